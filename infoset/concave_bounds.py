@@ -24,23 +24,9 @@ def bound_between(
 ) -> float:
     """Upper bound on [p, q] of a concave function with given values, plus slope (x - centre).
 
-    Parameters
-    ----------
-    labels, values : ndarray
-        Increasing arguments, and the values of the function.
-    number : int
-        Number of arguments.
-    first : int
-        Number of arguments that are at most p; the others are at least q.
-    p, q : float
-        Ends of the interval.
-    slope, centre : float
-        Coefficients of the added linear function.
-
-    Notes
-    -----
-    Outside of two of its points, a concave function lies below the line through them. The bound is infinite if neither
-    side has two points.
+    `labels` are `number` increasing arguments, of which `first` are at most p and the others at least q; `values` are
+    those of the function. Outside of two of its points, a concave function lies below the line through them. The bound
+    is infinite if neither side has two points.
     """
     has_left, has_right = first >= 2, number - first >= 2
     left_p = left_q = right_p = right_q = np.inf
@@ -64,11 +50,8 @@ def bound_between(
 def is_dead_between(dead: Records, latest: Floats) -> bool:
     """Return whether all labels from the first to the last of some dead labels, in increasing order, are dead.
 
-    `latest`, shape (2, len(dead)), is a working array.
-
-    Notes
-    -----
-    The overlap at the latest event at which one of them became empty is a concave function of the label.
+    The overlap at the latest event at which one of them became empty is a concave function of the label. `latest`,
+    shape (2, len(dead)), is a working array.
     """
     last_event = dead[0].died
     for i in range(1, len(dead)):

@@ -56,12 +56,8 @@ class Limits:
     def need(self, name: str, value: object) -> None:
         """Raise an error, which starts with `name`, if a value is not a number within these limits.
 
-        Raises
-        ------
-        TypeError
-            If it is not a float or an integer, or not an integer where it must be one; a bool is neither.
-        ValueError
-            If it is outside the limits.
+        TypeError for a value that is not a float or an integer, or not an integer where it must be one (a bool is
+        neither), ValueError for one outside the limits.
         """
         kinds = (int, np.integer) if self.whole else (int, float, np.integer)  # single precision would round
         if isinstance(value, bool) or not isinstance(value, kinds):
@@ -120,13 +116,7 @@ class _Rule:
 
 
 def limits_of(owner: type, field: str) -> Limits:
-    """Return the limits that a dataclass declares for the numbers of a field.
-
-    Raises
-    ------
-    TypeError
-        If it declares no limits.
-    """
+    """Return the limits that a dataclass declares for the numbers of a field; raise TypeError if it declares none."""
     found = next(rule.limits for rule in _rules(owner) if rule.field == field)
     if found is None:
         raise TypeError(f"{owner.__name__}.{field} declares no limits")
@@ -134,15 +124,11 @@ def limits_of(owner: type, field: str) -> Limits:
 
 
 def check_fields(owner: object) -> None:
-    """Check the values of a dataclass against the annotations of its fields.
+    """Check the values of a dataclass against the annotations of its fields; raise TypeError or ValueError.
 
     Numbers are annotated with `Limits`, intervals are pairs (least, greatest) of such numbers, ``tuple[float, ...]`` is
-    any number of them; enumerations, other dataclasses and text are checked by type.
-
-    Raises
-    ------
-    TypeError, ValueError
-        With the name of the field, the value, and what is allowed.
+    any number of them; enumerations, other dataclasses and text are checked by type. The message has the name of the
+    field, the value, and what is allowed.
     """
     kind: Any = type(owner)
     for rule in _rules(kind):
@@ -169,12 +155,8 @@ def _rule(field: str, name: str, hint: Any) -> _Rule:
 def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:
     """Raise an error, which starts with `name`, if a value is not a pair (least, greatest) of numbers within limits.
 
-    Raises
-    ------
-    TypeError
-        If it is not a tuple of two real numbers.
-    ValueError
-        If a number is outside the limits, or the pair is reversed.
+    TypeError for a value that is not a tuple of two real numbers, ValueError for a number outside the limits and for a
+    reversed pair.
     """
     if not isinstance(value, tuple) or len(value) != 2:
         raise TypeError(f"{name} must be a pair (least, greatest): got {shown(value)}")
@@ -187,12 +169,8 @@ def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:
 def real_values(name: str, value: ArrayLike) -> Floats:
     """Return an array of real numbers, finite or not, of any shape; `name` is for the message.
 
-    Raises
-    ------
-    TypeError
-        If it is masked, complex, or does not hold numbers.
-    ValueError
-        If its rows have different lengths.
+    A TypeError is raised if it is masked, complex, or does not hold numbers, a ValueError if its rows have different
+    lengths.
     """
     try:
         values = value if isinstance(value, np.ndarray) else np.asarray(value)
@@ -208,12 +186,7 @@ def real_values(name: str, value: ArrayLike) -> Floats:
 def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Return finite real numbers as an array of a shape, from such an array or from one number for all elements.
 
-    Raises
-    ------
-    TypeError
-        If it is masked, complex, or does not hold numbers.
-    ValueError
-        If a number is not finite, or the shape is different.
+    A TypeError is raised as by `real_values`, a ValueError if a number is not finite, or the shape is different.
     """
     values = real_values(name, value)
     if values.shape not in ((), shape):
@@ -226,12 +199,7 @@ def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
 def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Flags:
     """Return flags as an array of a shape, or a single flag for all elements.
 
-    Raises
-    ------
-    TypeError
-        If it is not of the type bool, or masked.
-    ValueError
-        If the shape is different.
+    A TypeError is raised if they are not of the type bool, or masked, a ValueError if the shape is different.
     """
     values = np.asarray(value)
     if isinstance(value, np.ma.MaskedArray) or values.dtype != np.bool_:

@@ -32,8 +32,8 @@ class Inconsistency:
     output : ndarray of int
         Output whose bounds made it empty, from 0, after the outputs before it. For noise in a polytope, its half-space.
     excess : ndarray
-        Least enlargement of these bounds, all others unchanged, for which a state exists, in the unit of the output;
-        0 if the set is not empty.
+        Least enlargement of these bounds, all others unchanged, for which a state exists, in the unit of the output; 0
+        if the set is not empty.
     """
 
     step: Integers
@@ -43,19 +43,7 @@ class Inconsistency:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """The set of possible states at a step.
-
-    Parameters
-    ----------
-    step : int
-        Number of the step, from 0.
-    sets : Sets
-        Sets of all runs.
-    single : bool
-        Whether there is one run without an axis of runs.
-    states : int
-        Number of states n.
-    """
+    """The sets of possible states of all runs at a step; with `single` there is one run, without an axis of runs."""
 
     step: int
     sets: Sets = field(repr=False)
@@ -69,13 +57,7 @@ class Estimate:
 
     @property
     def polygons(self) -> ConvexPolygons:
-        """The sets of two states.
-
-        Raises
-        ------
-        ValueError
-            If the system has another number of states.
-        """
+        """The sets of two states; a ValueError is raised if the system has another number of states."""
         if not isinstance(self.sets, Polygons):
             raise ValueError(f"the set has {self.states} states; its runs are .polytopes")
         polygons = ConvexPolygons.unchecked(self.sets.vertices, self.sets.counts)
@@ -108,10 +90,7 @@ class Estimate:
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
         """Return the least and the greatest values of matrix x, each of shape (m,) or (B, m); NaN for the empty set.
 
-        Raises
-        ------
-        ValueError
-            If the matrix does not have the shape (m, n).
+        A ValueError is raised if the `matrix` does not have the shape (m, n).
         """
         rows = real_values("matrix", matrix)
         if rows.ndim != 2 or rows.shape[1] != self.states:
@@ -155,10 +134,8 @@ class LinearObserver:
 
     Raises
     ------
-    TypeError
-        If a set or a number has a wrong type.
-    ValueError
-        If shapes do not agree, a number is not finite, or a set is empty.
+    TypeError, ValueError
+        If a set or a number has a wrong type, shapes do not agree, a number is not finite, or a set is empty.
 
     Notes
     -----
@@ -234,35 +211,18 @@ class LinearObserver:
             raise ValueError(f"{name} must not be empty")
 
     def predict(self, inputs: ArrayLike | None = None) -> None:
-        """Move the sets to the next step.
+        """Move the sets to the next step, with `inputs` u of shape (p,) or (B, p); without them zero.
 
-        Parameters
-        ----------
-        inputs : array_like, shape (p,) or (B, p), optional
-            u between this step and the next one; without it zero.
-
-        Raises
-        ------
-        ValueError
-            If the inputs have another shape or are not finite, or a matrix for this step is missing.
-        ArithmeticError
-            If a polytope has more than 5000 vertices.
+        A ValueError is raised if the inputs have another shape or are not finite, or a matrix for this step is missing,
+        an ArithmeticError if a polytope has more than 5000 vertices.
         """
         self._sets = self._sets.predicted(self._motion(self.step, inputs))
         self.step += 1
 
     def update(self, measurement: ArrayLike) -> None:
-        """Cut the sets by the measurement of this step.
+        """Cut the sets by the `measurement` y of this step, shape (q,) or (B, q); NaN is a missing measurement.
 
-        Parameters
-        ----------
-        measurement : array_like, shape (q,) or (B, q)
-            y; NaN is a missing measurement.
-
-        Raises
-        ------
-        ValueError
-            If it has another shape, or is infinite.
+        A ValueError is raised if it has another shape, or is infinite.
         """
         y = self._rows("measurement", measurement, self.outputs, missing=True)
         matrix = self._at(self._c, "output_matrix", self.step)
@@ -300,11 +260,6 @@ class LinearObserver:
             y of this step and of the next ones.
         inputs : array_like, shape (N, p) or (N, B, p), optional
             u after each measurement; one row less is enough.
-
-        Raises
-        ------
-        ValueError
-            As `predict` and `update`, or if there are too few inputs.
         """
         estimates = []
         rows = real_values("measurements", measurements)
@@ -325,14 +280,10 @@ class LinearObserver:
         Parameters
         ----------
         estimates : sequence of Estimate
-            Estimates of successive steps, as `run` returns them.
+            Estimates of successive steps, as `run` returns them; a ValueError is raised if the steps are not
+            successive.
         inputs : array_like, shape (N, p) or (N, B, p), optional
             u after each of them; the last one is not used.
-
-        Raises
-        ------
-        ValueError
-            If the steps are not successive, or there are too few inputs.
         """
         if any(after.step != before.step + 1 for before, after in pairwise(estimates)):
             raise ValueError("estimates must belong to successive steps")

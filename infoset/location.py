@@ -40,14 +40,9 @@ MOST_PROBES = 200
 
 
 class Living(NamedTuple):
-    """Interval of living labels [lower, upper], and a bracket of each end.
+    """Interval of living labels [lower, upper], m, and a bracket of each end: `below` and `above`.
 
-    Parameters
-    ----------
-    exists : bool
-        Whether a label lives.
-    below, lower, upper, above : float
-        Increasing labels, m. The middle two live. The outer two are dead, or equal to an end at a limit of the search.
+    The outer two labels are dead, or equal to an end at a limit of the search. `exists` is whether a label lives.
     """
 
     exists: bool
@@ -70,13 +65,9 @@ def locate_end(
 ) -> tuple[float, float]:
     """Narrow the bracket between a dead and a living label; return the bracket (dead, living).
 
-    The section at the living label is stored in `row` of the workspace.
-
-    Notes
-    -----
-    The overlap at the event that makes the section empty is a concave function of the label, so that the Illinois
-    variant of regula falsi converges fast. If four probes have not narrowed the bracket to an eighth, because that
-    event changes with the label, one bisection follows.
+    The section at the living label is stored in `row` of the workspace. The overlap at the event that makes the section
+    empty is a concave function of the label, so that the Illinois variant of regula falsi converges fast. If four
+    probes have not narrowed the bracket to an eighth, because that event changes with the label, one bisection follows.
     """
     run(living, tape, errors, laws, room.replays)
     keep_living(room, tape.events, row)
@@ -117,15 +108,9 @@ def locate_end(
 def search_living(resolution: float, tape: Tape, errors: Floats | None, laws: Floats, room: Workspace) -> bool:
     """Search for a living label between the first three known ones, which are dead; the middle one outlives the others.
 
-    Returns
-    -------
-    bool
-        Whether the middle label now lives. If not, there is no living label in the bracket.
-
-    Notes
-    -----
-    The pair (event, overlap) is a unimodal function of the label: the larger half of the bracket is probed at its
-    middle. The search ends if the bracket is narrower than the resolution, or if no label in it can live.
+    Return whether the middle label now lives; if not, there is no living label in the bracket. The pair (event,
+    overlap) is a unimodal function of the label: the larger half of the bracket is probed at its middle. The search
+    ends if the bracket is narrower than the resolution, or if no label in it can live.
     """
     known, four = room.known, room.four
     for _ in range(MOST_PROBES):
@@ -187,8 +172,6 @@ def search_everywhere(
 ) -> tuple[bool, float]:
     """Find a living label within limits if the living labels need not form an interval, or prove that none lives.
 
-    Notes
-    -----
     A window without living labels under the bands that are convex on it is discarded. The others are halved until they
     are narrower than the resolution, beginning with the one in which a probed label lived longest with its own bands.
     """
@@ -324,18 +307,12 @@ def refine_all(
     laws: Floats,
     room: Workspace,
 ) -> int:
-    """Replace the sections of the wanted engagements by a grid over the living labels, ends included.
+    """Replace the sections of the wanted engagements by a grid of `number` over the living labels, ends included.
 
-    Returns
-    -------
-    int
-        Number of vertices that every new section may gain.
-
-    Notes
-    -----
-    `limit_below` and `limit_above` are narrowed to dead labels, except where other labels may live beyond them: with
-    rates, with the rectangle as initial set of the guaranteed model, and with an error bound that rises with range in
-    the paper's model. If no label lives, the engagement has no living section afterwards.
+    Return the number of vertices that every new section may gain. If no label lives, the engagement has no living
+    section afterwards. `limit_below` and `limit_above` are narrowed to dead labels, except where other labels may live
+    beyond them: with rates, with the rectangle as initial set of the guaranteed model, and with an error bound that
+    rises with range in the paper's model.
     """
     spare = CAPACITY
     labels, used, alive, died = sections.labels, sections.used, sections.living, sections.died

@@ -31,7 +31,7 @@ class Model(Enum):
     """What the set allows for.
 
     PAPER is the published procedure, whose set may lose the true state. GUARANTEED allows for errors of the closing
-    speed, gravity, manoeuvres, errors of the engine and rounding, and its set does not.
+    speed, gravity, manoeuvres, errors of the engine and rounding, and its set contains the true state.
     """
 
     PAPER = "paper"
@@ -98,12 +98,8 @@ class StateBox:
         return ("z",) if self.y_m is None else ("y", "z")
 
     def axis(self, name: str) -> StateBox:
-        """Return the planar box of x and one lateral axis, "y" or "z", which is z in it.
-
-        Raises
-        ------
-        ValueError
-            If the box does not have the axis.
+        """Return the planar box of x and one lateral axis, "y" or "z", which is z in it; raise ValueError if there is
+        none.
         """
         if name not in self.axes:
             raise ValueError(f"StateBox: its lateral axes are {', '.join(self.axes)}: got {name!r}")
@@ -126,8 +122,6 @@ class StateBox:
     def farthest_m(self) -> float:
         """Greatest distance until x = 0, m.
 
-        Notes
-        -----
         Without impulses the distance is a convex function of time: it is greatest at the start or at the end.
         """
         offset, greatest = self.offset_m, self.x_m[1]
@@ -237,20 +231,12 @@ class SetModel:
     def axis(self, name: str) -> SetModel:
         """Return the planar model of x and one lateral axis, "y" or "z", which is z in it.
 
-        Notes
-        -----
         It has plane angles and no error of pointing: `section_laws` adds what couples the two axes.
         """
         return self if len(self.axes) == 1 else _planar_model(self, name)
 
     def check_period(self, name: str, sensor: Sensor) -> None:
-        """Refuse a sensor whose period is not a whole number of steps; `name` is its name in the message.
-
-        Raises
-        ------
-        ValueError
-            If the period is another number.
-        """
+        """Raise ValueError if the period of a sensor is not a whole number of steps; `name` is for the message."""
         steps = sensor.period_s / self.step_s
         whole = self.steps_in(sensor.period_s)
         if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
@@ -259,19 +245,12 @@ class SetModel:
             )
 
     def check_start(self, name: str, box: StateBox) -> None:
-        """Refuse starts below the range threshold, and starts where the error bound of the angle is not positive.
-
-        Parameters
-        ----------
-        name : str
-            Name of the box, for the message.
-        box : StateBox
-            Possible starts.
+        """Check that starts are above the range threshold, and that the error bound of the angle is positive there.
 
         Raises
         ------
         ValueError
-            If there are such starts.
+            If they are not; `name` is the name of the box in the message.
         """
         if self.range_threshold_m >= box.x_m[0]:
             raise ValueError(
@@ -321,10 +300,7 @@ class SetModel:
     def label_limits_m(self) -> Interval:
         """Least and greatest label of a true state, m: its range at t = 0 divided by 1 + eta.
 
-        Raises
-        ------
-        ValueError
-            If eta may be 1 or more, for which the guaranteed model has no labels.
+        A ValueError is raised if eta may be 1 or more, for which the guaranteed model has no labels.
         """
         least, greatest = self.bounds.x_m
         eta = self.speed_error

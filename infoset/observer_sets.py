@@ -28,14 +28,9 @@ MOST_POLYTOPE_VERTICES = 5000
 class Strips:
     """The sets {x: lower <= normal . x <= upper} of a batch of runs.
 
-    Parameters
-    ----------
-    normals : ndarray, shape (r, n)
-        Normals of any length; a zero one bounds nothing.
-    lower, upper : ndarray, shape (B, r)
-        Infinite for a strip that does not exist in this run.
-    terms : ndarray, shape (B, r)
-        Sums of the sizes of the terms of the bounds, which determine rounding errors.
+    `normals`, shape (r, n), have any length; a zero one bounds nothing. `lower` and `upper`, shape (B, r), are infinite
+    for a strip that does not exist in this run. `terms`, shape (B, r), are the sums of the sizes of the terms of the
+    bounds, which determine rounding errors.
     """
 
     normals: Floats
@@ -46,16 +41,10 @@ class Strips:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A step x+ = matrix x + shift + w.
+    """A step x+ = matrix x + shift + w, with w in the `disturbance`.
 
-    Parameters
-    ----------
-    shifts : ndarray, shape (B, n) or (1, n)
-        B u + c.
-    terms : ndarray, shape (B, n) or (1, n)
-        Sums of the sizes of the terms of the shifts, which determine rounding errors.
-    disturbance : ConvexPolygons, Polytope or Zonotope
-        Set of w.
+    `shifts`, shape (B, n) or (1, n), are B u + c, and `terms` of the same shape the sums of the sizes of their terms,
+    which determine rounding errors.
     """
 
     matrix: Floats
@@ -209,13 +198,7 @@ class Polytopes:
         return np.array([member is None for member in self.members])
 
     def predicted(self, motion: Motion) -> Polytopes:
-        """Return the sets after a step.
-
-        Raises
-        ------
-        ArithmeticError
-            If a set has more than `MOST_POLYTOPE_VERTICES` vertices.
-        """
+        """Return the sets after a step; raise ArithmeticError if one has more than `MOST_POLYTOPE_VERTICES`."""
         w, states = motion.disturbance, len(motion.matrix)
         centre = w.centre if isinstance(w, Zonotope) else np.zeros(states)
         shifts, terms = (

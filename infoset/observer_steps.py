@@ -49,18 +49,9 @@ def predict_all(
 ) -> None:
     """Write matrix P + shift + the segments of the generators + the polygon `other`, with slack, for each polygon P.
 
-    Parameters
-    ----------
-    shifts, terms : ndarray, shape (B, 2) or (1, 2)
-        Shifts, and the sums of the sizes of their terms.
-    generators : ndarray, shape (g, 2)
-        Half segments.
-    other : ndarray, shape (m, 2)
-        A polygon; not used if it has no vertices.
-    slack : float
-        Half the width of the box that is added, relative to the terms of a coordinate.
-    out : ndarray, shape (B, larger room, 2)
-        Receives at most 2 g + m + 4 vertices more.
+    `shifts`, and the sums `terms` of the sizes of their terms, have the shape (B, 2) or (1, 2). `generators`, shape (g,
+    2), are half segments; `other`, shape (m, 2), may have no vertices. `slack` is half the width of the box that is
+    added, relative to the terms of a coordinate. A result has at most 2 g + m + 4 vertices more.
     """
     scratch, second = np.empty((out.shape[1], 2)), np.empty((out.shape[1], 2))
     xx, xy, yx, yy = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
@@ -118,24 +109,10 @@ def corner(part: int) -> tuple[float, float]:
 def enlarge(
     points: Points, count: int, shift_x: float, shift_y: float, half_x: float, half_y: float, out: Points
 ) -> int:
-    """Write a polygon that is moved by (shift_x, shift_y) and contains the sum with a small box.
+    """Write a polygon, not empty, that is moved by (shift_x, shift_y) and contains the sum with a small box; return its
+    size.
 
-    Parameters
-    ----------
-    points, count : polygon
-        Not empty.
-    half_x, half_y : float
-        Half the widths of the box.
-    out : ndarray, shape (>= count + 4, 2)
-        Receives the vertices.
-
-    Returns
-    -------
-    int
-        Vertices of the result: `count` for most sets, at most count + 4.
-
-    Notes
-    -----
+    Half the widths of the box are (half_x, half_y). The result has `count` vertices for most sets, at most count + 4.
     O(count). The lowest, rightmost, highest and leftmost vertices divide the boundary into four parts, and each part
     moves by one corner of the box. A dividing vertex moves so that both of its edges move far enough, by at most five
     boxes; at a sharp tip it becomes two vertices. The division at extremes is correct for edges of a few ulp with a
@@ -247,22 +224,12 @@ def update_all(
     made: Integers,
     excess: Floats,
 ) -> None:
-    """Write the part of each polygon that is within the strips of a measurement.
+    """Write the part of each polygon that is within the strips of a measurement: at most 2 r vertices more.
 
-    Parameters
-    ----------
-    normals : ndarray, shape (r, 2)
-        Normals of the strips.
-    lower, upper : ndarray, shape (B, r)
-        Bounds of normal . x, infinite for a missing measurement.
-    terms : ndarray, shape (B, r)
-        Sums of the sizes of the terms of the bounds.
-    slack : float
-        Enlargement of the bounds, relative to their terms and those of normal . x.
-    out : ndarray, shape (B, larger room, 2)
-        Receives at most 2 r vertices more.
-    excess : ndarray, shape (B, r)
-        Receives the distance between set and strip, in the unit of the bounds, where the set becomes empty.
+    `normals` have the shape (r, 2). The bounds of normal . x, `lower` and `upper`, shape (B, r), are infinite for a
+    missing measurement; `terms`, shape (B, r), are the sums of the sizes of their terms. `slack` is the enlargement of
+    the bounds, relative to their terms and those of normal . x. `excess`, shape (B, r), receives the distance between
+    set and strip, in the unit of the bounds, where the set becomes empty.
     """
     for b in range(counts.size):
         count = counts[b]
@@ -296,23 +263,12 @@ def cut_to_preimage(
     out: Floats,
     made: Integers,
 ) -> None:
-    """Write the points x of each polygon for which matrix x is in a later polygon.
+    """Write the points x of each polygon for which matrix x is in a later polygon: at most four vertices more than
+    both.
 
-    Parameters
-    ----------
-    later : ndarray, shape (B, later room, 2)
-        Later polygons.
-    slack : float
-        Enlargement of the half-planes of the later polygon, relative to the terms of a height.
-    out : ndarray, shape (B, larger room, 2)
-        Receives the polygons, with at most four vertices more than both.
-    made : ndarray of int, shape (B,)
-        Receives the numbers of vertices.
-
-    Notes
-    -----
-    The level of each half-plane is the greatest height of all vertices, so that the half-plane of an edge of a few ulp
-    with a wrong direction contains the set. Half-planes along the axes bound what such edges leave open at sharp tips.
+    `slack` is the enlargement of the half-planes of the later polygon, relative to the terms of a height. The level of
+    each half-plane is the greatest height of all vertices, so that the half-plane of an edge of a few ulp with a wrong
+    direction contains the set. Half-planes along the axes bound what such edges leave open at sharp tips.
     """
     for b in range(counts.size):
         made[b] = 0

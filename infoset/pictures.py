@@ -14,17 +14,7 @@ MOST_INTERVALS = 24
 
 
 def outlines_svg(outlines: Sequence[Floats], x_title: str, y_title: str, title: str) -> str:
-    """Return a picture of convex polygons.
-
-    Parameters
-    ----------
-    outlines : sequence of ndarray, shape (n, 2)
-        Vertices of the polygons, in the units of the axes.
-    x_title, y_title : str
-        Names of the axes, with units.
-    title : str
-        Text above the picture.
-    """
+    """Return a picture of convex polygons, each an array of vertices of shape (n, 2) in the units of the axes."""
     shown = [outlines[index] for index in evenly(len(outlines), MOST_OUTLINES)]
     shown = [outline for outline in shown if len(outline)]
     if not shown:
@@ -39,13 +29,8 @@ def outlines_svg(outlines: Sequence[Floats], x_title: str, y_title: str, title: 
 def sections_svg(planes: Mapping[str, Sequence[Floats]], title: str) -> str:
     """Return a picture of sections in (omega, alpha) planes, coloured from the nearest (dark) to the farthest.
 
-    Parameters
-    ----------
-    planes : mapping of str to sequence of ndarray, shape (n, 2)
-        Vertices (omega, alpha) of each section, rad/s and rad, by what the title of the plane ends with. Planes are
-        side by side.
-    title : str
-        Text above each plane.
+    `planes` has the vertices (omega, alpha) of each section, rad/s and rad, shape (n, 2), by the text that the title of
+    the plane ends with. Planes are side by side.
     """
     return side_by_side(
         [

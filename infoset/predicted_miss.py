@@ -12,10 +12,8 @@ from infoset.pictures import predicted_miss_svg
 class ExtremePoints:
     """States that reach an end of the predicted-miss interval, one for each engagement.
 
-    Parameters
-    ----------
-    alpha_rad, omega_rad_s, range_m : ndarray, shape (B,)
-        Line-of-sight angle, its rate, and range: rad, rad/s, m. Shape (2, B) in space, along y and z.
+    Arrays of line-of-sight angle, its rate and range, rad, rad/s and m, have the shape (B,), in space (2, B) along y
+    and z.
     """
 
     alpha_rad: Floats

@@ -59,8 +59,8 @@ class Bias(Enum):
 class Geometry(Protocol):
     """True geometry of a batch of engagements, or other points with angles, rates and ranges.
 
-    The line of sight of a plane has arrays of shape (B,). In space, angles and rates have shape (2, B), along y and z;
-    below, (..., B) stands for both.
+    Arrays of angles and rates have the shape (B,) in a plane, (2, B) along y and z in space; below, (..., B) means
+    both.
     """
 
     @property
@@ -128,16 +128,10 @@ class Sensor(ABC):
 
     @abstractmethod
     def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
-        """Cut sets by the measurement of this sensor.
+        """Cut sets, for example an `InformationSet`, by the measurement of this sensor.
 
-        Parameters
-        ----------
-        sets : Cuttable
-            Sets of a batch, for example an `InformationSet`.
-        measured : mapping of str to ndarray, shape (..., B)
-            All measurements of the step (rad, m, rad/s), that of this sensor among them.
-        where : ndarray of bool, shape (B,)
-            Engagements that have measured.
+        `measured` has all measurements of the step by sensor, shape (..., B), rad, m and rad/s; `where`, shape (B,),
+        the engagements that have measured.
         """
 
     def measures_at(self, before_arrival_s: float) -> bool:
@@ -147,20 +141,9 @@ class Sensor(ABC):
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats] | None:
         """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
 
-        Parameters
-        ----------
-        range_m : ndarray
-            Ranges x, m.
-        closing_speed_m_s : float
-            Closing speed e.
-        errors : float
-            Half-width of the interval of the measured quantity, in units of the bound.
-
-        Returns
-        -------
-        tuple of (bool, ndarray), or None
-            Whether it is a band of the predicted miss z + V x/e (otherwise of z), and its half-width, m. None if a
-            measurement leaves V and z as they are.
+        It is whether the band is one of the predicted miss z + V x/e (otherwise of z), and its half-width, m, at ranges
+        x = `range_m`, with the closing speed e; None if a measurement leaves V and z as they are. `errors` is the
+        half-width of the interval of the measured quantity, in units of the bound.
         """
         return None
 
@@ -325,8 +308,6 @@ class AngleSensor(Sensor):
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
         """Return the greatest size of the error at a range (m), rad.
 
-        Notes
-        -----
         The bound of a camera does not increase at distances below its centroid error, where c/d is greater than 1 rad.
         """
         bound = self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
@@ -336,12 +317,8 @@ class AngleSensor(Sensor):
         return bound
 
     def error_bounds(self, range_m: Floats) -> Floats:
-        """Return the greatest size of the error of each angle, rad, at ranges (m) of shape (..., B).
-
-        Returns
-        -------
-        ndarray, shape (..., B)
-            (2, B) if the two axes differ.
+        """Return the greatest size of the error of each angle, rad, at ranges (m) of shape (..., B); (2, B) if the axes
+        differ.
         """
         if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
             return self.error_bound(range_m)
@@ -379,12 +356,10 @@ class AngleSensor(Sensor):
         return not (too_early or too_late)
 
     def with_bias(self, sight: Geometry, error: Floats, bias: Floats) -> Floats:
-        """Return the error of a camera in units of its bound, from those of the pixel and of the centroid part.
+        """Return the error of a camera in units of its bound, shape (..., B).
 
-        Parameters
-        ----------
-        error, bias : ndarray, shape (..., B)
-            Errors in units of the bounds of the two parts, within [-1, 1] or the unit disc.
+        `error` and `bias` are those of the pixel and the centroid part in units of the bounds of the two parts, within
+        [-1, 1] or the unit disc.
         """
         share = self.pixel_error_rad / self.error_bound(sight.range_m)
         return share * error + (1.0 - share) * bias
@@ -392,10 +367,8 @@ class AngleSensor(Sensor):
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
         """Return the measured angles for an error in units of the bound, rad.
 
-        Notes
-        -----
-        In the convention CONE, the true direction is turned by the angle |error| bound toward the projection of
-        (0, error_y, error_z) on the plane across it.
+        In the convention CONE, the true direction is turned by the angle |error| bound toward the projection of (0,
+        error_y, error_z) on the plane across it.
         """
         if self.convention is not Convention.CONE:
             return self.true_value(sight) + self.error_bounds(sight.range_m) * error
@@ -429,10 +402,8 @@ class AngleSensor(Sensor):
     def nearest(self, sight: Geometry, wanted: Floats) -> Floats:
         """Return the possible measurement that is nearest to wanted angles; in a disc, with their direction of error.
 
-        Parameters
-        ----------
-        wanted : ndarray, shape (..., B)
-            Angles atan2(y, x) and atan2(z, x), rad; the measurement is in the convention of the sensor.
+        `wanted` are atan2(y, x) and atan2(z, x), rad, shape (..., B); the measurement is in the convention of the
+        sensor.
         """
         wanted = self.of_plane_angles(wanted)
         if not self.is_disc:
@@ -447,8 +418,6 @@ class AngleSensor(Sensor):
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
         """Return a band of z.
 
-        Notes
-        -----
         With a camera the bound of a point off the axis, which is farther away, is less: h/x = b/(1 + b^2) allows for
         this, along both axes at once.
         """
@@ -492,11 +461,6 @@ class RangeSensor(Sensor):
         Time between measurements, s; the first is at t = 0.
     relative_error : float
         Greatest |d_m - d| / d, in (0, 1).
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not a number within its limits.
 
     References
     ----------
@@ -545,11 +509,6 @@ class RateSensor(Sensor):
         Time between measurements, s; the first is at t = 0.
     error_rad_s : float
         Greatest |omega_m - omega|, rad/s.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not a number within its limits.
 
     References
     ----------

@@ -41,12 +41,6 @@ class SetState:
 
     Parameters
     ----------
-    model : SetModel
-        Known constants and assumptions.
-    stack : SectionStack
-        The stored sections.
-    history : History
-        Measurements and impulses so far.
     lower_label, upper_label : ndarray, shape (B,)
         Limits of the labels, m.
     status : ndarray of int, shape (B,)
@@ -73,14 +67,8 @@ class SetState:
     phi: GuaranteedMiss | None
 
     def refine(self, wanted: Flags, sections: int) -> None:
-        """Replace the sections of the wanted engagements by a new grid over their living labels, found by replay.
-
-        Parameters
-        ----------
-        wanted : ndarray of bool, shape (B,)
-            Engagements to refine.
-        sections : int
-            Number of sections of the new grid, both ends included.
+        """Replace the sections of the wanted engagements by a grid of `sections` over their living labels, found by
+        replay.
         """
         stack, history = self.stack, self.history
         stack.make_room_for_new(wanted, sections)

@@ -25,10 +25,8 @@ class Plane:
     ----------
     x, y : tuple of float
         Limits of the axes.
-    x_title, y_title : str
-        Names of the axes, with units.
-    title : str
-        Text above the plane.
+    x_title, y_title, title : str
+        Names of the axes, with units, and the text above the plane.
     height : int
         Height of the picture in pixels.
     levels : sequence of (float, str), or None
@@ -117,15 +115,7 @@ def note(text: str) -> str:
 
 
 def limits(values: Floats, margin: float = 0.06) -> Limits:
-    """Return limits slightly wider than the values, of nonzero width.
-
-    Parameters
-    ----------
-    values : ndarray
-        One value or more.
-    margin : float
-        Added on each side, relative to the width of the values.
-    """
+    """Return limits of nonzero width, slightly wider than the values: by `margin` of their width on each side."""
     low, high = float(values.min()), float(values.max())
     room = margin * (high - low) or 0.05 * abs(high) or 1.0
     return low - room, high + room

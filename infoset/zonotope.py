@@ -21,11 +21,6 @@ class Zonotope:
         Point of symmetry.
     generators : array_like, shape (m, n)
         One generator g_i a row; none for a point.
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not agree, or a number is not finite.
     """
 
     centre: Floats

@@ -104,10 +104,10 @@ def undescribed(name: str, thing: Any) -> list[str]:
     if inspect.isclass(thing) and getattr(thing, "_is_protocol", False):
         return []
     text = inspect.getdoc(thing) or ""
-    known = described(text)
-    contract = CONTRACTS.get(name.rsplit(".", 1)[-1])
-    if contract is not None and "Parameters\n" not in text:
-        known |= described(inspect.getdoc(THINGS[f"{contract}.{name.rsplit('.', 1)[-1]}"]) or "") | {"batch"}
+    known, method = described(text), name.rsplit(".", 1)[-1]
+    if method in CONTRACTS and "Parameters\n" not in text:
+        text += inspect.getdoc(THINGS[f"{CONTRACTS[method]}.{method}"]) or ""
+        known |= described(text) | {"batch"}
     return [
         parameter.name
         for parameter in inspect.signature(thing).parameters.values()
