@@ -22,14 +22,10 @@ def need_finite(name: str, values: Floats) -> None:
 
 
 def finite_values(name: str, value: ArrayLike, *shape: str | int) -> Floats:
-    """Return finite numbers of a shape.
+    """Return finite numbers of a shape; an empty list is an array without rows.
 
-    Parameters
-    ----------
-    value : array_like
-        Its unit is that of the set. An empty list is an array without rows.
-    *shape : str or int
-        Sizes of the axes. A letter is any size, of the axes n and m at least 1; "..." is any number of axes.
+    `shape` has the sizes of the axes. A letter is any size, of the axes n and m at least 1; "..." is any number of
+    axes.
     """
     values = real_values(name, value)
     last = shape[1:] if shape[:1] == ("...",) else shape

@@ -75,8 +75,6 @@ def height(points: Points, i: int, normal_x: float, normal_y: float) -> float:
 def crossing(points: Points, i: int, j: int, normal_x: float, normal_y: float, level: float) -> tuple[float, float]:
     """Return the point of the edge i-j at a level of `normal . p`, interpolated from the nearer end.
 
-    Notes
-    -----
     The result does not depend, bit for bit, on the order of i and j, so that a cut segment stays a segment.
     """
     height_i = height(points, i, normal_x, normal_y)
@@ -97,26 +95,11 @@ def crossing(points: Points, i: int, j: int, normal_x: float, normal_y: float, l
 
 @compiled
 def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: float, level: float) -> int:
-    """Remove, in place, the part higher than a level. Vertex `top` must be higher, and some vertex must not be.
+    """Remove, in place, the part with normal . p > level; return the new number of vertices, at most count + 1.
 
-    Parameters
-    ----------
-    points, count : polygon
-        The array needs room for one more vertex.
-    top : int
-        The highest vertex.
-    normal_x, normal_y, level : float
-        The result satisfies normal . p <= level.
-
-    Returns
-    -------
-    int
-        New number of vertices, at most count + 1.
-
-    Notes
-    -----
-    O(count). The two points where the boundary crosses the level replace the sequence of high vertices around the top;
-    other vertices do not change, so that rounding errors elsewhere have no effect.
+    Vertex `top` is the highest and is higher than the level, and some vertex is not. O(count). The two points where the
+    boundary crosses the level replace the sequence of high vertices around the top; other vertices do not change, so
+    that rounding errors elsewhere have no effect.
     """
     first = last = top
     before = first - 1 if first > 0 else count - 1
@@ -161,27 +144,12 @@ def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: flo
 def clip_to_band(
     points: Points, count: int, normal_x: float, normal_y: float, lower: float, upper: float
 ) -> tuple[int, float]:
-    """Intersect in place with the band lower <= normal . p <= upper.
+    """Intersect in place with the band lower <= normal . p <= upper; return the number of vertices and the overlap.
 
-    Parameters
-    ----------
-    points, count : polygon
-        The array needs room for two more vertices.
-    normal_x, normal_y : float
-        Normal of the band, of any nonzero length.
-    lower, upper : float
-        Bounds; infinite ones give a half-plane.
-
-    Returns
-    -------
-    count : int
-        Vertices of the intersection; 0 if it is empty.
-    overlap : float
-        Smaller overlap of polygon and band at the two borders; minus their distance if they do not intersect.
-
-    Notes
-    -----
-    O(count). A vertex on a border is inside. The new vertices of an axis-parallel cut lie exactly on its line.
+    The array needs room for two more vertices. The normal has any nonzero length; infinite bounds give a half-plane.
+    The overlap is the smaller one of polygon and band at the two borders; minus their distance if they do not
+    intersect. O(count). A vertex on a border is inside. The new vertices of an axis-parallel cut lie exactly on its
+    line.
     """
     if count == 0 or lower > upper:
         return 0, -np.inf
@@ -300,11 +268,9 @@ def fan_area(points: Points, i: int) -> float:
 
 @compiled
 def centroid(points: Points, count: int) -> tuple[float, float]:
-    """Return the centroid of a nonempty polygon; the middle of a segment or of a set without area.
+    """Return the centroid of a nonempty polygon; the middle of a segment or of a set without area. O(count).
 
-    Notes
-    -----
-    O(count). It is a convex combination of the centroids of a triangle fan, so that it lies in the hull.
+    It is a convex combination of the centroids of a triangle fan, so that it lies in the hull.
     """
     weight = 0.0
     x = 0.0
@@ -333,8 +299,6 @@ def pass_edge(
 ) -> tuple[float, bool]:
     """Add one edge to the squared distance of (x, y) to the boundary and to the parity test for inside.
 
-    Notes
-    -----
     Without branches: a mispredicted branch costs more than a division.
     """
     edge_x, edge_y = end[0] - start[0], end[1] - start[1]
@@ -355,11 +319,10 @@ def pass_edge(
 @compiled
 def margin(points: Points, count: int, x: float, y: float) -> float:
     """Return the signed distance from (x, y) to the boundary: positive inside, negative outside, -inf if empty.
+    O(count).
 
-    Notes
-    -----
-    O(count). The parity of the edges to the right gives the sign, and the nearest edge the distance. An edge of a few
-    ulp with a wrong direction has no effect on either; the signed distance to its line would be wrong.
+    The parity of the edges to the right gives the sign, and the nearest edge the distance. An edge of a few ulp with a
+    wrong direction has no effect on either; the signed distance to its line would be wrong.
     """
     nearest = np.inf
     inside = False

@@ -79,12 +79,10 @@ def diameter(points: Points, count: int) -> float:
 
 @compiled
 def largest_disc(points: Points, count: int) -> tuple[float, float, float]:
-    """Return the centre (x, y) and the radius of a largest disc in a nonempty polygon.
+    """Return the centre (x, y) and the radius of a largest disc in a nonempty polygon. O(count^2).
 
-    Notes
-    -----
-    O(count^2). The sides move inward at the same speed, and a side whose length becomes zero is removed, until no area
-    is left. The centre is the middle of the segment that remains.
+    The sides move inward at the same speed, and a side whose length becomes zero is removed, until no area is left. The
+    centre is the middle of the segment that remains.
     """
     a, n = tidy(points, count)
     a = a[:n].copy()

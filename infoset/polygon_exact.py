@@ -178,8 +178,6 @@ def meeting(a: Points, i: int, j: int, b: Points, k: int, m: int) -> tuple[float
 def intersect(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
     """Write the intersection of two polygons and return its number of vertices, at most count + other_count.
 
-    Notes
-    -----
     O(count * other_count) orientations. The vertices are the vertices of each polygon that are in the other one and the
     crossings of edges. All are decided exactly, so that no sliver or contact is lost, and each vertex is within 4 ulp
     of the coordinates of the exact one.
@@ -226,22 +224,13 @@ def apart(one: float, other: float) -> bool:
 
 @compiled
 def corner(points: Points, count: int) -> tuple[int, int, float]:
-    """Return how a ring turns, exactly decided.
-
-    Returns
-    -------
-    turns : int
-        1 for a counter-clockwise ring, -1 for a clockwise one, 0 if all vertices are on one line.
-    reflex : int
-        The first vertex at which the ring turns the other way or back; without one, the first from which it goes
-        around a second time; -1 if the ring is convex.
-    depth : float
-        Greatest distance by which such a vertex must move, to the line through its neighbours or to one of them,
-        relative to the largest coordinates.
-
-    Notes
-    -----
+    """Return how a ring turns, exactly decided, its first reflex vertex, and the depth of its reflex vertices.
     O(count).
+
+    The first number is 1 for a counter-clockwise ring, -1 for a clockwise one, 0 if all vertices are on one line. The
+    second is the first vertex at which the ring turns the other way or back; without one, the first from which it goes
+    around a second time; -1 if the ring is convex. The depth is the greatest distance by which such a vertex must move,
+    to the line through its neighbours or to one of them, relative to the largest coordinates.
     """
     size_x = size_y = area = 0.0
     flat = True

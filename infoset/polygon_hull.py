@@ -14,20 +14,9 @@ from infoset.polygon import ROUNDING, Points, append, close, cross
 def hull(points: Points, count: int, out: Points) -> int:
     """Write the convex hull of points: counter-clockwise, without repeated vertices or vertices along an edge.
 
-    Parameters
-    ----------
-    out : ndarray, shape (>= count, 2)
-        Receives the vertices.
-
-    Returns
-    -------
-    int
-        Vertices of the hull: 2 if the points lie on a line, 1 if they coincide, 0 if there are none.
-
-    Notes
-    -----
-    Andrew's monotone chain: O(count) for sorted points; the sort takes O(count^2) in the worst case. Points that
-    protrude by less than rounding are removed. The directions of the edges increase strictly in spite of rounding.
+    Return its number of vertices: 2 if the points lie on a line, 1 if they coincide, 0 if there are none. O(count) for
+    sorted points; the sort takes O(count^2) in the worst case. Points that protrude by less than rounding are removed.
+    The directions of the edges increase strictly in spite of rounding.
 
     References
     ----------
@@ -93,23 +82,12 @@ def drop_repeats(points: Points, count: int) -> int:
 
 @compiled
 def reduce_outward(points: Points, count: int, cap: int) -> int:
-    """Remove edges, in place, until at most `cap` vertices are left; the result contains the polygon.
+    """Remove edges, in place, until at most `cap` vertices are left; the result contains the polygon; return its size.
 
-    Parameters
-    ----------
-    cap : int
-        At least 4, because a convex polygon of five vertices always has an edge that can be removed.
-
-    Returns
-    -------
-    int
-        New number of vertices.
-
-    Notes
-    -----
-    An edge is removed by extending its neighbours to their intersection; the edge that adds the least area is removed
-    first, at O(count) per edge. If rounding has given an edge a wrong direction, the hull is taken first; a rectangle
-    replaces a hull that is too thin.
+    The cap is at least 4, because a convex polygon of five vertices always has an edge that can be removed. An edge is
+    removed by extending its neighbours to their intersection; the edge that adds the least area is removed first, at
+    O(count) per edge. If rounding has given an edge a wrong direction, the hull is taken first; a rectangle replaces a
+    hull that is too thin.
     """
     is_hull = False
     while count > cap:
@@ -182,17 +160,8 @@ def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> tup
 def drop_inner_edges(points: Points, count: int, fewest: int, added: Points) -> tuple[int, bool]:
     """Remove edges inside a path, in place, until `fewest` vertices are left; the path moves outward only.
 
-    Parameters
-    ----------
-    added : ndarray, shape (>= count,)
-        Working array: the area that the removal of each edge adds. A removal changes four of these areas.
-
-    Returns
-    -------
-    count : int
-        New number of vertices.
-    done : bool
-        False if no edge can be removed before that.
+    Return the new number of vertices, and False if no edge can be removed before that. `added`, shape (>= count,), is a
+    working array: the area that the removal of each edge adds. A removal changes four of these areas.
     """
     first, last = 1, count - 3
     while count > fewest:

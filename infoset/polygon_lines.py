@@ -52,24 +52,12 @@ def determinant(one: Points, two: Points, row: Points) -> float:
 
 @compiled
 def intersect_rows(rows: Points, out: Points) -> int:
-    """Write the polygon {p: a x + b y <= c for all rows (a, b, c)}; return its number of vertices.
+    """Write the polygon {p: a x + b y <= c for all rows (a, b, c)}; return its number of vertices, or `UNBOUNDED`.
 
-    Parameters
-    ----------
-    rows : ndarray, shape (k, 3)
-        An infinite c is no limit; a = b = 0 is no limit either if c >= 0, and the empty set otherwise.
-    out : ndarray, shape (>= k + 4, 2)
-        Receives the vertices.
-
-    Returns
-    -------
-    int
-        0 for the empty set, `UNBOUNDED` if the set is not bounded.
-
-    Notes
-    -----
-    O(k^2). Borders are inserted one by one. A vertex is kept as the pair of its borders, and an exact determinant
-    decides whether it satisfies a row, so that rounding decides nothing; each coordinate is within a few ulp of itself.
+    `rows` has the shape (k, 3), `out` (>= k + 4, 2). An infinite c is no limit; a = b = 0 is no limit either if c >= 0,
+    and the empty set otherwise. O(k^2). Borders are inserted one by one. A vertex is kept as the pair of its borders,
+    and an exact determinant decides whether it satisfies a row, so that rounding decides nothing; each coordinate is
+    within a few ulp of itself.
     """
     count = len(rows)
     lines = np.zeros((count + 4, 3))
@@ -123,8 +111,6 @@ def intersect_rows(rows: Points, out: Points) -> int:
 def difference(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
     """Write the Minkowski (Pontryagin) difference {p: p + q in the polygon for all q in the other one}, neither empty.
 
-    Notes
-    -----
     O(count * (count + other_count)), in coordinates about a vertex of each polygon. The sides are moved by rounded
     support functions. The bounding box, whose sides need no direction, holds the tips of needles in place.
     """

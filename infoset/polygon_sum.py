@@ -11,26 +11,12 @@ from infoset.polygon_hull import hull
 
 @compiled
 def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int:
-    """Minkowski sum with the segment from -half to +half, in place and in two passes.
+    """Minkowski sum with the segment from -half to +half, in place; return the number of vertices, at most count + 2.
 
-    Parameters
-    ----------
-    points, count : polygon
-        The array needs room for two more vertices.
-    half_x, half_y : float
-        Half of the segment.
-
-    Returns
-    -------
-    int
-        Vertices of the sum: at most count + 2; 0 for the empty set.
-
-    Notes
-    -----
-    O(count). The boundary is divided at its extremes across the segment; the part to the right of the segment's
-    direction moves by +half, the rest by -half. A division at extremes, and not at sign changes of edges, is correct
-    for tiny edges with a wrong direction. If rounding could hide an extreme (an edge along the segment, a set thin
-    across it, a point), `add_segment_carefully` computes the sum.
+    O(count), in two passes. The boundary is divided at its extremes across the segment; the part to the right of the
+    segment's direction moves by +half, the rest by -half. A division at extremes, and not at sign changes of edges, is
+    correct for tiny edges with a wrong direction. If rounding could hide an extreme (an edge along the segment, a set
+    thin across it, a point), `add_segment_carefully` computes the sum.
     """
     if count == 0 or (half_x == 0.0 and half_y == 0.0):
         return count
@@ -68,13 +54,11 @@ def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
 
 @compiled
 def add_segment_carefully(points: Points, count: int, half_x: float, half_y: float) -> int:
-    """Minkowski sum, in place, with a segment, for all sets: thin ones, points, edges along the segment.
+    """Minkowski sum, in place, with a segment, for all sets: thin ones, points, edges along the segment. O(count).
 
-    Notes
-    -----
-    O(count). Heights are relative to a vertex, so that their rounding errors are relative to the size of the set. If
-    the set is longer along the segment than across it, rounding does not affect which vertices are first and last along
-    the segment: the lowest vertex is searched between the first and the last, and the highest between the last and the
+    Heights are relative to a vertex, so that their rounding errors are relative to the size of the set. If the set is
+    longer along the segment than across it, rounding does not affect which vertices are first and last along the
+    segment: the lowest vertex is searched between the first and the last, and the highest between the last and the
     first. Otherwise rounding does not affect which vertices are lowest and highest.
     """
     source = points[:count].copy()
@@ -170,23 +154,11 @@ def lowest_index(points: Points, count: int) -> int:
 
 @compiled
 def add_polygon(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
-    """Write the Minkowski sum of two convex polygons by merging their edges in order of direction.
+    """Write the Minkowski sum of two convex polygons by merging their edges in order of direction; return its size.
 
-    Parameters
-    ----------
-    out : ndarray, shape (>= count + other_count, 2)
-        Receives the vertices.
-
-    Returns
-    -------
-    int
-        Vertices of the sum: at most count + other_count; 0 if either is empty.
-
-    Notes
-    -----
-    O(count + other_count). If rounding has given an edge a wrong direction, the hull is taken first, which costs more:
-    the merge needs edges in order. Each vertex of the sum is one addition of two vertices, so that rounding errors do
-    not accumulate.
+    The result has at most count + other_count vertices; none if either polygon is empty. O(count + other_count). If
+    rounding has given an edge a wrong direction, the hull is taken first, which costs more: the merge needs edges in
+    order. Each vertex of the sum is one addition of two vertices, so that rounding errors do not accumulate.
     """
     if count == 0 or other_count == 0:
         return 0

@@ -132,12 +132,8 @@ def relative_interior(
 
     Raises
     ------
-    EmptyPolytopeError
-        If no point satisfies all rows.
-    UnboundedPolytopeError
-        If the set is unbounded.
-    UncertainHullError
-        If a linear program was not solved.
+    EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+        If no point satisfies all rows, the set is unbounded, or a linear program was not solved.
     """
     lengths = np.linalg.norm(normals, axis=1)
     long = lengths > ROUNDING * float(lengths.max(initial=0.0))
@@ -182,14 +178,10 @@ def relative_interior(
 def chebyshev_ball(rows: Floats, limits: Floats, sizes: Floats | float = 1.0) -> tuple[Floats, float]:
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}, rows of unit length.
 
-    `sizes` are the lengths of the rows in the coordinates in which the ball is round, if these are others.
-
-    The radius is negative if the set is empty; its absolute value is the least relaxation of the rows that has a point.
-
-    Raises
-    ------
-    UncertainHullError
-        If the linear program (HiGHS) was not solved, for example because the set has balls of any size.
+    `sizes` are the lengths of the rows in the coordinates in which the ball is round, if these are others. The radius
+    is negative if the set is empty; its absolute value is the least relaxation of the rows that has a point. An
+    UncertainHullError is raised if the linear program (HiGHS) was not solved, for example because the set has balls of
+    any size.
     """
     size = rows.shape[1]
     matrix = np.column_stack([rows, np.broadcast_to(sizes, len(rows))])
@@ -202,12 +194,9 @@ def chebyshev_ball(rows: Floats, limits: Floats, sizes: Floats | float = 1.0) ->
 
 
 def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:
-    """Return all solutions of equations, which may be dependent: the one of least norm, and a basis of the null space.
+    """Return the solution of least norm of equations, which may be dependent, and a basis of the null space.
 
-    Raises
-    ------
-    EmptyPolytopeError
-        If the equations are inconsistent.
+    An EmptyPolytopeError is raised if the equations are inconsistent.
     """
     if not len(across):
         return np.zeros(across.shape[1]), np.eye(across.shape[1])

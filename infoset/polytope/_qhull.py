@@ -38,10 +38,7 @@ _MOST_JOGGLED = 200
 def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
     """Return both representations of the convex hull of points, shape (k, n).
 
-    Raises
-    ------
-    UncertainHullError
-        If Qhull fails, or its facets and vertices do not agree.
+    An UncertainHullError is raised if Qhull fails, or its facets and vertices do not agree.
     """
     frame = frame_of(points, flat)
     return _outward(frame, *_hull(frame.inward(points)))
@@ -52,10 +49,7 @@ def intersection_of_halfspaces(
 ) -> Description:
     """Return both representations of {x: normals x <= offsets, across x = levels}.
 
-    Raises
-    ------
-    EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
-        If the set is empty, is unbounded, or depends on rounding.
+    The errors of `relative_interior` are raised if the set is empty, is unbounded, or depends on rounding.
     """
     inside = relative_interior(normals, offsets, across, levels, bounded=bounded)
     if not inside.dimension:
@@ -178,15 +172,9 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
 
     `points`, shape (k, d), contain all vertices, and perhaps other points of the polytope, in coordinates in which its
     width is about one. `normals`, shape (m, d), and `offsets` contain all facets, and perhaps other half-spaces that
-    contain the polytope. Normals of the returned facets have unit length.
+    contain the polytope. Normals of the returned facets have unit length. An UncertainHullError is raised if, because
+    of rounding, a point is outside or the result is not a polytope.
 
-    Raises
-    ------
-    UncertainHullError
-        If, because of rounding, a point is outside or the result is not a polytope.
-
-    Notes
-    -----
     A plane is a facet if the points on it span d - 1 dimensions and are not a subset of the points on another plane. A
     point is a vertex if it is the only common point of the planes through it. O(k m d^2), and O(m^2 k) for matrix
     products. The hull of the vertices is computed again as a check: it must contain all points, and each simplex of its

@@ -156,13 +156,7 @@ def stretched(description: Description, scale: Floats) -> Description:
 
 
 def described(rows: Floats, limits: Floats, across: Floats, levels: Floats, *, bounded: bool) -> Description:
-    """Return both representations as `intersection_of_halfspaces`, in scaled coordinates if their sizes differ much.
-
-    Raises
-    ------
-    EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
-        If the set is empty, is unbounded, or depends on rounding.
-    """
+    """Return both representations as `intersection_of_halfspaces`, in scaled coordinates if their sizes differ much."""
     result: Description | None = None
     failure: ValueError | ArithmeticError | None = None
     try:

@@ -33,16 +33,10 @@ _HULL = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class FacetsAndVertices:
-    """A polytope of full dimension n that is not empty.
+    """A polytope of full dimension n that is not empty: v vertices, and f facets normal . x <= offset.
 
-    Parameters
-    ----------
-    vertices : ndarray, shape (v, n)
-        Vertices, without redundant points.
-    normals, offsets : ndarray, shape (f, n) and (f,)
-        Facets normal . x <= offset, normals of unit length.
-    incidence : ndarray of bool, shape (v, f)
-        Whether a vertex lies on a facet.
+    No vertex is redundant, and the normals have unit length. `incidence`, shape (v, f), is whether a vertex lies on a
+    facet.
     """
 
     vertices: Floats
