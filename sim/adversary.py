@@ -76,8 +76,7 @@ class WorstEngagement:
     construction : str
         Kind of the first plan from which the engagement was derived.
     sets_emptied : int
-        Number of simulated engagements whose set became empty. If it is zero, the search with `keep_set` and the
-        search without it are the same.
+        Number of simulated engagements whose set became empty. If it is zero, `keep_set` makes no difference.
     lateral_miss_m : mapping of str to float
         Position at the closest approach by lateral axis, y and z, m; empty in a plane.
     history : tuple of (int, float)
@@ -112,10 +111,7 @@ class WorstEngagement:
     def record(self, strategy: Strategy | None = None) -> Record:
         """Simulate the engagement again and return its record.
 
-        Parameters
-        ----------
-        strategy : Strategy or None
-            None is the scenario's. A strategy different from that of the search has a different miss.
+        `strategy` None is the scenario's. A strategy different from that of the search has a different miss.
         """
         return replace(fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise()), noise=WORST_FOUND)
 
@@ -138,6 +134,8 @@ def find_worst(
         The search covers all starts in `set_model.bounds` (B x D), not only its dispersion.
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
+    budget : int
+        Number of engagements to simulate.
     seed : int
         Root seed. The same seed and budget give the same engagement for any number of threads.
     keep_set : bool
@@ -148,8 +146,6 @@ def find_worst(
 
     Raises
     ------
-    TypeError, ValueError
-        If the budget or the number of threads is not an integer from 1, or the seed not one from 0.
     BudgetError
         If the first plans of so many steps need too much memory.
     NothingCountsError
@@ -203,13 +199,7 @@ class _Search:
         self._elite: Flown | None = None
 
     def check_memory(self, budget: int) -> None:
-        """Refuse a budget whose first plans have too many errors.
-
-        Raises
-        ------
-        BudgetError
-            If they have more than `MOST_ERRORS`.
-        """
+        """Raise BudgetError if the first plans of a budget have more than `MOST_ERRORS` errors."""
         most = int(MOST_ERRORS / (FIRST_SHARE * len(self._names) * self._axes * self._steps))
         if budget > most:
             raise BudgetError(

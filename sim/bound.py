@@ -73,13 +73,10 @@ class TruthPair:
         return -self.label_m / self.vx_m_s
 
     def difference_m(self, step_s: float) -> tuple[Floats, Floats]:
-        """Return the times of all steps and of the arrival, s, and the differences of the two by axis, m.
+        """Return the times of all steps and of the arrival, s, shape (n,), and the differences of the two, m, shape
+        (axes, n).
 
-        Returns
-        -------
-        times_s : ndarray, shape (n,)
-        difference_m : ndarray, shape (axes, n)
-            First motion minus second, along z, or along y and z.
+        The difference is first motion minus second, along z, or along y and z.
         """
         steps = self.acceleration_m_s2.shape[-1]
         times_s = np.append(np.arange(steps) * step_s, self.arrival_s)
@@ -163,9 +160,9 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance (1e-11 m/s^2).
 
     In space, each axis has a linear program, and the impulses limit the modulus. If the errors of the angles are in a
-    box, the two motions of a pair differ along both axes, each by the most that its program allows:
-    |(dy(T), dz(T))| replaces |dz(T)|, so the bound is never below that of one axis. If the errors are in a disc, they
-    differ along the axis with the greater bound. Equal axes have one linear program.
+    box, the two motions of a pair differ along both axes, each by the most that its program allows: |(dy(T), dz(T))|
+    replaces |dz(T)|, so the bound is never below that of one axis. If the errors are in a disc, they differ along the
+    axis with the greater bound. Equal axes have one linear program.
     """
     model = scenario.set_model
     slow, fast = max(model.bounds.vx_m_s), min(model.bounds.vx_m_s)
@@ -227,21 +224,10 @@ def pair_at(
     last_common_step: int | None = None,
     try_first_before_s: float | None = None,
 ) -> TruthPair:
-    """Find the pair of motions with the greatest bound for one label and velocity.
+    """Find the pair of motions with the greatest bound for the range x(t) = label + vx t.
 
-    Parameters
-    ----------
-    label_m, vx_m_s : float
-        Range at t = 0 and velocity along x; the range is x(t) = label + vx t.
-    last_common_step : int or None
-        Last step with the same measurements; None searches for the best one.
-    try_first_before_s : float or None
-        Time before arrival at which that search starts, s; None starts at the end.
-
-    Raises
-    ------
-    BoundError
-        If a linear program is not solved.
+    `last_common_step` is the last step with the same measurements; None searches for the best one. That search starts
+    at the time `try_first_before_s` before arrival, s, or at the end.
     """
     approach = _Approach(scenario, label_m, vx_m_s)
     if last_common_step is not None:
@@ -402,8 +388,6 @@ class _Program:
     def farthest(self, last_common_step: int) -> tuple[float, float, Floats, float]:
         """Return the difference of the two motions: offset and velocity at t = 0, acceleration over each step, end.
 
-        Notes
-        -----
         A linear program in the offset, the velocity and the acceleration at the knots of a time grid that has the steps
         near the last common measurement and longer blocks before. An acceleration that is constant over longer blocks
         is admissible, and measurements within a block are additional inequalities.

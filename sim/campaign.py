@@ -42,12 +42,7 @@ FEWEST_A_SHARD = 50
 class CampaignResult:
     """The stored runs of a campaign or a sweep.
 
-    Parameters
-    ----------
-    folder : CampaignFolder
-        Folder of the campaign.
-    redone : tuple of Damage
-        Damaged shards whose runs were simulated again.
+    `redone` are the damaged shards whose runs were simulated again.
     """
 
     folder: CampaignFolder
@@ -91,10 +86,8 @@ class Progress:
     ----------
     done, total : int
         Engagements stored in all sessions, and all engagements.
-    flown : int
-        Engagements stored in this session.
-    elapsed_s : float
-        Time since the start of this session.
+    flown, elapsed_s : int and float
+        Engagements stored in this session, and the time since its start.
     undecided : int or None
         Cells that need more runs to decide a requirement; None without one. `total` is then an upper bound.
     """
@@ -112,8 +105,6 @@ class Campaign:
 
     Parameters
     ----------
-    scenario : Scenario
-        Scenario to simulate.
     runs : int
         Number of runs, from run 0; with `until` the greatest number.
     folder : str or Path
@@ -190,8 +181,8 @@ class Campaign:
         Parameters
         ----------
         executor : Executor or None
-            An executor of `concurrent.futures`, or one with the same interface; processes must be spawned, not
-            forked. None uses threads of this process.
+            An executor of `concurrent.futures`, or one with the same interface; processes must be spawned, not forked.
+            None uses threads of this process.
         workers : int or None
             Number of threads, by default one per core; with an executor, the number of chunks that are submitted at a
             time, by default two per core.
@@ -209,10 +200,8 @@ class Campaign:
             kept, and the campaign can be resumed.
         VersionError
             If the workers of the executor have other versions of the packages.
-        ValueError
-            If there is no worker.
-        FloatingPointError
-            If results are not finite.
+        ValueError, FloatingPointError
+            If there is no worker, or results are not finite.
         """
         if workers is not None and workers < 1:
             raise ValueError(f"need at least one worker: got {workers}")
@@ -346,23 +335,8 @@ class Campaign:
 class Sweep(Campaign):
     """A sweep: the same runs in many cells. Starts and errors are the same, so that only the varied values differ.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario that is varied.
-    axes : tuple of Axis
-        As for `Campaign`; at least one.
-    cells : tuple of Scenario
-        As for `Campaign`.
-    runs : int
-        Engagements per cell.
-    folder, seed, noise, guarantee, chunk, strategy, until, most_runs, require
-        As for `Campaign`; the guaranteed miss is not computed by default.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As for `Campaign`, or if there is no axis.
+    The parameters are those of `Campaign`; `runs` is the number of engagements per cell, and the guaranteed miss is not
+    computed by default. A ValueError is raised if there is no axis.
     """
 
     def __init__(

@@ -42,10 +42,8 @@ class Chunk:
 
     Parameters
     ----------
-    index : int
-        Number of the chunk in the campaign.
-    cell : int
-        Number of the scenario in a sweep; 0 in a campaign.
+    index, cell : int
+        Number of the chunk in the campaign, and of the scenario in a sweep; a campaign has the cell 0.
     scenario : Scenario
         Scenario; its noise is not used.
     guarantee : bool
@@ -75,17 +73,9 @@ class Chunk:
 def fly_chunk(chunk: Chunk, check: Callable[[], None] | None = None) -> Results:
     """Simulate the runs of a chunk and return the results in the order of the runs.
 
-    The results of a run do not depend on the chunk, the worker or the machine.
-
-    Parameters
-    ----------
-    check : callable or None
-        Called after every step; an exception that it raises stops the simulation.
-
-    Raises
-    ------
-    VersionError
-        If the chunk needs other versions of the packages.
+    The results of a run do not depend on the chunk, the worker or the machine. `check` is called after every step; an
+    exception that it raises stops the simulation. A VersionError is raised if the chunk needs other versions of the
+    packages.
     """
     differ = differences(chunk.versions, calculating_versions())
     if differ:

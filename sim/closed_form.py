@@ -24,22 +24,11 @@ def possible_miss_m(
 ) -> FloatOrFloats:
     """Return half the greatest width of the interval of misses along one axis that images leave possible, m.
 
-    It is also the greatest miss after an impulse that centres this interval exactly.
-
-    Parameters
-    ----------
-    closing_speed_m_s, pixel_error_rad, centroid_error_m : float
-        Closing speed e, pixel error beta and centroid error c.
-    first_image_s, last_image_s : float
-        Times t_f and t_c before the arrival of the first and the last image, s.
-    constant_bias : bool
-        Whether the interval is that of a set that knows that the centroid error is constant. The information set does
-        not know it.
-
-    Notes
-    -----
-    2 beta e t_c/(1 - t_c/t_f) + c (1 + t_c/t_f)/(1 - t_c/t_f); with a known constant bias the second term is c.
-    docs/guarantee.md contains the proof (Lemma 17).
+    It is also the greatest miss after an impulse that centres this interval exactly. With the closing speed e, the
+    pixel error beta, the centroid error c, and the times t_f and t_c before the arrival of the first and the last
+    image, s, it is 2 beta e t_c/(1 - t_c/t_f) + c (1 + t_c/t_f)/(1 - t_c/t_f). With `constant_bias` the second term is
+    c: the interval is that of a set that knows that the centroid error is constant, which the information set does not
+    know. docs/guarantee.md contains the proof (Lemma 17).
     """
     share = last_image_s / first_image_s
     of_pixels = 2.0 * pixel_error_rad * closing_speed_m_s * last_image_s / (1.0 - share)
@@ -65,10 +54,7 @@ def _images_s(scenario: Scenario) -> list[float]:
 def images_s(scenario: Scenario) -> tuple[float, float]:
     """Return the times before the arrival of the first image and of the last one before the last decision, s.
 
-    Raises
-    ------
-    ValueError
-        If there are fewer than two such images.
+    A ValueError is raised if there are fewer than two such images.
     """
     before_s = _images_s(scenario)
     if len(before_s) < 2:
@@ -112,11 +98,8 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
 def possible_miss_of(scenario: Scenario) -> float:
     """Return `possible_miss_m` of the camera and the last impulse of a scenario, m: in space that of both axes at once.
 
-    Raises
-    ------
-    ValueError
-        If the angle sensor is not a camera, images can be lost, or there are fewer than two images before the last
-        impulse.
+    A ValueError is raised if the angle sensor is not a camera, images can be lost, or there are fewer than two images
+    before the last impulse.
     """
     camera = scenario.set_model.angle_sensor
     if camera.centroid_error_m is None:

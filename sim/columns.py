@@ -33,14 +33,9 @@ class Column:
         Whether a value may be unknown: masked in an array, null in a file.
     optional : bool
         Whether CSV and JSON leave the column out if it is unknown in all runs.
-    limits : Limits
-        Limits of the numbers.
-    field : str
-        Name of the field; set by `columns_of`.
-    component : int or None
-        Index along the second axis of a field of shape (B, 2), None for a field of shape (B,); set by `columns_of`.
-    derived : bool
-        Whether the field is computed from others (``init=False``); set by `columns_of`.
+    field, component, derived : str, int or None, bool
+        Set by `columns_of`: name of the field, index along the second axis of a field of shape (B, 2), None for a field
+        of shape (B,), and whether the field is computed from others (``init=False``).
     """
 
     name: str

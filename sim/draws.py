@@ -61,13 +61,7 @@ class Draws:
 
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
-    """Return the random numbers of some runs; run k has the same numbers in every call with the same seed.
-
-    Raises
-    ------
-    ValueError
-        If a flight takes more than `MOST_STEPS` steps.
-    """
+    """Return the random numbers of some runs; run k has the same numbers in every call with the same seed."""
     steps = greatest_number_of_steps(scenario)
     lower, upper = corners(scenario.dispersion)
     starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
@@ -146,10 +140,7 @@ def generator(seed: int, run: int, stream: int) -> np.random.Generator:
 def greatest_number_of_steps(scenario: Scenario) -> int:
     """Return the number of steps after which every start of the dispersion has passed its closest approach.
 
-    Raises
-    ------
-    ValueError
-        If they are more than `MOST_STEPS`.
+    A ValueError is raised if they are more than `MOST_STEPS`.
     """
     box = scenario.dispersion
     slowest = min(-box.vx_m_s[0], -box.vx_m_s[1])

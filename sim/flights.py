@@ -27,18 +27,9 @@ def fly_on(
 ) -> Flights:
     """Simulate chunks and yield every chunk with its results as soon as it is finished, in any order.
 
-    Parameters
-    ----------
-    executor : Executor
-        Executor of threads, processes or a cluster.
-    at_once : int
-        Greatest number of chunks that are submitted at a time; it limits the memory.
-    check : callable or None
-        See `fly_chunk`; for threads only.
-
-    Notes
-    -----
-    When the generator is closed or ends with an error, chunks that have not started are cancelled.
+    At most `at_once` chunks are submitted to the executor of threads, processes or a cluster at a time, which limits
+    the memory. `check` is that of `fly_chunk`, for threads only. When the generator is closed or ends with an error,
+    chunks that have not started are cancelled.
     """
     waiting = iter(chunks)
     under_way: dict[Future[Results], Chunk] = {}
@@ -59,13 +50,8 @@ def fly_on(
 def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Flights:
     """Simulate chunks on threads of this process, as `fly_on` does; the kernels release the interpreter's lock.
 
-    When the generator is closed or ends with an error or an interrupt, running chunks stop after their current step.
-    After a MemoryError it does not wait for running chunks, because Numba may then keep its lock.
-
-    Raises
-    ------
-    InterruptedError
-        In a running chunk, to stop it.
+    When the generator is closed or ends with an error or an interrupt, running chunks stop after their current step, by
+    an InterruptedError. After a MemoryError it does not wait for running chunks, because Numba may then keep its lock.
     """
     stopped = threading.Event()
 
@@ -90,14 +76,9 @@ def worker_processes(count: int) -> Iterator[Executor]:
     """Start processes that simulate chunks, and end the processes on exit from the context.
 
     After an error they end at once; if this process dies, they end too. Processes are spawned, because a forked process
-    would keep the lock of a campaign's folder after the end of its parent. Half of the
-    work of an engagement needs the interpreter, which threads share and processes do not. Each process takes one or two
-    seconds to start, and needs additional memory.
-
-    Raises
-    ------
-    ValueError
-        If `count` is less than one.
+    would keep the lock of a campaign's folder after the end of its parent. Half of the work of an engagement needs the
+    interpreter, which threads share and processes do not. Each process takes one or two seconds to start, and needs
+    additional memory. A ValueError is raised if `count` is less than one.
     """
     if count < 1:
         raise ValueError(f"need at least one process: got {count}")

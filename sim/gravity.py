@@ -18,10 +18,8 @@ LEAST_SPEED_CHANGE = 1e-8
 def on_board_model(scenario: Scenario) -> SetModel:
     """Return the set model of a scenario with the bounds of gravity and of the engine's errors.
 
-    Raises
-    ------
-    ValueError
-        If the true closing speed may differ from the nominal one by 100 % or more: the guaranteed model has no labels.
+    A ValueError is raised if the true closing speed may differ from the nominal one by 100 % or more: the guaranteed
+    model has no labels.
     """
     thruster = scenario.thruster
     model = replace(
@@ -49,21 +47,13 @@ def greatest_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
 def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetModel:
     """Return a model with the bounds of gravity, along each lateral axis and of the closing speed.
 
-    Parameters
-    ----------
-    sun : Sun or None
-        None is free space.
-    impulses_m_s : float
-        Greatest sum of the impulses' moduli, which change the lateral velocity.
+    `impulses_m_s` is the greatest sum of the impulses' moduli, which change the lateral velocity.
 
-    Notes
-    -----
-    To first order, the difference of the Sun's attraction at two points with distance vector r is
-    (K/R^3)(3 (n . r) n - r), with the direction n of the Sun. Along a lateral axis, with offset a, it is at most
-    (K/R^3)(1.5 |r| + 0.5 |a|), in any direction at most 2 K/R^3 |r|. The lengths of the model scale with V_x, which
-    gravity changes; this adds 0.7 |a| and 2 (|r| + |a|) V/|V_x|, with the velocity V across x. R decreases by at most
-    the range and the distance travelled. A margin of 5 % covers the second order and the change of n.
-    docs/guarantee.md has the derivation.
+    To first order, the difference of the Sun's attraction at two points with distance vector r is (K/R^3)(3 (n . r) n -
+    r), with the direction n of the Sun. Along a lateral axis, with offset a, it is at most (K/R^3)(1.5 |r| + 0.5 |a|),
+    in any direction at most 2 K/R^3 |r|. The lengths of the model scale with V_x, which gravity changes; this adds 0.7
+    |a| and 2 (|r| + |a|) V/|V_x|, with the velocity V across x. R decreases by at most the range and the distance
+    travelled. A margin of 5 % covers the second order and the change of n. docs/guarantee.md has the derivation.
     """
     if sun is None:
         return replace(model, gravity_m_s2=0.0, gravity_y_m_s2=None, gravity_speed_change=LEAST_SPEED_CHANGE)

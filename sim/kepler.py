@@ -27,17 +27,17 @@ POSITION, VELOCITY, ACCELERATION, LOST = range(4)
 
 @dataclass(frozen=True)
 class Sight:
-    """True geometry of each engagement.
+    """True geometry of each engagement, arrays of shape (B,); in space (2, B), for the planes (x, y) and (x, z).
 
     Parameters
     ----------
-    alpha_rad, omega_rad_s : ndarray, shape (B,), or (2, B) in space
-        Line-of-sight angle and rate, equation (12) of the paper; in space those of the planes (x, y) and (x, z).
+    alpha_rad, omega_rad_s : ndarray
+        Line-of-sight angle and rate, equation (12) of the paper.
     range_m : ndarray, shape (B,)
         Distance between the centres of mass.
-    slope, slope_rate_per_s : ndarray, shape (B,), or (2, B) in space
-        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero. In space y/x
-        and z/x.
+    slope, slope_rate_per_s : ndarray
+        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero. In space y/x and
+        z/x.
     """
 
     alpha_rad: Floats
@@ -49,18 +49,16 @@ class Sight:
 
 @dataclass(frozen=True)
 class Passage:
-    """Closest approaches within one step.
+    """Closest approaches within one step, arrays of shape (B,).
 
     Parameters
     ----------
-    passed : ndarray of bool, shape (B,)
-        Whether the closest approach lies within the step.
-    least_distance_m : ndarray, shape (B,)
-        Least distance where the closest approach lies within the step, infinite elsewhere.
-    arrival_s : ndarray, shape (B,)
-        Time from the beginning of the step to x = 0 where the closest approach lies within the step, zero elsewhere.
+    passed : ndarray of bool
+        Whether the closest approach lies within the step. Elsewhere the distance is infinite and the others are zero.
+    least_distance_m, arrival_s : ndarray
+        Least distance, and the time from the beginning of the step to x = 0.
     lateral_m : ndarray, shape (B,), or (2, B) in space
-        z, or (y, z), at the closest approach where it lies within the step, zero elsewhere.
+        z, or (y, z), at the closest approach.
     """
 
     passed: Flags
@@ -144,8 +142,6 @@ class KeplerMotion:
     def arrival_s(self) -> Floats:
         """Return the times from now to x = 0, shape (B,), s.
 
-        Notes
-        -----
         The motion without impulses in 64 leaps, and a straight line at the end. Impulses, which are across x, change
         this time through gravity by some nanoseconds.
         """
@@ -161,10 +157,8 @@ class KeplerMotion:
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         """Advance by one step.
 
-        Parameters
-        ----------
-        manoeuvre_m_s2 : ndarray, shape (B,), or (2, B) in space, or None
-            Lateral acceleration of the object from now on; None leaves it as it is.
+        `manoeuvre_m_s2`, shape (B,), or (2, B) in space, is the lateral acceleration of the object from now on; None
+        leaves it as it is.
         """
         if manoeuvre_m_s2 is not None:
             self._manoeuvre = np.ascontiguousarray(np.atleast_2d(manoeuvre_m_s2))
@@ -247,15 +241,9 @@ def attraction_share(squared_m2: float, gravitational_parameter_m3_s2: float) ->
 def accelerate_all(motion: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float) -> None:
     """Write the accelerations of a motion, relative and of the spacecraft.
 
-    Parameters
-    ----------
-    motion : ndarray, shape (4, A + 1, 2, B)
-        Position, velocity, acceleration and lost rounding; along the A lateral axes and x; relative, and of the
-        spacecraft.
-    manoeuvre_m_s2 : ndarray, shape (A, B)
-        Lateral acceleration of the object.
-    gravitational_parameter_m3_s2 : float
-        K of the Sun; zero is free space.
+    A motion, shape (4, A + 1, 2, B), has position, velocity, acceleration and lost rounding; along the A lateral axes
+    and x; relative, and of the spacecraft. `manoeuvre_m_s2`, shape (A, B), is the lateral acceleration of the object.
+    The gravitational parameter K of the Sun is zero in free space.
     """
     for b in range(motion.shape[3]):
         own_share = object_share = 0.0
@@ -283,10 +271,7 @@ def leap_all(
 ) -> bool:
     """Write a motion after times of shape (B,), in the form of `accelerate_all`: one step of velocity Verlet.
 
-    Returns
-    -------
-    bool
-        Whether the distance of some relative motion increases then.
+    Return whether the distance of some relative motion increases then.
     """
     for axis in range(motion.shape[1]):
         for craft in (RELATIVE, SPACECRAFT):

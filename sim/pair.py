@@ -23,16 +23,8 @@ STEPS_BEYOND = 2
 class ScheduledMotion(KeplerMotion):
     """Kepler motion with a prescribed acceleration of the object across x.
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (B, 2) or (B, 3)
-        Relative (z, x) and (V_z, V_x) at t = 0; (y, z, x) and (V_y, V_z, V_x) in space.
-    sun : Sun or None
-        None is free space.
-    acceleration_m_s2 : ndarray, shape (B, steps) or (2, B, steps)
-        Acceleration along z, or along y and z, over each step; zero after the last.
-    substep_s : float
-        Greatest length of a substep, s.
+    `acceleration_m_s2`, shape (B, steps) or (2, B, steps), is along z, or along y and z, over each step; zero after the
+    last. The other parameters are those of `KeplerMotion`.
     """
 
     def __init__(
@@ -59,12 +51,8 @@ class ScheduledMotion(KeplerMotion):
 class PairFlight:
     """Outcome of the flight of a pair.
 
-    Parameters
-    ----------
-    impulse_m_s : ndarray, shape (steps, 2) or (steps, 2, 2)
-        Impulses at each step; along y and z in space: step, axis, motion.
-    greatest_error_share : float
-        Greatest error of a common measurement, in units of its bound.
+    Impulses at each step have the shape (steps, 2) or (steps, 2, 2), along y and z in space: step, axis, motion.
+    `greatest_error_share` is the greatest error of a common measurement, in units of its bound.
     """
 
     results: Results
@@ -79,22 +67,10 @@ def fly_pair(
 ) -> PairFlight:
     """Simulate two motions with the same measurements up to the last common step.
 
-    The greater one of the two misses is at least `pair.bound_m` for every deterministic strategy, up to the differences
-    in the notes.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The pair replaces its noise and the manoeuvre of its target.
-    pair : TruthPair
-        Starts and accelerations of the two motions.
-    strategy : Strategy or None
-        Guidance strategy; None is the scenario's.
-
-    Notes
-    -----
-    The bound assumes straight motion, and the distance at x = 0 as the miss. Here gravity curves the motion, and the
-    miss is the least distance, which is smaller by the relative amount (V/V_x)^2 / 2, where V is the velocity across x.
+    The pair replaces the noise of the scenario and the manoeuvre of its target. For every deterministic strategy (None
+    is the scenario's), the greater one of the two misses is at least `pair.bound_m`, up to two differences: the bound
+    assumes straight motion, and the distance at x = 0 as the miss. Here gravity curves the motion, and the miss is the
+    least distance, which is smaller by the relative amount (V/V_x)^2 / 2, where V is the velocity across x.
     """
     *shape, steps = pair.acceleration_m_s2.shape
     nothing = np.zeros((*shape, steps + STEPS_BEYOND))

@@ -20,14 +20,9 @@ def results_html(
 ) -> str:
     """Return a table of the results of a batch as HTML.
 
-    Parameters
-    ----------
-    samples : mapping of str to ndarray
-        Known values by title, unit included; each is a row with its quantiles.
-    truths_kept : int
-        Number of engagements whose true state was inside its section at every step.
-    hits : int or None
-        Number of engagements that hit; None if the body has no size.
+    `samples` are known values by title, unit included; each is a row with its quantiles. `truths_kept` is the number of
+    engagements whose true state was inside its section at every step, `hits` that of hits, None if the body has no
+    size.
     """
     counts = ", ".join(f"{count} {outcome}" for outcome, count in Counter(outcomes).items())
     kept = f"true state inside the set at every step: {truths_kept} of {len(outcomes)}"
@@ -48,16 +43,9 @@ def course_html(
 ) -> str:
     """Return the course of one engagement as HTML: facts, predicted miss and impulses over time.
 
-    Parameters
-    ----------
-    time_s : ndarray, shape (steps,)
-        Times of the steps.
-    impulses_m_s : mapping of str to ndarray, shape (steps,)
-        Impulse of each step by direction: an empty text in a plane, ``" along y"`` and ``" along z"`` in space.
-    miss_time_s : ndarray, shape (n,)
-        Times at which a predicted miss exists, s.
-    misses_m : mapping of str to ndarray, shape (n, 2)
-        Least and greatest predicted miss at these times by direction, m.
+    `impulses_m_s`, shape (steps,), and the least and greatest predicted misses `misses_m`, shape (n, 2), are by
+    direction: an empty text in a plane, ``" along y"`` and ``" along z"`` in space. `miss_time_s`, shape (n,), are the
+    times at which a predicted miss exists.
     """
     table = _table(caption, (), [(name, [text]) for name, text in facts.items()])
     misses = [_miss_svg(miss_time_s, miss_m, along) for along, miss_m in misses_m.items() if len(miss_time_s)]

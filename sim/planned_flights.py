@@ -101,10 +101,7 @@ class PlannedNoise:
 def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
     """Return values of shape (n, axes, ...) as a sensor uses them: (n, ...), or by axis in space, (2, n, ...).
 
-    Parameters
-    ----------
-    sensor : Sensor or None
-        A sensor that measures by axis, or not (`Sensor.is_lateral`); None is the angle sensor.
+    The sensor measures by axis, or does not (`Sensor.is_lateral`); None is the angle sensor.
     """
     is_lateral = sensor is None or sensor.is_lateral
     return np.moveaxis(values, 1, 0) if is_lateral and values.shape[1] > 1 else values[:, 0]
@@ -112,18 +109,14 @@ def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
 
 @dataclass(frozen=True)
 class Flown:
-    """Plans with their outcomes.
+    """Plans with their outcomes, arrays of shape (n,).
 
     Parameters
     ----------
-    value : ndarray, shape (n,)
+    value : ndarray
         Miss, m; -inf if the engagement does not count.
     errors : ndarray, shape (n, rows, axes, steps)
         Errors made, in units of their bounds.
-    set_emptied : ndarray of bool, shape (n,)
-        Whether the set became empty.
-    truth_kept : ndarray of bool, shape (n,)
-        Whether the true state was inside its section at every step.
     lateral_miss_m : ndarray, shape (n, 2)
         Position (y, z) at the closest approach, m; without meaning in a plane.
     """

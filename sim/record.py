@@ -32,8 +32,6 @@ class AxisStep:
         "range" (m), which is the same for both axes.
     true_angle_rad, true_rate_rad_s : float
         True line of sight in the plane of x and the axis.
-    impulse_m_s : float
-        Component of the impulse.
     predicted_miss_m : tuple of float, or None
         (pi_*, pi^*) after the measurement and before the impulse; None without a set.
     """
@@ -96,10 +94,7 @@ class StepRecord:
 class Inconsistency:
     """The first measurement that contradicts all states of the set.
 
-    Parameters
-    ----------
-    label_m : float
-        Label nearest to consistency: its range at t = 0.
+    `label_m` is the label nearest to consistency: its range at t = 0.
     """
 
     step: int

@@ -49,21 +49,9 @@ class Decision(Enum):
 
 @dataclass(frozen=True)
 class Requirement:
-    """An upper bound of a quantile, written `miss_m p99<10`.
+    """An upper bound of a quantile, in the unit of its quantity, written `miss_m p99<10`.
 
     It is a requirement on a share of the runs: at least 99 % of the misses are less than 10 m.
-
-    Parameters
-    ----------
-    quantile : QuantileName
-        What is bounded.
-    bound : float
-        In the unit of the quantity.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the bound is not positive.
     """
 
     quantile: QuantileName
@@ -109,18 +97,7 @@ class Requirement:
 
 @dataclass(frozen=True)
 class HitRequirement:
-    """A lower bound of the probability of a hit, written `hit>=0.95`.
-
-    Parameters
-    ----------
-    share : float
-        Least share of the runs that hit, between 0 and 1.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the share is not between 0 and 1.
-    """
+    """A lower bound of the probability of a hit, written `hit>=0.95`: the least share of the runs that hit."""
 
     share: Fraction
 
@@ -159,13 +136,7 @@ AnyRequirement = Requirement | HitRequirement
 
 
 def parse_requirement(text: str) -> AnyRequirement:
-    """Read `miss_m p99<10` or `hit>=0.95`, which may be written `hit>0.95`.
-
-    Raises
-    ------
-    ValueError
-        If the text has another form, or a number is out of its range.
-    """
+    """Read `miss_m p99<10` or `hit>=0.95`, which may be written `hit>0.95`; raise ValueError for any other text."""
     match = _HIT.fullmatch(text[:100])
     try:
         if match is None:
@@ -258,8 +229,7 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     Parameters
     ----------
     values : ndarray, shape (n,)
-        The required quantity, in the order of the runs; at least one. It is `requirement.unknown` in runs without a
-        value.
+        The required quantity, in the order of the runs. It is `requirement.unknown` in runs without a value.
     watched : bool
         Whether the number of runs may depend on the values, because runs were added after a look at them. False: the
         number of runs was fixed before.
@@ -347,23 +317,11 @@ def share_interval(count: int, runs: int) -> tuple[float, float]:
 
 
 def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Integers, Integers]:
-    """Return the numbers of runs that satisfy a bound at which a requirement is decided.
+    """Return the numbers of runs that satisfy a bound, with a required share, at which a requirement is decided.
 
-    Parameters
-    ----------
-    size : int
-        Number of runs.
-    share : float
-        Required share.
-    watched : bool
-        Return the counts for 1, 2, ..., `size` runs, those of the confidence sequence; otherwise only for `size` runs.
-
-    Returns
-    -------
-    fewest_met : ndarray of int, shape (size,) or (1,)
-        The requirement is met from this number on; one more than the number of runs if no number decides.
-    most_missed : ndarray of int, shape (size,) or (1,)
-        It is not met up to this number; -1 if no number decides. Both arrays are read-only.
+    The requirement is met from the first number on (one more than the number of runs if no number decides), and not met
+    up to the second one (-1 if no number decides). Both are read-only arrays: `watched`, those of the confidence
+    sequence for 1, 2, ..., `size` runs; otherwise of shape (1,), for `size` runs.
     """
     if not watched:
         return _critical_counts(size, size, share, watched)
@@ -395,14 +353,8 @@ def _least(most: Integers, is_enough: Callable[[Integers], Flags]) -> Integers:
 def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike, *, watched: bool) -> tuple[Floats, Floats]:
     """Return the p-values of the hypotheses that the true share is at most, and at least, a given share.
 
-    Parameters
-    ----------
-    runs, count : array_like
-        Number of runs, and of those that satisfy the bound; `count` may be fractional.
-    share : array_like
-        Between 0 and 1.
-    watched : bool
-        Whether they hold for all numbers of runs at once; then they are inverse likelihood ratios: see `judge`.
+    `count` is the number of those of n `runs` that satisfy the bound; it may be fractional. If `watched`, the values
+    hold for all numbers of runs at once; then they are inverse likelihood ratios: see `judge`.
     """
     from scipy.special import betainc, betaln  # slow to load, and few commands need it
 

@@ -142,10 +142,7 @@ class Results:
     def to_pandas(self) -> Any:
         """Return the columns as a pandas `DataFrame`, one row per run, with the units in ``frame.attrs["units"]``.
 
-        Raises
-        ------
-        ModuleNotFoundError
-            If pandas is not installed.
+        A ModuleNotFoundError is raised if pandas is not installed.
         """
         try:
             import pandas as pd

@@ -32,11 +32,6 @@ class Sun:
         Direction of the Sun seen from the spacecraft at t = 0, from the x axis toward z, rad.
     elevation_rad : float
         Angle of that direction out of the plane (x, z), toward y, rad. For space only.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not a number within its limits.
     """
 
     gravitational_parameter_m3_s2: Positive
@@ -74,11 +69,6 @@ class Target:
         Acceleration along y, m/s^2; None is that along z. For space only.
     switching_period_s : float
         Time between changes of sign (bang-bang), or the mean time (random telegraph), s.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not within its limits.
     """
 
     manoeuvre: Manoeuvre
@@ -92,18 +82,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Body:
-    """The size of the object.
-
-    Parameters
-    ----------
-    radius_m : float
-        Radius of a sphere, m: an engagement hits if its miss is at most this radius.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the radius is not a positive number.
-    """
+    """The size of the object, a sphere: an engagement hits if its miss is at most `radius_m`, m."""
 
     radius_m: Positive
 
@@ -114,6 +93,8 @@ class Body:
 @dataclass(frozen=True)
 class Scenario:
     """An interception: true motion, sensors, engine, guidance and noise.
+
+    A TypeError or ValueError is raised if a value is not within its limits, or two of them contradict each other.
 
     Parameters
     ----------
@@ -133,11 +114,6 @@ class Scenario:
         A target that manoeuvres; None does not.
     body : Body or None
         The size of the object; None is a point, and no engagement has a hit or a miss.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not within its limits, or two of them contradict each other.
     """
 
     name: str
@@ -176,7 +152,7 @@ class Scenario:
             )
 
     def _check_axes(self) -> None:
-        """Refuse a start in a plane with a set in space or the other way, and values of space in a plane."""
+        """Check that start and set are both in a plane or both in space, and that a plane has no values of space."""
         if self.dispersion.axes != self.set_model.axes:
             raise ValueError(
                 "Scenario: dispersion and set_model.bounds must both have y_m and vy_m_s (an engagement in space), or "

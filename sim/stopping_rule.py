@@ -25,19 +25,9 @@ NUMBER = rf"\s*(?P<number>{DIGITS})\s*"
 
 @dataclass(frozen=True)
 class QuantileName:
-    """A quantile of a quantity, written `miss_m p99`.
+    """A quantile of one of `QUANTITIES` at a level between 0 and 1, written `miss_m p99`.
 
-    Parameters
-    ----------
-    quantity : str
-        One of `QUANTITIES`.
-    level : float
-        Between 0 and 1.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the quantity is unknown, or the level is out of its range.
+    A ValueError is raised if the quantity is unknown, or the level is out of its range.
     """
 
     quantity: str
@@ -61,19 +51,7 @@ class QuantileName:
 class StoppingRule:
     """Stop when the confidence interval of a quantile is narrower than a width, written `miss_m p99 ci<0.5`.
 
-    Parameters
-    ----------
-    quantile : QuantileName
-        Quantile whose interval is compared with the width.
-    width : float
-        In the unit of the quantity.
-    confidence : float
-        Of the interval, in (0, 1).
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the width or the confidence is out of its range.
+    The width is in the unit of the quantity, the `confidence` of the interval in (0, 1).
     """
 
     quantile: QuantileName
@@ -103,19 +81,8 @@ class StoppingRule:
 class Watch:
     """Checks a stopping rule on the chunks of a campaign in their order, as far as they are stored without a gap.
 
-    Parameters
-    ----------
-    rule : StoppingRule
-        Rule to check.
-    groups : int
-        Samples of each chunk, one for each noise. Each must meet the rule.
-    read : callable
-        Returns the samples of a chunk.
-    chunks : int
-        Chunks of the campaign.
+    `read` returns the samples of a chunk, one for each of the `groups`, the noises; each must meet the rule.
 
-    Notes
-    -----
     It checks after certain numbers of chunks only, which do not depend on the workers and their speed: the campaign
     stops at the same run on one worker and on a hundred, in one session and in ten. O(N log N) over a campaign.
     """
@@ -130,18 +97,7 @@ class Watch:
         self._next = next(self._checks)
 
     def met(self, finished: Callable[[int], bool]) -> int | None:
-        """Check the new chunks.
-
-        Parameters
-        ----------
-        finished : callable
-            Whether a chunk is stored.
-
-        Returns
-        -------
-        int or None
-            Number of chunks after which to stop; None to go on.
-        """
+        """Check the new chunks that are `finished`; return the number of chunks after which to stop, None to go on."""
         while self._seen < self._chunks and finished(self._seen):
             for sample, values in zip(self._samples, self._read(self._seen), strict=True):
                 sample.append(values)
@@ -163,12 +119,9 @@ def _checks(chunks: int) -> Iterator[int]:
 
 
 def parse_quantile(text: str, end: str, wanted: str, number: str = "") -> tuple[QuantileName, float]:
-    """Read a quantile and, if the pattern `end` has one, the number after it.
+    """Read a quantile and, if the pattern `end` has one, the number after it; raise ValueError for any other text.
 
-    Raises
-    ------
-    ValueError
-        If the text has another form; `wanted` and `number` name the form and the number in the message.
+    `wanted` and `number` name the form and the number in the message.
     """
     match = re.fullmatch(_QUANTILE + end, text[:100])
     if match is None:

@@ -15,12 +15,8 @@ ROUNDING = 1e-12
 def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:
     """Return the lateral acceleration of the targets of a batch over one step, m/s^2, shape (B,), or (2, B) in space.
 
-    Parameters
-    ----------
-    draws : ndarray, shape (B, steps), or (2, B, steps) in space
-        Random numbers, uniform in [-1, 1].
-    predicted_miss_m : ndarray, shape (B,), or (2, B) in space
-        Predicted miss z + V_z (time to go) of the true state, signed, and that along y.
+    `draws`, shape (B, steps), or (2, B, steps) in space, are uniform in [-1, 1]. `predicted_miss_m` is the signed
+    predicted miss z + V_z (time to go) of the true state, and that along y.
     """
     first = np.where(draws[..., 0] >= 0.0, 1.0, -1.0)
     if target.manoeuvre is Manoeuvre.NONE:

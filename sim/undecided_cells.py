@@ -26,21 +26,10 @@ class _Cell:
 class UndecidedCells:
     """The chunks of a sweep that must still be simulated, and those that were simulated before an earlier chunk.
 
-    Parameters
-    ----------
-    folder : CampaignWriter
-        Folder of the sweep; the number of runs in its manifest is the limit of each cell.
-    requirement : Requirement or HitRequirement
-        Requirement to decide for each noise, by the confidence sequence of `sim.requirement.judge`.
-    noises : sequence of str
-        Noises of the sweep.
-    least_runs : int
-        Least number of runs of each cell.
-
-    Notes
-    -----
-    A chunk is stored only if the chunks before it in its cell are stored and have not decided. The stored runs are
-    therefore the same for any number of workers and after any interruption.
+    The number of runs in the manifest of the folder is the limit of each cell, `least_runs` its least number. The
+    requirement is decided for each noise, by the confidence sequence of `sim.requirement.judge`. A chunk is stored only
+    if the chunks before it in its cell are stored and have not decided. The stored runs are therefore the same for any
+    number of workers and after any interruption.
     """
 
     def __init__(

@@ -42,8 +42,6 @@ def _version(name: str) -> str:
 def install_command(extra: str) -> str:
     """Return the command that installs an optional extra: from the clone if there is one, else by name.
 
-    References
-    ----------
     PEP 610: `direct_url.json` has the key `dir_info` if the package was installed from a folder.
     """
     try:

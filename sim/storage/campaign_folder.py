@@ -34,15 +34,8 @@ class Damage:
 
 
 class CampaignFolder:
-    """The stored runs of a campaign or a sweep.
+    """The stored runs of a campaign or a sweep; `damaged` lists shards that were left out.
 
-    Attributes
-    ----------
-    damaged : list of Damage
-        Shards that were left out.
-
-    Notes
-    -----
     A shard is named after its chunk and the CRC-32 of its bytes, and is renamed into place once it is complete: the
     folder needs no list of its shards. When a shard is first read, all its values are checked.
     """
@@ -87,19 +80,9 @@ class CampaignFolder:
         return self.finished_runs == self.wanted_runs
 
     def table(self, columns: Sequence[str] | None = None, cell: int | None = None) -> Any:
-        """Return rows as a pyarrow.Table, in the order of cells and runs.
+        """Return rows as a pyarrow.Table, in the order of cells and runs; None is all columns, or all cells.
 
-        Parameters
-        ----------
-        columns : sequence of str or None
-            None returns all.
-        cell : int or None
-            None returns all.
-
-        Raises
-        ------
-        DamagedError
-            If a shard has changed since the folder was opened.
+        A DamagedError is raised if a shard has changed since the folder was opened.
         """
         parts = [self._read(index, columns) for index in self._wanted(cell)]
         return self._tables.joined(parts, columns, with_cell=bool(self.manifest.axes))
@@ -109,19 +92,9 @@ class CampaignFolder:
     ) -> Iterator[tuple[dict[str, Numbers], dict[str, Codes]]]:
         """Yield columns shard by shard, in the order of cells and runs; one shard is in memory at a time.
 
-        Parameters
-        ----------
-        quantities : sequence of str
-            Columns of numbers; they are masked where null.
-        texts : mapping of str to sequence of str
-            Columns of text, each with a list of values: the codes are indices in the list, -1 for other values.
-        cell : int or None
-            None yields all.
-
-        Raises
-        ------
-        DamagedError
-            If a shard has changed since the folder was opened.
+        Columns of numbers are masked where null. `texts` has a list of values for each column of text: the codes are
+        indices in the list, -1 for other values. A DamagedError is raised if a shard has changed since the folder was
+        opened.
         """
         for index in self._wanted(cell):
             yield self._columns_of(index, quantities, texts)
@@ -171,14 +144,9 @@ class CampaignFolder:
         return rows
 
     def table_file(self, columns: Mapping[str, Sequence[Any]], units: Mapping[str, str]) -> bytes:
-        """Return the Parquet file of a table derived from the campaign.
+        """Return the Parquet file of a table derived from the campaign, of numbers and text; None is null.
 
-        Parameters
-        ----------
-        columns : mapping of str to sequence
-            Numbers and text; None is null.
-        units : mapping of str to str
-            Written into the metadata of the fields, as in the shards.
+        The `units` are in the metadata of the fields, as in the shards.
         """
         table = self._tables.plain_table(columns, units)
         return bytes(self._tables.to_bytes(table, {"campaign": self.manifest.identity}))
@@ -271,13 +239,7 @@ def _by_noise(values: Numbers, codes: Codes, noises: int, unknown: float | None)
 
 
 def need_arrow() -> ModuleType:
-    """Return the module that reads and writes tables.
-
-    Raises
-    ------
-    MissingLibraryError
-        If pyarrow is not installed.
-    """
+    """Return the module that reads and writes tables; raise MissingLibraryError if pyarrow is not installed."""
     try:
         from sim.storage import tables
     except ImportError:

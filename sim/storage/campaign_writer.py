@@ -37,23 +37,14 @@ class CampaignWriter(CampaignFolder):
     ) -> Iterator[CampaignWriter]:
         """Start a campaign in a folder, or resume the one in it, and hold the folder's lock until the context ends.
 
-        Parameters
-        ----------
-        manifest : Manifest
-            Manifest of the campaign; more runs than in the folder extend the campaign.
-        resume : bool
-            Whether the folder may contain this campaign already.
-        beside : mapping of str to str
-            Names and contents of text files to write into the folder.
+        More runs in the `manifest` than in the folder extend the campaign. `resume` is whether the folder may contain
+        this campaign already. `beside` has names and contents of text files to write into the folder.
 
         Raises
         ------
-        OccupiedError
-            If the folder contains something else, or another campaign is running in it.
-        ManifestError
-            If the folder contains a campaign with different settings.
         StorageError
-            If the folder cannot be written.
+            If the folder contains something else or a campaign with different settings, another campaign is running in
+            it, or it cannot be written.
         """
         need_arrow()
         need_free(path, resume=resume)
@@ -80,15 +71,7 @@ class CampaignWriter(CampaignFolder):
             yield cls(path, manifest)
 
     def write(self, chunk: Chunk, results: Results) -> None:
-        """Write the shard of a chunk atomically.
-
-        Raises
-        ------
-        StorageError
-            If it cannot be written; `DiskFullError` where the disk is full.
-        FloatingPointError
-            If the results are not finite.
-        """
+        """Write the shard of a chunk atomically; raise FloatingPointError if the results are not finite."""
         table = self._tables.rows(chunk, results, with_cell=bool(self.manifest.axes))
         content = self._tables.to_bytes(table, {"campaign": self.manifest.identity, "chunk": str(chunk.index)})
         file = self.path / SHARDS / f"chunk-{chunk.index:07d}-{zlib.crc32(content):08x}.parquet"
@@ -121,13 +104,7 @@ class CampaignWriter(CampaignFolder):
 
 
 def need_free(path: Path, *, resume: bool) -> None:
-    """Check that a folder is empty or does not exist, or contains a campaign to resume.
-
-    Raises
-    ------
-    OccupiedError
-        If the folder contains something else.
-    """
+    """Raise OccupiedError if a folder has content, except a campaign to `resume`."""
     with reporting(path):
         if not path.exists() and not path.is_symlink():
             return

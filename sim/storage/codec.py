@@ -52,11 +52,8 @@ def _used(value: Any, plain: Any) -> Any:
 def from_json(kind: Callable[..., Kind], value: object) -> Kind:
     """Return a dataclass from its JSON values.
 
-    Raises
-    ------
-    ValueError
-        If a key is missing or unknown, or a value is not of its field's type; the message names the key. Text with
-        control characters, which could steer a terminal, is refused too.
+    A ValueError is raised if a key is missing or unknown, or a value is not of its field's type; the message names the
+    key. Text with control characters, which could steer a terminal, is refused too.
     """
     if not all(map(str.isprintable, _texts(value))):
         raise ValueError("contains text with control characters")

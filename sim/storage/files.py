@@ -89,12 +89,9 @@ def clear_leftovers(folder: Path) -> None:
 
 @contextlib.contextmanager
 def reporting(path: Path) -> Iterator[None]:
-    """Raise an `OSError` during reading or writing of `path` as a `StorageError` with a message for the user.
+    """Raise an `OSError` during reading or writing of `path` as a StorageError with a message for the user.
 
-    Raises
-    ------
-    StorageError
-        `DiskFullError` if the disk is full.
+    It is a DiskFullError if the disk is full.
     """
     try:
         yield
@@ -109,14 +106,10 @@ def reporting(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder; the lock ends with the process at the latest.
+    """Hold the lock of a folder; raise OccupiedError if another campaign holds it.
 
-    A forked child would keep the lock after its parent has ended: use process pools that spawn.
-
-    Raises
-    ------
-    OccupiedError
-        If another campaign holds the lock.
+    The lock ends with the process at the latest. A forked child would keep the lock after its parent has ended: use
+    process pools that spawn.
     """
     with contextlib.ExitStack() as stack, reporting(folder / LOCK):
         try:

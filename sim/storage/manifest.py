@@ -33,19 +33,9 @@ _DERIVED = ("format", "schema", "version", "kind", "name", "scenario_hash", "sha
 
 @dataclass(frozen=True)
 class Axis:
-    """A key that a sweep varies.
+    """A key that a sweep varies, as in a scenario file, with its table and unit, and at least two values in this unit.
 
-    Parameters
-    ----------
-    key : str
-        Key as in a scenario file, with its table and unit.
-    values : tuple of float
-        At least two values, in the unit of the file.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If there are fewer values, or one is out of range.
+    A TypeError or ValueError is raised if there are fewer values, or one is out of range.
     """
 
     key: str
@@ -63,7 +53,8 @@ class Axis:
 class Manifest:
     """All that determines the numbers of a campaign or a sweep, its progress, and its division into chunks.
 
-    Chunks are numbered from 0; each is stored as one shard.
+    Chunks are numbered from 0; each is stored as one shard. A TypeError or ValueError is raised if a number is out of
+    its range.
 
     Parameters
     ----------
@@ -96,11 +87,6 @@ class Manifest:
         Versions of the packages on which results depend.
     made_by : mapping of str to str
         Version of Python and kind of machine of the first session; they may differ when a campaign is resumed.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a number is out of its range.
     """
 
     runs: int
@@ -230,10 +216,7 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 def read_manifest(folder: Path) -> Manifest:
     """Read the manifest of a folder.
 
-    Raises
-    ------
-    ManifestError
-        If there is none, or this version cannot read it; the message names the invalid key.
+    A ManifestError is raised if there is none, or this version cannot read it; the message names the invalid key.
     """
     file = folder / MANIFEST
     if not file.is_file():
@@ -266,13 +249,7 @@ def _parsed(content: bytes) -> Manifest:
 
 
 def need_same(stored: Manifest, wanted: Manifest, folder: Path) -> None:
-    """Compare the decisive values of the campaign in a folder with those of another one.
-
-    Raises
-    ------
-    ManifestError
-        If they differ; all differences are listed.
-    """
+    """Raise ManifestError, with all differences, if the decisive values of two campaigns differ."""
     there, here = _flat(stored.decisive()), _flat(wanted.decisive())
     lines = [
         f"{key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"

@@ -74,10 +74,7 @@ def schema(*, with_cell: bool) -> Any:
 def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
     """Return the results of a chunk as an Arrow table, with the column `cell` in a sweep.
 
-    Raises
-    ------
-    FloatingPointError
-        If a number is not finite or out of its limits.
+    A FloatingPointError is raised if a number is not finite or out of its limits.
     """
     noises = chunk.noises(results.runs)
     stored: dict[str, Any] = {
@@ -105,10 +102,7 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
 def need_sound(table: Any, runs: range, cell: int) -> None:
     """Check that complete rows belong to the runs of a cell, in order, and that all values are within their limits.
 
-    Raises
-    ------
-    ValueError
-        If they do not; the message names the column.
+    A ValueError that names the column is raised if they do not.
     """
     for name, wanted in (("run", np.arange(runs.start, runs.stop)), ("cell", np.full(len(runs), cell))):
         if name in table.column_names:
@@ -154,12 +148,7 @@ def largest_file(rows: int) -> int:
 def fault(content: bytes, wanted: Mapping[str, str], rows: int, *, with_cell: bool) -> str | None:
     """Return a description of the damage of a shard, from its metadata; None if there is none.
 
-    Parameters
-    ----------
-    wanted : mapping of str to str
-        Entries that the metadata of its schema must have.
-    rows : int
-        Number of rows that the file must have.
+    The metadata of its schema must have the entries `wanted`, and the file must have `rows` rows.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(content))
@@ -187,12 +176,7 @@ def fault(content: bytes, wanted: Mapping[str, str], rows: int, *, with_cell: bo
 def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
     """Return some columns of a shard without a `fault`; None returns all columns.
 
-    Raises
-    ------
-    ValueError
-        If the content is not that of a shard.
-    OSError
-        If the file cannot be read.
+    A ValueError is raised if the content is not that of a shard.
     """
     wanted = _some(columns, with_cell=with_cell)
     try:
