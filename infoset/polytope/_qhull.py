@@ -195,7 +195,7 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
         on = np.zeros((len(kept), len(normals)), dtype=bool)
         np.logical_or.at(on, labels, gaps <= near)
         try:
-            corners, facets = _agreeing(points, normals, on, max(near, _LEAST_RANK))
+            corners, facets = _agreeing(points, normals, offsets, on, max(near, _LEAST_RANK))
         except UncertainHullError as error:
             failed = error
         else:
@@ -203,7 +203,9 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
     raise failed
 
 
-def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> tuple[Integers, Integers]:
+def _agreeing(
+    points: Floats, normals: Floats, offsets: Floats, on: Flags, negligible: float
+) -> tuple[Integers, Integers]:
     """Return which points are vertices and which planes facets, given which points are on which planes."""
     size = points.shape[1]
     facets = _largest(on, size)
@@ -223,8 +225,31 @@ def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> 
         raise UncertainHullError(f"a facet of a polytope in R^{size} has fewer than {size} vertices")
     if size == 2 and len(corners) != len(facets):
         raise UncertainHullError(f"{len(corners)} vertices and {len(facets)} sides are no polygon")
-    _need_agreement(points, corners, on[:, facets])
+    few_facets = len(facets) < len(corners) and len(corners) > _MOST_JOGGLED
+    if not (few_facets and _meet_in(points, corners, normals[facets], offsets[facets], on[:, facets])):
+        _need_agreement(points, corners, on[:, facets])
     return corners, facets
+
+
+def _meet_in(points: Floats, corners: Integers, normals: Floats, offsets: Floats, on_facets: Flags) -> bool:
+    """Whether the facets contain all points and meet in the vertices only. Fast if facets are few.
+
+    The hull of 915 vertices in 8 dimensions takes a minute, the intersection of their 23 facets milliseconds.
+    """
+    vertices = points[corners]
+    try:
+        met = HalfspaceIntersection(np.column_stack([normals, -offsets]), vertices.mean(axis=0))
+    except QhullError:
+        return False
+    apart, nearest = cKDTree(vertices).query(met.intersections, p=np.inf)
+    return (
+        float((points @ normals.T - offsets).max()) <= _APART
+        and float(apart.max()) <= _APART
+        and len(np.unique(nearest)) == len(corners)
+        and all(
+            on_facets[corners[corner], planes].all() for corner, planes in zip(nearest, met.dual_facets, strict=True)
+        )
+    )
 
 
 def _need_agreement(points: Floats, corners: Integers, on_facets: Flags) -> None:

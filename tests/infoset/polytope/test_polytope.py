@@ -14,6 +14,7 @@ from infoset.polytope import (
     Polytope,
     UnboundedPolytopeError,
     UncertainHullError,
+    _qhull,
     product,
     relative_interior,
     shadow,
@@ -76,6 +77,23 @@ def test_redundant_points_and_halfspaces_are_dropped() -> None:
     rows = np.vstack([np.eye(3), -np.eye(3), np.ones((1, 3)), np.eye(3)])
     again = Polytope.from_constraints(rows, [1, 1, 1, 0, 0, 0, 3, 1, 5, 1])
     assert (len(again.vertices), len(again.normals)) == (8, 6)
+
+
+def test_many_vertices_and_few_facets() -> None:
+    corners = np.array(list(itertools.product([-1.0, 1.0], repeat=8)))
+    normals, offsets = np.vstack([np.eye(8), -np.eye(8)]), np.ones(16)
+    on = corners @ normals.T == 1.0
+    every = np.arange(256)
+    vertices, facets, _ = _qhull.essential(corners, normals, offsets)
+    assert (len(vertices), len(facets)) == (256, 16)
+    assert _qhull._meet_in(corners, every, normals, offsets, on)
+    assert not _qhull._meet_in(corners, every[1:], normals, offsets, on)
+    assert not _qhull._meet_in(np.vstack([corners, 1.1 * corners[:1]]), every, normals, offsets, on)
+    assert not _qhull._meet_in(
+        np.vstack([corners, np.zeros(8)]), np.arange(257), normals, offsets, np.vstack([on, on[:1]])
+    )
+    on[0] = False
+    assert not _qhull._meet_in(corners, every, normals, offsets, on)
 
 
 @needs_ppl
