@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 INTERRUPTED = 130
 """Exit code of a program that Ctrl-C ends."""
@@ -22,6 +23,15 @@ class InputError(Exception):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+
+@contextlib.contextmanager
+def input_errors(source: str) -> Iterator[None]:
+    """Turn a `ValueError` into an `InputError` with the name of the file or the option."""
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(f"{source}: {error}") from None
 
 
 def shown(value: object) -> str:

@@ -5,12 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from decimal import Decimal
 from enum import Enum
+from typing import Generic, TypeVar
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BaseModel
 
+from experiments.common.errors import InputError
 from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in
+from experiments.common.output import library_version
 from experiments.common.toml_form import Form, KeyPath, Known, Problem, Tables, no_checks
 from experiments.common.toml_values import Constant, Description, Name, Table, key, quoted_text
 
@@ -26,6 +32,42 @@ class ProblemTables(Table):
     kind: Constant = key("kind of problem", '"pareto-encounter"')
     name: Name = key("name of the results", '"my-problem"')
     description: Description = key("one line for results and pages", '""', default="")
+
+
+OfProblem = TypeVar("OfProblem", bound=ProblemTables)
+
+
+@dataclass(frozen=True, eq=False)
+class ReadProblem(Generic[OfProblem]):
+    """A problem as read: its tables, and the name of its file for messages."""
+
+    tables: OfProblem
+    source: str
+
+    @property
+    def name(self) -> str:
+        """Return the name of the results."""
+        return self.tables.name
+
+    @property
+    def hash(self) -> str:
+        """Return the fingerprint of the values."""
+        return problem_hash(self.tables)
+
+    @property
+    def toml(self) -> str:
+        """Return a file that reads back as the same problem."""
+        return problem_toml(self.tables)
+
+    @property
+    def head(self) -> dict[str, object]:
+        """Return the first keys of the JSON of a command."""
+        return {"version": library_version(), "problem": self.name, "problem_hash": self.hash}
+
+    def need_finite(self, *results: ArrayLike) -> None:
+        """Raise `InputError` if a result is not finite."""
+        if not all(np.isfinite(values).all() for values in results):
+            raise InputError(f"{self.source}: the numbers are so large that results are not finite; check the units")
 
 
 def problem_text(name: str) -> str:

@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, input_errors
 from experiments.common.problem_file import (
     ProblemTables,
+    ReadProblem,
     angle_problems,
     duplicate_names,
     problem_form,
-    problem_hash,
-    problem_toml,
 )
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import KeyPath, Known, Problem
@@ -271,69 +270,41 @@ FORM = problem_form(
 
 
 @dataclass(frozen=True, eq=False)
-class MultipointProblem:
+class MultipointProblem(ReadProblem[MultipointTables]):
     """A problem as read.
 
     Parameters
     ----------
-    source : str
-        Name of the file, for messages.
     times_s : ndarray, shape (n,), or None
         Times of the visits, by target as listed; None if one is missing.
     """
 
-    name: str
-    source: str
-    hash: str
-    toml: str
-    axes: Axes
     tour: Visits
     times_s: Floats | None
-    optimise: bool
     latest_s: float | None
-    least_gap_s: float
     price_per_s: float
     greatest_control_m_s2: float | None
 
     def limits(self) -> TimeLimits:
-        """Return the limits of the times.
-
-        Raises
-        ------
-        InputError
-            If the last time has neither a limit nor a price.
-        """
+        """Return the limits of the times; `InputError` if the last time has neither a limit nor a price."""
         try:
-            return TimeLimits(self.latest_s, self.least_gap_s, self.price_per_s)
+            return TimeLimits(self.latest_s, self.tables.times.si("least_gap_s"), self.price_per_s)
         except ValueError as error:
             raise InputError(f"{self.source}: {error}: latest_s or price_per_s under [times]") from None
 
 
 def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) -> MultipointProblem:
-    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem, or it is not sound.
-    """
+    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
     tables = load_tables(FORM, name_or_path, settings)
-    try:
+    with input_errors(name_or_path):
         tour = _hill(tables) if tables.axes is Axes.HILL else _inertial(tables)
-    except ValueError as error:
-        raise InputError(f"{name_or_path}: {error}") from None
     times_s = [table.si("time_s") for table in tables.target if table.time_s is not None]
     return MultipointProblem(
-        tables.name,
+        tables,
         name_or_path,
-        problem_hash(tables),
-        problem_toml(tables),
-        tables.axes,
         tour,
         np.array(times_s) if len(times_s) == len(tables.target) else None,
-        tables.times.optimise,
         tables.times.si("latest_s"),
-        tables.times.si("least_gap_s"),
         tables.times.si("price_per_s"),
         tables.si("greatest_control_m_s2"),
     )

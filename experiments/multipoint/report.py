@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, library_version, trajectories_csv
+from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, trajectories_csv
 from experiments.common.screen import Part, number_table
 from experiments.multipoint.command import BEST, GIVEN
 from experiments.multipoint.file import Axes, MultipointProblem
@@ -63,11 +63,9 @@ class Report:
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
     problem, path = report.problem, report.scene.path
-    hill = problem.axes is Axes.HILL
+    hill = report.scene.axes is Axes.HILL
     return {
-        "version": library_version(),
-        "problem": problem.name,
-        "problem_hash": problem.hash,
+        **problem.head,
         "units": "m, s; " + ("x radial, y along the motion, z along the orbit's normal" if hill else "inertial axes"),
         "order_chosen": report.search.order,
         "times_chosen": report.search.times,

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, input_errors
 from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, show
 from experiments.multipoint.command import BEST, GIVEN, Multipoint
@@ -29,7 +29,7 @@ Progress = Callable[[float], None]
 def run(options: Multipoint) -> None:
     """Solve the problem, write the files and print the tables."""
     problem = load_multipoint(options.problem, options.settings)
-    search = Search(options.order, options.times or (BEST if problem.optimise else GIVEN))
+    search = Search(options.order, options.times or (BEST if problem.tables.times.optimise else GIVEN))
     _check(problem, search)
     with (
         output_of(options, ("problem.toml", "results.json", TRAJECTORIES, *figure_files(*FIGURES))) as written,
@@ -81,14 +81,10 @@ def _large(number: int) -> str:
 
 
 def _solve(problem: MultipointProblem, search: Search, progress: Progress) -> Report:
-    try:
+    with input_errors(problem.source):
         report = _searched(problem, search, progress)
-    except ValueError as error:
-        raise InputError(f"{problem.source}: {error}") from None
     path = report.scene.path
-    numbers = (path.cost, report.objective, path.costate_start, path.arrival_states, path.time_gradient)
-    if not all(np.isfinite(values).all() for values in numbers):
-        raise InputError(f"{problem.source}: the numbers are so large that results are not finite; check the units")
+    problem.need_finite(path.cost, report.objective, path.costate_start, path.arrival_states, path.time_gradient)
     bound = problem.greatest_control_m_s2
     if bound is not None and report.peak_m_s2 > bound:
         raise InputError(
@@ -120,7 +116,7 @@ def _searched(problem: MultipointProblem, search: Search, progress: Progress) ->
     return Report(
         problem,
         search,
-        Scene(problem.axes, tour, order, path),
+        Scene(problem.tables.axes, tour, order, path),
         objective,
         evaluations,
         begun,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import ProblemTables, problem_form, problem_hash, problem_toml
+from experiments.common.problem_file import ProblemTables, ReadProblem, problem_form
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
@@ -235,8 +235,8 @@ FORM = problem_form(
 
 
 @dataclass(frozen=True, eq=False)
-class ObserverProblem:
-    """A problem as read; the source is the name of its file for messages.
+class ObserverProblem(ReadProblem[ObserverTables]):
+    """A problem as read.
 
     Parameters
     ----------
@@ -252,11 +252,6 @@ class ObserverProblem:
         Names of the states with their units.
     """
 
-    name: str
-    source: str
-    hash: str
-    toml: str
-    description: str
     a: Floats
     b: Floats
     c: Floats
@@ -286,13 +281,7 @@ class ObserverProblem:
 
 
 def load_observer(name_or_path: str, settings: Sequence[str] | None = None) -> ObserverProblem:
-    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem, or it is not sound.
-    """
+    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
     tables = load_tables(FORM, name_or_path, settings)
     system = tables.system
     a, c = np.array(system.si("A")), np.array(system.si("C"))
@@ -301,11 +290,8 @@ def load_observer(name_or_path: str, settings: Sequence[str] | None = None) -> O
     series = tables.measurements or MeasurementTable()
     simulation = tables.simulation or SimulationTable()
     return ObserverProblem(
-        tables.name,
+        tables,
         name_or_path,
-        problem_hash(tables),
-        problem_toml(tables),
-        tables.description,
         a,
         b,
         c,

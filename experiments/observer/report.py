@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
 
-from experiments.common.output import Cell, library_version, to_csv
+from experiments.common.output import Cell, to_csv
 from experiments.common.screen import Part, number_table
 from experiments.observer.data import Data
 from experiments.observer.file import ObserverProblem
@@ -69,9 +69,7 @@ def report_json(report: Report) -> dict[str, object]:
     for step, state in zip(steps, () if report.data.states is None else report.data.states, strict=False):
         step["state"] = state
     return {
-        "version": library_version(),
-        "problem": problem.name,
-        "problem_hash": problem.hash,
+        **problem.head,
         "data": report.data.origin,
         "states": problem.names,
         "steps": steps,

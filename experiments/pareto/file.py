@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
-from experiments.common.errors import InputError
+from experiments.common.errors import input_errors
 from experiments.common.problem_file import (
     ProblemTables,
+    ReadProblem,
     angle_problems,
     duplicate_names,
     problem_form,
-    problem_hash,
-    problem_toml,
 )
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
@@ -131,25 +130,15 @@ FORM = problem_form(KIND, ParetoTables, _checks)
 
 
 @dataclass(frozen=True, eq=False)
-class ParetoProblem:
-    """A problem as read; the source is the name of its file for messages."""
+class ParetoProblem(ReadProblem[ParetoTables]):
+    """A problem as read."""
 
-    name: str
-    source: str
-    hash: str
-    toml: str
     encounter: Encounter
     greatest_control_m_s2: float | None
 
 
 def load_pareto(name_or_path: str, settings: Sequence[str] | None = None) -> ParetoProblem:
-    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem, or it is not sound.
-    """
+    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
     tables = load_tables(FORM, name_or_path, settings)
     motion = ClohessyWiltshire(tables.si("orbit_rate_rad_s"), ORBITAL)
     craft = tuple(
@@ -163,15 +152,6 @@ def load_pareto(name_or_path: str, settings: Sequence[str] | None = None) -> Par
         for table in tables.craft
     )
     fixed = np.array(tables.terminal.si_numbers(*TERMINAL.values()))
-    try:
+    with input_errors(name_or_path):
         encounter = Encounter(craft, tables.si("duration_s"), tables.free, fixed, tables.meet)
-    except ValueError as error:
-        raise InputError(f"{name_or_path}: {error}") from None
-    return ParetoProblem(
-        tables.name,
-        name_or_path,
-        problem_hash(tables),
-        problem_toml(tables),
-        encounter,
-        tables.si("greatest_control_m_s2"),
-    )
+    return ParetoProblem(tables, name_or_path, encounter, tables.si("greatest_control_m_s2"))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, library_version, trajectories_csv
+from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, trajectories_csv
 from experiments.common.screen import Part, number, number_table
 from experiments.pareto.file import TERMINAL, ParetoProblem
 from rendezvous.pareto import BoundCheck, Coalitions, DurationSweep, EncounterSolution, Feasibility, distances
@@ -50,9 +50,7 @@ def report_json(report: Report, samples: int) -> dict[str, object]:
     problem, solution = report.problem, report.solution
     encounter = problem.encounter
     return {
-        "version": library_version(),
-        "problem": problem.name,
-        "problem_hash": problem.hash,
+        **problem.head,
         "units": {
             "axes": "x against the motion, y radially outward, z along the orbit's normal",
             "costate_at_meeting": "m/s^3 of the position's three, m/s^2 of the velocity's",

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from experiments.common.errors import InputError, shown
+from experiments.common.errors import InputError, input_errors, shown
 from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, show
 from experiments.common.toml_values import LARGEST
@@ -23,9 +23,6 @@ from rendezvous.pareto import (
     BoundCheck,
     EncounterSolution,
     Feasibility,
-    Meeting,
-    NotCertifiedError,
-    NotOptimalError,
     analyse_coalitions,
     check_bound,
     least_greatest_excess,
@@ -89,12 +86,9 @@ def _preferred(text: str, problem: ParetoProblem) -> Floats:
 
 def _solve(problem: ParetoProblem, preferred: Floats | None, progress: Callable[[float], None]) -> Report:
     encounter = problem.encounter
-    try:
+    with input_errors(problem.source):
         solution = solve_encounter(encounter)
-    except ValueError as error:
-        raise InputError(f"{problem.source}: {error}") from None
-    if not (np.isfinite(solution.meeting_state()).all() and np.isfinite(solution.cost_squared()).all()):
-        raise InputError(f"{problem.source}: the numbers are so large that results are not finite; check the units")
+    problem.need_finite(solution.meeting_state(), solution.cost_squared())
     selections = _selections(problem, solution, preferred)
     progress(0.2)
     bounds = _bounds(problem, solution)
@@ -124,10 +118,8 @@ def _selections(problem: ParetoProblem, solution: EncounterSolution, preferred: 
         "least_greatest_excess": least_greatest_excess(solution),
     }
     if preferred is not None:
-        try:
+        with input_errors(f"{problem.source}: --prefer"):
             selections["preferred"] = nearest_to(solution, preferred)
-        except NotOptimalError as error:
-            raise InputError(f"{problem.source}: --prefer: {error}") from None
     return selections
 
 
@@ -136,12 +128,9 @@ def _bounds(problem: ParetoProblem, solution: EncounterSolution) -> tuple[BoundC
     bound, encounter = problem.greatest_control_m_s2, problem.encounter
     if bound is None:
         return ()
-    common = 6 if encounter.meeting is Meeting.RENDEZVOUS else 3
     where = f"{problem.source}: greatest_control_m_s2"
-    try:
-        checks = [check_bound(solution.plan(index), bound, common) for index in range(len(solution.costs))]
-    except NotCertifiedError as error:
-        raise InputError(f"{where}: {error}") from None
+    with input_errors(where):
+        checks = [check_bound(solution.plan(index), bound, encounter.common) for index in range(len(solution.costs))]
     worst = max(range(len(checks)), key=lambda index: checks[index].least_peak_m_s2)
     need = checks[worst].least_peak_m_s2
     if checks[worst].feasibility is Feasibility.IMPOSSIBLE:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated
 
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike
 from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import ProblemTables, problem_form, problem_hash, problem_toml
+from experiments.common.problem_file import ProblemTables, ReadProblem, problem_form
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
@@ -112,41 +111,18 @@ class PursuitTables(ProblemTables):
     evader: PlayerTable = key("the evader, which maximizes the time of capture", "")
 
 
-@dataclass(frozen=True)
-class PursuitProblem:
-    """A problem as read, with the name of its file for messages."""
-
-    tables: PursuitTables
-    source: str
-
-    @property
-    def name(self) -> str:
-        """Return the name of the results."""
-        return self.tables.name
-
-    @property
-    def hash(self) -> str:
-        """Return a fingerprint of the values."""
-        return problem_hash(self.tables)
+class PursuitProblem(ReadProblem[PursuitTables]):
+    """A problem as read."""
 
     def game(self, changes: Mapping[str, float] | None = None) -> Game:
-        """Return the game in SI.
+        """Return the game in SI; `ValueError` if a value is impossible.
 
         Parameters
         ----------
         changes : mapping of str to float, optional
             Values in place of those of the file, by parameter, in the unit of its name.
-
-        Raises
-        ------
-        ValueError
-            If a value is impossible.
         """
         return _game(self.tables, changes or {})
-
-    def to_toml(self) -> str:
-        """Return a file that reads back as the same problem."""
-        return problem_toml(self.tables)
 
     def warnings(self) -> Iterator[str]:
         """Yield a line for each value that is allowed but probably in a wrong unit."""
@@ -274,13 +250,7 @@ FORM = problem_form(KIND, PursuitTables, _checks, [f"{player}.{element}" for pla
 
 
 def load_pursuit(name_or_path: str, settings: Sequence[str] | None = None) -> PursuitProblem:
-    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem, or it is not sound.
-    """
+    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
     return PursuitProblem(load_tables(FORM, name_or_path, settings), name_or_path)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
-from experiments.common.output import Cell, library_version, output_of, to_csv, to_json
+from experiments.common.output import Cell, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, show
 from experiments.pursuit.command import ROWS, PursuitMap
 from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
@@ -61,7 +61,7 @@ def run(options: PursuitMap) -> None:
                 progress=begin("map"),
             )
         elapsed_s = perf_counter() - began_s
-        written.save("problem.toml", problem.to_toml())
+        written.save("problem.toml", problem.toml)
         written.save("results.json", to_json(_summary(problem, x, y, solved, elapsed_s)), "--json")
         written.save("map.csv", to_csv(*_table(x, y, solved)), "--csv")
         if options.out is not None:
@@ -120,9 +120,7 @@ def read_axis(option: str, text: str) -> Axis:
 
 def _summary(problem: PursuitProblem, x: Axis, y: Axis, solved: CaptureMap, elapsed_s: float) -> dict[str, object]:
     return {
-        "version": library_version(),
-        "problem": problem.name,
-        "problem_hash": problem.hash,
+        **problem.head,
         "elapsed_s": elapsed_s,
         "x": x,
         "y": y,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.common.display_units import M_PER_KM, S_PER_HOUR
-from experiments.common.output import STATE_COLUMNS, Cell, library_version, trajectories_csv
+from experiments.common.output import STATE_COLUMNS, Cell, trajectories_csv
 from experiments.common.screen import Part, number, number_table
 from experiments.pursuit.file import PursuitProblem
 from rendezvous.pursuit_evasion import (
@@ -69,9 +69,7 @@ def report_json(report: Report) -> dict[str, object]:
     problem, solution, certificate = report.problem, report.solution, report.certificate
     warnings = list(problem.warnings())
     return {
-        "version": library_version(),
-        "problem": problem.name,
-        "problem_hash": problem.hash,
+        **problem.head,
         **({"warnings": warnings} if warnings else {}),
         "elapsed_s": report.elapsed_s,
         "verdict": solution.verdict,

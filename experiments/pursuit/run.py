@@ -9,7 +9,7 @@ from time import perf_counter
 
 from matplotlib.figure import Figure
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, input_errors
 from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, say, say_warnings, show
 from experiments.pursuit.command import Pursuit
@@ -47,7 +47,7 @@ def run(options: Pursuit) -> None:
             if written.wants("--csv") and _has_trajectory(report.solution):
                 written.save(TRAJECTORIES, trajectories(report.solution), "--csv")
             if options.out is not None:
-                written.save("problem.toml", problem.to_toml())
+                written.save("problem.toml", problem.toml)
                 written.draw(_drawings(report), begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
@@ -63,10 +63,8 @@ def _check_feedback(options: Pursuit) -> None:
 
 def _solve(problem: PursuitProblem, options: Pursuit, evader: EvaderPolicy | None, begin: Begin) -> Report:
     began_s, progress = perf_counter(), begin("solve")
-    try:
+    with input_errors(problem.source):
         solution = solve(problem.game(), all_directions=options.certify)
-    except ValueError as error:
-        raise InputError(f"{problem.source}: {error}; correct the problem") from None
     progress(0.5)
     certificate = None if solution.capture is None else certify(solution, all_directions=options.certify)
     progress(1.0)

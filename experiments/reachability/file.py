@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import ProblemTables, problem_form, problem_hash, problem_toml
+from experiments.common.problem_file import ProblemTables, ReadProblem, problem_form
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
@@ -170,7 +170,7 @@ class ReachabilityTables(ProblemTables):
 
 
 @dataclass(frozen=True, eq=False)
-class Rendezvous:
+class Rendezvous(ReadProblem[ReachabilityTables]):
     """A problem as read, in SI.
 
     Parameters
@@ -183,10 +183,6 @@ class Rendezvous:
         Largest error of each component.
     """
 
-    name: str
-    description: str
-    hash: str
-    toml: str
     problem: ReachabilityProblem
     motion: ConstantMotion | TschaunerHempel
     truth: NonlinearMotion
@@ -215,16 +211,10 @@ class Rendezvous:
 
 
 def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Rendezvous:
-    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem, or it is not sound.
-    """
+    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
     tables = load_tables(FORM, name_or_path, settings)
     try:
-        return _rendezvous(tables)
+        return _rendezvous(tables, os.fspath(name_or_path))
     except InadmissibleStartError as error:
         violated = "; ".join(f"{name} by {excess:.6g}" for name, excess in error.broken)
         raise InputError(
@@ -343,7 +333,7 @@ def _keep_in_problems(known: Known) -> Iterator[Problem]:
 FORM = problem_form(KIND, ReachabilityTables, _checks)
 
 
-def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
+def _rendezvous(tables: ReachabilityTables, source: str) -> Rendezvous:
     orbit = EllipticOrbit.of_size(
         *tables.orbit.si_numbers(
             "semi_major_axis_km", "eccentricity", "gravitational_parameter_m3_s2", "true_anomaly_deg"
@@ -374,10 +364,8 @@ def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
         disturbance = control / acceleration * _vector(tables.disturbance, "acceleration_m_s2")
     navigation = tables.navigation
     return Rendezvous(
-        tables.name,
-        tables.description,
-        problem_hash(tables),
-        problem_toml(tables),
+        tables,
+        source,
         problem,
         motion,
         NonlinearMotion(orbit, tables.orbit.si("semi_major_axis_km")),

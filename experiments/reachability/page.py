@@ -46,7 +46,7 @@ def reachability_page(report: Report) -> str:
     ]
     miss = report.solution.optimal.miss
     about = [
-        *([rendezvous.description] if rendezvous.description else []),
+        *filter(None, [rendezvous.tables.description]),
         f"least terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; trajectories of the nonlinear model",
     ]
     names = [member.name for member in members]

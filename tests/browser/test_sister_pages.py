@@ -49,8 +49,9 @@ class Solved:
             "least_sum_of_costs": least_sum_of_costs(self.encounter),
             "least_greatest_excess": least_greatest_excess(self.encounter),
         }
-        rendezvous = replace(self.report.rendezvous, name=name, description=description)
-        axes = load_multipoint("service-3").axes
+        tables = self.report.rendezvous.tables.model_copy(update={"name": name, "description": description})
+        rendezvous = replace(self.report.rendezvous, tables=tables)
+        axes = load_multipoint("service-3").tables.axes
         return {
             "pareto": pareto_page(name, self.encounter, selections),
             "multipoint": multipoint_page(name, Scene(axes, self.tour, (0, 1, 2), self.path), 0.02),

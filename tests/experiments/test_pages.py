@@ -209,7 +209,7 @@ def test_colours_that_stand_together_can_be_told_apart_by_the_colour_blind(theme
 def _visits() -> str:
     problem = load_multipoint("service-5")
     path = problem.tour.fly((0, 2, 1, 3, 4), np.array([1800.0, 3600.0, 6000.0, 8700.0, 11000.0]))
-    return multipoint_page("visits", Scene(problem.axes, problem.tour, (0, 2, 1, 3, 4), path))
+    return multipoint_page("visits", Scene(problem.tables.axes, problem.tour, (0, 2, 1, 3, 4), path))
 
 
 def _pursuit() -> str:

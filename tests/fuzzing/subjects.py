@@ -89,7 +89,7 @@ def _read_scenario(path: str) -> Scenario:
 def _read_pursuit(path: str) -> object:
     problem = load_pursuit(path)
     problem.warnings()
-    assert read_tables(PURSUIT, problem.to_toml(), "written again") == problem.tables
+    assert read_tables(PURSUIT, problem.toml, "written again") == problem.tables
     try:
         return problem.game()
     except ValueError as error:  # what the core documents

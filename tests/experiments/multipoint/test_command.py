@@ -209,7 +209,7 @@ def test_every_built_in_problem_is_sound() -> None:
         loaded = load_multipoint(each.name)
         assert loaded.name == each.name
         assert each.description
-        assert loaded.axes is (Axes.INERTIAL if each.name == "asteroid-tour" else Axes.HILL)
+        assert loaded.tables.axes is (Axes.INERTIAL if each.name == "asteroid-tour" else Axes.HILL)
 
 
 @pytest.mark.parametrize(
@@ -387,7 +387,7 @@ def test_figures_say_what_they_show() -> None:
     problem = load_multipoint("service-3")
     assert problem.times_s is not None
     path = problem.tour.fly((0, 1, 2), problem.times_s)
-    scene = Scene(problem.axes, problem.tour, (0, 1, 2), path)
+    scene = Scene(problem.tables.axes, problem.tour, (0, 1, 2), path)
     curves = cost_curves(scene)
     assert len(curves) == 3
     for index, curve in enumerate(curves):
@@ -408,6 +408,6 @@ def test_figures_say_what_they_show() -> None:
 def test_matplotlib_warns_of_nothing_in_the_path_of_a_tour(caplog: pytest.LogCaptureFixture) -> None:
     problem = load_multipoint("asteroid-tour")
     assert problem.times_s is not None
-    scene = Scene(problem.axes, problem.tour, (0, 1, 2), problem.tour.fly((0, 1, 2), problem.times_s))
+    scene = Scene(problem.tables.axes, problem.tour, (0, 1, 2), problem.tour.fly((0, 1, 2), problem.times_s))
     assert [kind for kind, _ in figure_bytes(draw_path(scene))] == ["pdf", "png"]
     assert [each.message for each in caplog.records if each.name.startswith("matplotlib")] == []

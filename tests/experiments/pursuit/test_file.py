@@ -16,7 +16,7 @@ def read_problem(text: str, source: str) -> PursuitProblem:
 
 @pytest.fixture(scope="module")
 def text() -> str:
-    return load_pursuit("geo-pursuit").to_toml()
+    return load_pursuit("geo-pursuit").toml
 
 
 def complaint(text: str) -> str:
@@ -28,7 +28,7 @@ def complaint(text: str) -> str:
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_problems_read_back_as_they_are_written(name: str) -> None:
     problem = load_pursuit(name)
-    again = read_problem(problem.to_toml(), "again")
+    again = read_problem(problem.toml, "again")
     assert again.tables == problem.tables
     assert again.hash == problem.hash
     assert list(problem.warnings()) == []
