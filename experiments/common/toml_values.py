@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import types
 import typing
+from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation
 from enum import Enum, EnumMeta
@@ -224,6 +225,22 @@ class Numbers:
             if problem is not None:
                 raise wrong(f"number {place} of the array {problem}")
         return tuple(Decimal(each) for each in value)
+
+
+@dataclass(frozen=True)
+class Items:
+    """An array of `least` to `most` values, each checked by `item`; `noun` names them in messages."""
+
+    item: Callable[[object], Any]
+    noun: str
+    most: int
+    least: int = 1
+
+    def __call__(self, value: object) -> tuple[Any, ...]:
+        """Check and return them."""
+        if not isinstance(value, list) or not self.least <= len(value) <= self.most:
+            raise wrong(f"must be an array of {self.least} to {self.most} {self.noun}")
+        return tuple(self.item(item) for item in value)
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,10 @@ from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
     NUMBER,
     ZERO,
+    Items,
     Line,
     Name,
     Number,
-    Numbers,
     Positive,
     Table,
     Whole,
@@ -44,8 +44,8 @@ MOST_GENERATORS = 12
 
 
 @dataclass(frozen=True)
-class _Rows:
-    """An array of up to `most` rows of numbers, all of one length up to `longest`; empty rows only if allowed."""
+class Rows:
+    """An array of up to `most` rows of numbers, all of one length up to `longest`; empty rows only with `gaps`."""
 
     most: int
     longest: int
@@ -53,51 +53,22 @@ class _Rows:
 
     def __call__(self, value: object) -> tuple[Row, ...]:
         """Check and return them."""
-        if not isinstance(value, list) or not all(isinstance(row, list) for row in value):
-            raise wrong("must be an array of rows, each an array of numbers")
-        if not 1 <= len(value) <= self.most:
-            raise wrong(f"must have from 1 to {self.most} rows, not {len(value)}")
-        lengths = {len(row) for row in value} - ({0} if self.gaps else set())
-        if len(lengths) > 1 or not lengths <= set(range(1, self.longest + 1)):
-            raise wrong(f"must have rows of one length, from 1 to {self.longest} numbers")
-        return tuple(Numbers(len(row), NUMBER)(row) for row in value)
+        numbers = Items(NUMBER, "numbers", self.longest, least=0 if self.gaps else 1)
+        rows = Items(numbers, "rows, each an array of numbers", self.most)(value)
+        if len({len(row) for row in rows if row}) > 1:
+            raise wrong("must have rows of one length")
+        return rows
 
 
-@dataclass(frozen=True)
-class _Some:
-    """An array of 1 to `most` numbers within limits."""
-
-    most: int
-    number: Number = NUMBER
-
-    def __call__(self, value: object) -> Row:
-        """Check and return them."""
-        if not isinstance(value, list) or not 1 <= len(value) <= self.most:
-            raise wrong(f"must be an array of 1 to {self.most} numbers")
-        return Numbers(len(value), self.number)(value)
-
-
-def _names(value: object) -> tuple[str, ...]:
-    if not isinstance(value, list) or not 1 <= len(value) <= MOST_STATES:
-        raise wrong(f"must be an array of 1 to {MOST_STATES} texts")
-    return tuple(Line(40, empty=False)(name) for name in value)
-
-
-def _steps(value: object) -> tuple[int, ...]:
-    if not isinstance(value, list) or len(value) > MOST_STEPS:
-        raise wrong("must be an array of steps")
-    if not all(isinstance(step, int) and not isinstance(step, bool) and 0 <= step < MOST_STEPS for step in value):
-        raise wrong(f"must be an array of whole numbers from 0 to {MOST_STEPS - 1}")
-    return tuple(value)
-
-
-Matrix = Annotated[tuple[Row, ...], PlainValidator(_Rows(MOST_OUTPUTS, MOST_STATES))]
-Vector = Annotated[Row, PlainValidator(_Some(MOST_STATES))]
-Generators = Annotated[tuple[Row, ...], PlainValidator(_Rows(MOST_GENERATORS, MOST_STATES))]
-Vertices = Annotated[tuple[Row, ...], PlainValidator(_Rows(MOST_VERTICES, MOST_STATES))]
-Widths = Annotated[Row, PlainValidator(_Some(MOST_OUTPUTS, Number(least=ZERO)))]
-Series = Annotated[tuple[Row, ...], PlainValidator(_Rows(MOST_STEPS, MOST_OUTPUTS, gaps=True))]
-Inputs = Annotated[tuple[Row, ...], PlainValidator(_Rows(MOST_STEPS, MOST_OUTPUTS))]
+Matrix = Annotated[tuple[Row, ...], PlainValidator(Rows(MOST_OUTPUTS, MOST_STATES))]
+Vector = Annotated[Row, PlainValidator(Items(NUMBER, "numbers", MOST_STATES))]
+Generators = Annotated[tuple[Row, ...], PlainValidator(Rows(MOST_GENERATORS, MOST_STATES))]
+Vertices = Annotated[tuple[Row, ...], PlainValidator(Rows(MOST_VERTICES, MOST_STATES))]
+Widths = Annotated[Row, PlainValidator(Items(Number(least=ZERO), "numbers", MOST_OUTPUTS))]
+Series = Annotated[tuple[Row, ...], PlainValidator(Rows(MOST_STEPS, MOST_OUTPUTS, gaps=True))]
+Inputs = Annotated[tuple[Row, ...], PlainValidator(Rows(MOST_STEPS, MOST_OUTPUTS))]
+Steps = Annotated[tuple[int, ...], PlainValidator(Items(Whole(MOST_STEPS - 1, least=0), "steps", MOST_STEPS, least=0))]
+Names = Annotated[tuple[str, ...], PlainValidator(Items(Line(40, empty=False), "texts", MOST_STATES))]
 
 
 class SystemTable(Table):
@@ -108,7 +79,7 @@ class SystemTable(Table):
     C: Matrix = key("a row for each output, n columns", "[[1.0, 0.0]]")
     offset: Vector | None = key("n numbers", "[0.0, 0.0]", default=None)
     step_s: Positive | None = key("time between two steps, for figures", "0.5", default=None)
-    states: Annotated[tuple[str, ...], PlainValidator(_names)] | None = key(
+    states: Names | None = key(
         "names of the states with their units, for figures", '["position, m", "speed, m/s"]', default=None
     )
 
@@ -149,9 +120,7 @@ class SimulationTable(Table):
     """[simulation]: measurements that are simulated if there are none."""
 
     steps: Annotated[int, PlainValidator(Whole(MOST_STEPS))] = key("number of measurements", "30", default=30)
-    missing: Annotated[tuple[int, ...], PlainValidator(_steps)] = key(
-        "steps without a measurement", "[10, 11]", default=()
-    )
+    missing: Steps = key("steps without a measurement", "[10, 11]", default=())
 
 
 class ObserverTables(ProblemTables):
@@ -164,6 +133,9 @@ class ObserverTables(ProblemTables):
     noise: NoiseTable = key("bounds of the errors v of the outputs", "")
     measurements: MeasurementTable | None = key("measurements and inputs", "", default=None)
     simulation: SimulationTable | None = key("simulated measurements, if there are none", "", default=None)
+
+
+_FORMS = (("lower", "upper"), ("center", "generators"), ("vertices",))
 
 
 def _width(value: object) -> int | None:
@@ -180,16 +152,12 @@ def _checks(known: Known) -> Iterator[Problem]:
     if n is None:
         return
     rows = {name: known.value("system", name) for name in ("A", "B", "C")}
-    for name, value, wanted in (
-        ("A", rows["A"], n),
-        ("B", rows["B"], n),
-    ):
-        if isinstance(value, list) and len(value) != wanted:
+    for name, value in rows.items():
+        if name != "C" and isinstance(value, list) and len(value) != n:
             text = f"has {len(value)} rows, and A has {n} columns"
             yield Problem(("system", name), text, f"write {n} rows, one a state")
-    sizes = [(("system", "C"), n), (("system", "offset"), n), (("system", "states"), n)]
-    for table in ("initial", "disturbance"):
-        sizes += [((table, name), n) for name in ("lower", "upper", "center", "generators", "vertices")]
+    sizes = [(("system", name), n) for name in ("C", "offset", "states")]
+    sizes += [((table, name), n) for table in ("initial", "disturbance") for form in _FORMS for name in form]
     if isinstance(rows["C"], list):
         outputs = len(rows["C"])
         sizes += [(("noise", "half_width"), outputs), (("measurements", "y"), outputs)]
@@ -206,18 +174,12 @@ def _checks(known: Known) -> Iterator[Problem]:
             yield from _form_problems(known, table, value)
 
 
-_FORMS = (("lower", "upper"), ("center", "generators"), ("vertices",))
-
-
 def _form_problems(known: Known, table: str, value: dict[str, Any]) -> Iterator[Problem]:
     """Yield a problem unless a set has exactly one of the three forms."""
     used = [form for form in _FORMS if any(name in value for name in form)]
     if len(used) != 1 or not all(name in value for name in used[0]):
-        yield Problem(
-            (table,),
-            "does not describe one set",
-            "write lower and upper, or center and generators, or vertices",
-        )
+        remedy = "write lower and upper, or center and generators, or vertices"
+        yield Problem((table,), "does not describe one set", remedy)
         return
     lower, upper = (known.value(table, name) for name in ("lower", "upper"))
     if isinstance(lower, list) and isinstance(upper, list) and len(lower) == len(upper):

@@ -22,6 +22,7 @@ from experiments.common.toml_values import (
     POSITIVE,
     Degrees,
     Eccentricity,
+    Items,
     Number,
     Numbers,
     Positive,
@@ -30,7 +31,6 @@ from experiments.common.toml_values import (
     Whole,
     key,
     si,
-    wrong,
 )
 from infoset.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
@@ -60,28 +60,11 @@ _MOST_REACH = 1e4
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 
 
-def _rows(value: object) -> Rows:
-    """Check an array of arrays of three numbers."""
-    if not isinstance(value, list) or not 1 <= len(value) <= MOST_HALFSPACES:
-        raise wrong(f"must be an array of 1 to {MOST_HALFSPACES} arrays of 3 numbers")
-    return tuple(Numbers(3, NUMBER)(row) for row in value)
-
-
-def _row(value: object) -> tuple[Decimal, ...]:
-    if not isinstance(value, list) or not 1 <= len(value) <= MOST_HALFSPACES:
-        raise wrong(f"must be an array of 1 to {MOST_HALFSPACES} numbers")
-    return Numbers(len(value), NUMBER)(value)
-
-
-def _from_period(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_PERIODS:
-        raise wrong(f"must be a whole number from 0 to {MOST_PERIODS}")
-    return value
-
-
 OpenAngle = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), below=Decimal(90)))]
 Bound = Annotated[tuple[Decimal, ...], PlainValidator(Numbers(3, POSITIVE, one_for_all=True))]
-FromPeriod = Annotated[int, PlainValidator(_from_period)]
+FromPeriod = Annotated[int, PlainValidator(Whole(MOST_PERIODS, least=0))]
+Normals = Annotated[Rows, PlainValidator(Items(Numbers(3, NUMBER), "arrays of 3 numbers", MOST_HALFSPACES))]
+Offsets = Annotated[tuple[Decimal, ...], PlainValidator(Items(NUMBER, "numbers", MOST_HALFSPACES))]
 
 
 class OrbitTable(Table):
@@ -114,7 +97,7 @@ class ConeTable(Table):
     apex_m: Vector = key("apex", "[-20.0, 0.0, 0.0]")
     axis: Vector = key("direction of the axis, of any length", "[1.0, 0.0, 0.0]")
     half_angle_deg: OpenAngle = key("angle between axis and cone", "60.0")
-    faces: Annotated[int, PlainValidator(Whole(MOST_FACES))] = key(
+    faces: Annotated[int, PlainValidator(Whole(MOST_FACES, least=3))] = key(
         "number of faces of the pyramid, at least 3", "8", default=8
     )
     from_period: FromPeriod = key("first t at which it holds", "0", default=0)
@@ -123,12 +106,10 @@ class ConeTable(Table):
 class KeepInTable(Table):
     """[[keep_in]]: a bounded polytope for the position, normals . position <= offsets_m."""
 
-    normals: Annotated[Rows, PlainValidator(_rows)] = key(
+    normals: Normals = key(
         "one array for each half-space", "[[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]"
     )
-    offsets_m: Annotated[tuple[Decimal, ...], PlainValidator(_row)] = key(
-        "one number for each half-space", "[2900, 2900, 2900, 2900, 2900, 2900]"
-    )
+    offsets_m: Offsets = key("one number for each half-space", "[2900, 2900, 2900, 2900, 2900, 2900]")
     from_period: FromPeriod = key("first t at which it holds", "0", default=0)
 
 
@@ -155,7 +136,7 @@ class ReachabilityTables(ProblemTables):
     thrust: ThrustShape = key(
         '"box" (each component is bounded) or "ball" (the norm is bounded)', '"box"', default=ThrustShape.BOX
     )
-    checks_between_periods: FromPeriod = key(
+    checks_between_periods: Annotated[int, PlainValidator(Whole(MOST_CHECKS, least=0))] = key(
         "number of instants within a period at which the constraints also hold", "0", default=0
     )
     orbit: OrbitTable = key("the orbit of the passive craft", "")
@@ -218,8 +199,8 @@ def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str
     except InadmissibleStartError as error:
         violated = "; ".join(f"{name} by {excess:.6g}" for name, excess in error.broken)
         raise InputError(
-            f"{os.fspath(name_or_path)}: initial: the state violates constraints: {violated}; move it inside, or let "
-            "them hold from a later period (from_period)"
+            f"{os.fspath(name_or_path)}: initial: the state violates constraints: {violated}; move it "
+            "inside, raise [bounds], or let the cone and keep_in hold from a later period (from_period)"
         ) from None
     except (ValueError, ArithmeticError) as error:
         raise InputError(f"{os.fspath(name_or_path)}: {error}; check the numbers and their units") from None
@@ -227,34 +208,13 @@ def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str
 
 def _checks(known: Known) -> Iterator[Problem]:
     """Check the values against each other."""
-    for quantity, unit in (("position", "m"), ("velocity", "m_s")):
-        name = f"{quantity}_{unit}"
-        values, bounds = known.value("initial", name), known.value("bounds", name)
-        if not isinstance(values, list):
-            continue
-        limits = bounds if isinstance(bounds, list) else [bounds] * len(values)
-        for axis, value, limit in zip("xyz", values, limits, strict=False):
-            if limit is not None and abs(Decimal(value)) > Decimal(limit):
-                yield Problem(
-                    ("initial", name),
-                    f"{axis} is outside its bound, {limit}: found {value}",
-                    f"move it inside, or raise bounds.{name}",
-                )
     control = known.value("bounds", "control")
     if known.value("thrust") == "ball" and isinstance(control, list) and len({Decimal(value) for value in control}) > 1:
         yield Problem(("bounds", "control"), "must be one number for thrust in a ball", "write the radius of the ball")
-    faces = known.value("cone", "faces")
-    if isinstance(faces, int) and faces < 3:
-        yield Problem(("cone", "faces"), f"must be from 3 to {MOST_FACES}, found {faces}", "write faces = 8")
     direction = known.value("cone", "axis")
     if isinstance(direction, list) and not any(direction):
         yield Problem(("cone", "axis"), "has no direction: all components are 0", "write axis = [1.0, 0.0, 0.0]")
-    checks = known.value("checks_between_periods")
-    if isinstance(checks, int) and checks > MOST_CHECKS:
-        yield Problem(
-            ("checks_between_periods",), f"must be at most {MOST_CHECKS}, found {checks}", "shorten period_s instead"
-        )
-    if known.value("disturbance") is not None and checks:
+    if known.value("disturbance") is not None and known.value("checks_between_periods"):
         yield Problem(
             ("disturbance",),
             "is possible without checks between periods only",
