@@ -37,7 +37,9 @@ class Scan:
 
 
 @dataclass(frozen=True)
-class _End:
+class End:
+    """The end of an extremal of one side along `nu`, with the directions across it and the linear response."""
+
     state: Floats
     nu: Floats
     plane: Floats
@@ -86,10 +88,10 @@ def directions(count: int) -> Floats:
     return np.stack([across_axis * np.cos(angle), across_axis * np.sin(angle), z], axis=1)
 
 
-def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -> dict[int, _End]:
+def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -> dict[int, End]:
     """Find the end states of one side for the directions of a grid, which are sorted from nu outward."""
-    first = _end(side, state, nu, duration)
-    solved: dict[int, _End] = {}
+    first = end_along(side, state, nu, duration)
+    solved: dict[int, End] = {}
     if first is None:
         return solved
     for i, toward in enumerate(grid):
@@ -104,7 +106,7 @@ def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -
     return {i: end for i, end in solved.items() if end.nu @ end.state[:3] >= reach[i].max() - _SHORT}
 
 
-def _turn(side: Side, seed: _End, toward: Floats, duration: float) -> _End | None:
+def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
     """Turn the direction of an extremal, in steps as long as they converge."""
     parts = 1
     while parts <= _MOST_PARTS:
@@ -112,7 +114,7 @@ def _turn(side: Side, seed: _End, toward: Floats, duration: float) -> _End | Non
         for part in range(1, parts + 1):
             nu = seed.nu + (toward - seed.nu) * (part / parts)
             nu = nu / np.linalg.norm(nu)
-            end = _end(side, here.state + here.response.by_nu @ (here.plane @ (nu - here.nu)), nu, duration)
+            end = end_along(side, here.state + here.response.by_nu @ (here.plane @ (nu - here.nu)), nu, duration)
             if end is None:
                 break
             here = end
@@ -122,8 +124,8 @@ def _turn(side: Side, seed: _End, toward: Floats, duration: float) -> _End | Non
     return None
 
 
-def _end(side: Side, state: Floats, nu: Floats, duration: float) -> _End | None:
-    """Find the extremal of one side along nu, near a guess of its end."""
+def end_along(side: Side, state: Floats, nu: Floats, duration: float) -> End | None:
+    """Return the end of the extremal of one side along nu, near a guess; None if Newton's method finds none."""
     plane = across(nu)
     before = np.inf
     for _ in range(_MOST_ITERATIONS):
@@ -135,7 +137,7 @@ def _end(side: Side, state: Floats, nu: Floats, duration: float) -> _End | None:
             return None
         state, before = state + response.rho, correction
         if correction < _CONVERGED:
-            return _End(state, nu, plane, response) if response.regular else None
+            return End(state, nu, plane, response) if response.regular else None
     return None
 
 
@@ -150,7 +152,7 @@ def _starts(nu: Floats, values: Floats) -> list[int]:
     return chosen
 
 
-def _climb(pair: Pair, pursuer: _End, evader: _End, duration: float) -> Node | None:
+def _climb(pair: Pair, pursuer: End, evader: End, duration: float) -> Node | None:
     """Climb h_E - h_P, whose gradient is r_E - r_P, and finish with Newton's method."""
     stride = 0.2
     for _ in range(_MOST_CLIMBING):

@@ -98,23 +98,21 @@ class Certificate:
     @property
     def failures(self) -> tuple[str, ...]:
         """Return a phrase for each check that failed."""
-        failures = []
-        if not self.residual < MOST_RESIDUAL:
-            failures.append(f"the residual is {self.residual:.1e}")
-        if not self.hamiltonian_drift < MOST_HAMILTONIAN_DRIFT:
-            failures.append(f"the Hamiltonian drifts by {self.hamiltonian_drift:.1e}")
-        if not self.integrator_gap_m < MOST_INTEGRATOR_GAP * self.unit_length_m:
-            failures.append(f"a second integrator ends {self.integrator_gap_m:.3g} m away")
-        if not self.closing_speed_m_s > 0.0:
-            failures.append("the closing speed is not positive")
-        if not self.least_curvature > 0.0:
-            failures.append("a curvature is not positive")
-        if not self.no_conjugate_point:
-            failures.append("an extremal has a conjugate point")
-        if not self.no_earlier_capture:
-            failures.append("earlier captures are not excluded")
-        if not self.above_the_planet:
-            failures.append("a path goes through the planet")
+        gap_m = self.integrator_gap_m
+        checks = (
+            (self.residual < MOST_RESIDUAL, f"the residual is {self.residual:.1e}"),
+            (
+                self.hamiltonian_drift < MOST_HAMILTONIAN_DRIFT,
+                f"the Hamiltonian drifts by {self.hamiltonian_drift:.1e}",
+            ),
+            (gap_m < MOST_INTEGRATOR_GAP * self.unit_length_m, f"a second integrator ends {gap_m:.3g} m away"),
+            (self.closing_speed_m_s > 0.0, "the closing speed is not positive"),
+            (self.least_curvature > 0.0, "a curvature is not positive"),
+            (self.no_conjugate_point, "an extremal has a conjugate point"),
+            (self.no_earlier_capture, "earlier captures are not excluded"),
+            (self.above_the_planet, "a path goes through the planet"),
+        )
+        failures = [text for holds, text in checks if not holds]
         if self.pursuer_alone_s is None:
             failures.append("the pursuer's deviation could not be followed")
         elif self.pursuer_alone_s < self.capture_s - MOST_GAIN_S:

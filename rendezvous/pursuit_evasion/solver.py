@@ -12,16 +12,15 @@ import numpy as np
 from rendezvous._arrays import Floats
 from rendezvous.linear_game import LinearGameError, circular_orbit_capture
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
-from rendezvous.pursuit_evasion._pair import COARSE, Craft, Node, across
-from rendezvous.pursuit_evasion._scan import greater
+from rendezvous.pursuit_evasion._pair import Craft, Node
+from rendezvous.pursuit_evasion._scan import end_along, greater
 from rendezvous.pursuit_evasion.game import Game, Player, ScaledGame, Units, horizon_s, scaled_game, units_of
 from rendezvous.pursuit_evasion.paths import orbital_axes, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.steering import Policy
 
 _MOST_BRANCHES = 6
-_REACH_STEP, _MOST_REACH_STEPS, _REACHED = 0.1, 400, 1e-6
-_MOST_ITERATIONS = 8
+_REACH_STEP, _MOST_REACH_STEPS = 0.1, 400
 _THRUST_STEP, _LEAST_THRUST_STEP = 0.25, 1e-3
 _LONGEST = 40.0
 """Longest duration of the linear game, in radians."""
@@ -224,32 +223,19 @@ def _linear_guess(game: Game, scaled: ScaledGame) -> tuple[float, Floats] | None
 
 def _reached(craft: Craft, nu: Floats, duration: float) -> Floats | None:
     """Return the end state of a craft's extremal along nu, by continuation in the duration from zero."""
-    plane = across(nu)
     time = min(0.01, duration)
     state, step = craft.ballistic(time, nu), _REACH_STEP
     slope: Floats | None = None
     for _ in range(_MOST_REACH_STEPS):
         to = time if slope is None else min(duration, time + step)
         guess = state if slope is None else state + (to - time) * slope
-        end = _end_near(craft, guess, nu, plane, to)
+        end = end_along(craft, guess, nu, to)
         if end is None:
             if slope is None or step < 1e-4:
                 return None
             step *= 0.4
             continue
-        (state, slope), time, step = end, to, min(2.0 * step, _REACH_STEP)
+        state, slope, time, step = end.state, end.response.by_time, to, min(2.0 * step, _REACH_STEP)
         if time >= duration:
             return state
-    return None
-
-
-def _end_near(craft: Craft, state: Floats, nu: Floats, plane: Floats, duration: float) -> tuple[Floats, Floats] | None:
-    """Return the end state near a guess, and its slope in time."""
-    for _ in range(_MOST_ITERATIONS):
-        response = craft.respond(state, nu, plane, duration, COARSE)
-        if response is None or np.abs(response.rho).max() > 0.5:
-            return None
-        state = state + response.rho
-        if np.abs(response.rho).max() < _REACHED:
-            return state, response.by_time
     return None
