@@ -13,24 +13,18 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, separate_labels, style
-from experiments.interception.figures.distributions import axis_limit, draw_band, draw_radius, scale_axis
-from sim import band_half_width, estimate_quantiles
+from experiments.interception.figures.distributions import MOST_POINTS, Sample, axis_limit, beyond, draw_samples
+from infoset.arrays import Floats
+from sim import estimate_quantiles
 from sim.statistics import correlation_interval, level_name, shows
 
-Floats = NDArray[np.float64]
-
 CONVERGING = (0.5, 0.9, 0.99)
-MOST_POINTS = 2000
-"""Most points of a curve and of a cloud; more would only make the file larger."""
-
 RUNS_A_BIN = 100
 """Least mean number of runs in a bin of the median and the 90 % quantile over the initial state."""
 _CONFIDENCE = 0.95
 _LOOKS = 28
-_DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
 _BINS = 24
 _SMALL_KM_S = 0.01
 """Extent of a velocity below which its axis is in m/s."""
@@ -76,30 +70,22 @@ class CampaignColumns:
 
 
 def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
-    """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their confidence bands.
-
-    The guaranteed miss is dotted. There must be at least one noise.
-    """
-    with style():
-        figure = new_figure(height_mm=99.0)
-        (row,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 31.0, 7.0), gaps_mm=(7.0, 0.0))
-        _draw_miss(row[0], columns)
-        _draw_impulse(row[1], columns)
-        row[0].set_ylabel("distribution function (share of runs)")
-        row[1].tick_params(labelleft=False)
-        handles, labels = _handles(columns)
-        radius = draw_radius(row[0], columns[0].radius_m)
-        for axes in row:
-            separate_labels(axes)
-        figure.legend(
-            [*handles, *radius],
-            [*labels, *(str(line.get_label()) for line in radius)],
-            loc="lower center",
-            ncols=2,
-            columnspacing=2.5,
-            handler_map={tuple: HandlerTuple(ndivide=None, pad=0.15)},
+    """Draw the distribution functions of the noises, at least one, with `draw_samples`."""
+    samples = []
+    for column in columns:
+        meter = "with" if column.range_meter else "no"
+        bound = "guaranteed miss" if column.guarantees else "the paper's $\\Phi$ (not a bound here)"
+        samples.append(
+            Sample(
+                f"{column.noise} noise, {meter} range meter, {column.miss_m.size} runs",
+                column.look,
+                column.miss_m,
+                column.impulse_m_s,
+                column.guaranteed_miss_m,
+                f"{column.noise} noise: {bound}",
+            )
         )
-    return figure
+    return draw_samples(samples, columns[0].radius_m)
 
 
 def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
@@ -154,7 +140,7 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
                 axes.tick_params(labelleft=axes is row[0])
                 axes.set_title(f"({next(letter)}) {column.noise} noise")
                 separate_labels(axes)
-            row[0].set_ylabel("\n".join(["miss, m", *filter(None, [_beyond("runs", [column.miss_m], 1.04 * limit)])]))
+            row[0].set_ylabel("\n".join(["miss, m", *filter(None, [beyond("runs", [column.miss_m], 1.04 * limit)])]))
         most = max(column.miss_m.size for column in columns)
         runs = f"runs (at most {MOST_POINTS} drawn)" if most > MOST_POINTS else "runs"
         handles = [Line2D([], [], linestyle="", marker=".", color=LIMIT, label=runs)]
@@ -204,51 +190,6 @@ def _ranks(values: Floats) -> Floats:
     _, indices, counts = np.unique(values, return_inverse=True, return_counts=True)
     first = np.cumsum(counts) - counts
     return np.asarray((first + 0.5 * (counts - 1))[indices], dtype=np.float64)
-
-
-def _draw_miss(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
-    """Draw the distributions of the misses, and with dotted lines those of the guaranteed misses."""
-    samples = [column.miss_m for column in columns]
-    guaranteed = [column.guaranteed_miss_m for column in columns]
-    ends = scale_axis(axes, [*samples, *(sample for sample in guaranteed if sample.size)], from_zero=True)
-    for column in columns:
-        _distribution(axes, column.miss_m, ends, column.look, band=True)
-        if column.guaranteed_miss_m.size:
-            _distribution(axes, column.guaranteed_miss_m, ends, column.look | _DOTTED, band=False)
-    notes = [_beyond("runs", samples, ends[1]), _beyond("dotted", guaranteed, ends[1])]
-    axes.set_title("(a) miss")
-    axes.set_xlabel("\n".join(["miss, m", *filter(None, notes)]))
-
-
-def _draw_impulse(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
-    samples = [column.impulse_m_s for column in columns]
-    ends = scale_axis(axes, samples, from_zero=False)
-    for column in columns:
-        _distribution(axes, column.impulse_m_s, ends, column.look, band=True)
-    axes.set_title("(b) impulse spent")
-    axes.set_xlabel("\n".join(["impulse spent, m/s", *filter(None, [_beyond("runs", samples, ends[1])])]))
-
-
-def _beyond(name: str, samples: Sequence[Floats], right: float) -> str:
-    """Return a note with the number of values beyond the axis, or an empty text without such values."""
-    counts = [f"{int((sample > right).sum())} of {sample.size}" for sample in samples if (sample > right).any()]
-    return f"{name} beyond the axis: {', '.join(counts)}" if counts else ""
-
-
-def _distribution(
-    axes: Axes, sample: Floats, ends: tuple[float, float], look: Mapping[str, Any], *, band: bool
-) -> None:
-    values = np.sort(sample)
-    share = np.arange(1, values.size + 1) / values.size
-    if values.size > MOST_POINTS:
-        kept = np.unique(np.linspace(0, values.size - 1, MOST_POINTS).astype(np.int64))
-        values, share = values[kept], share[kept]
-    if band:
-        half = band_half_width(sample.size, _CONFIDENCE)
-        lower, upper = np.clip(share - half, 0.0, 1.0), np.clip(share + half, 0.0, 1.0)
-        draw_band(axes, values, lower, upper, look["color"])
-    values = np.concatenate([[min(ends[0], float(values[0]))], values, [max(ends[1], float(values[-1]))]])
-    axes.plot(values, np.concatenate([[0.0], share, [1.0]]), drawstyle="steps-post", zorder=3.0, **look)
 
 
 def _convergence_legend(figure: Figure, drawn: set[float], banded: set[float]) -> None:
@@ -337,23 +278,3 @@ def _cloud(axes: Axes, start: Floats, miss: Floats, colour: str) -> bool:
 
 def _line(index: int) -> Any:
     return ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))[index]
-
-
-def _guarantee_name(columns: Sequence[CampaignColumns]) -> str:
-    return "guaranteed miss" if columns[0].guarantees else "the paper's $\\Phi$ (not a bound here)"
-
-
-def _handles(columns: Sequence[CampaignColumns]) -> tuple[list[Any], list[str]]:
-    """Return the handles and labels of the legend: each noise, its guarantee dotted, and the band in all colours."""
-    handles: list[Any] = []
-    labels = []
-    for column in columns:
-        meter = "with" if column.range_meter else "no"
-        handles.append(Line2D([], [], **column.look))
-        labels.append(f"{column.noise} noise, {meter} range meter, {column.miss_m.size} runs")
-        if column.guaranteed_miss_m.size:
-            handles.append(Line2D([], [], **(column.look | _DOTTED)))
-            labels.append(f"{column.noise} noise: {_guarantee_name(columns)}")
-    handles.append(tuple(Line2D([], [], color=column.look["color"], linewidth=0.7) for column in columns))
-    labels.append("thin lines: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
-    return handles, labels

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 from experiments.common.output import hit_key, library_version
@@ -17,12 +16,11 @@ from experiments.common.screen import number, number_table, quantile_notes
 from experiments.interception.runs.shared import bound_name
 from experiments.interception.study import SetCounts, game_note, hit_text, set_counts, set_warnings
 from guidance import NoiseKind
+from infoset.arrays import Flags, Integers
 from sim import HitEstimate, Outcome, QuantileEstimate, Scenario, estimate_hits, estimate_quantiles
 from sim.statistics import level_name, shows
 from sim.stopping_rule import QUANTITIES
 from sim.storage import CampaignFolder, Manifest, scenario_hash
-
-Floats = NDArray[np.float64]
 
 LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
 START = ("y_km", "z_km", "x_km", "vy_km_s", "vz_km_s", "vx_km_s")
@@ -74,7 +72,7 @@ def noises_of(folder: CampaignFolder) -> list[str]:
     return [kind.value for kind in folder.manifest.noise.kinds]
 
 
-def noise_flags(folder: CampaignFolder) -> dict[str, NDArray[np.bool_] | slice]:
+def noise_flags(folder: CampaignFolder) -> dict[str, Flags | slice]:
     """Return the rows of each noise as flags, or as a slice if there is one noise."""
     noises = noises_of(folder)
     if len(noises) == 1:
@@ -145,7 +143,7 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
 class _Counts:
     """Counts over the rows of a noise."""
 
-    outcomes: NDArray[np.int64] = field(default_factory=lambda: np.zeros(len(OUTCOMES), dtype=np.int64))
+    outcomes: Integers = field(default_factory=lambda: np.zeros(len(OUTCOMES), dtype=np.int64))
     sets: SetCounts = field(default_factory=SetCounts)
     hits: int = 0
     sized: int = 0

@@ -19,7 +19,6 @@ from matplotlib.markers import CARETUPBASE
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
-from numpy.typing import NDArray
 
 from experiments.campaigns.axis_names import key_label, unit_of
 from experiments.campaigns.sweep_table import (
@@ -43,12 +42,12 @@ from experiments.common.figure_style import (
     style,
     width_mm,
 )
+from infoset.arrays import Floats
 from sim import QuantileName, Requirement
 from sim.requirement import AnyRequirement, Decision
 from sim.statistics import level_name, number_text
 from sim.storage import Axis
 
-Floats = NDArray[np.float64]
 Grid = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 
 MOST_NUMBERS = 120

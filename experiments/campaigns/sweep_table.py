@@ -10,7 +10,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.campaigns.axis_names import tied_keys, unit_of
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples, shown_value
@@ -22,8 +21,6 @@ from sim.requirement import AnyRequirement, Decision, Verdict, judge
 from sim.statistics import level_name
 from sim.stopping_rule import QUANTITIES
 from sim.storage import Axis, CampaignFolder
-
-Floats = NDArray[np.float64]
 
 TABLE = "sweep.parquet"
 SHOWN = tuple(QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99))

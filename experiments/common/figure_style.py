@@ -16,9 +16,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FixedLocator
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 WIDTH_MM = 180.0
 PNG_DPI = 200

@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from experiments.common.display_units import Unit, time_unit
 from experiments.common.page_document import page
-
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 _SPEEDS = (5, 30, 60, 120)
 _FLAT = np.cos(np.radians(4.0))

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.interception.study import QUANTILES
 from guidance import NoiseKind, Strategy, TieRule
+from infoset.arrays import Flags, Floats
 from sim import HitEstimate, Results, Scenario, estimate_hits
 from sim.statistics import shown_quantiles
 
-Floats = NDArray[np.float64]
 Flight = tuple[str, TieRule | None]
 
 
@@ -42,12 +41,12 @@ class Comparison:
         return np.asarray(np.max([each.impulse_m_s for each in self.results.values()], axis=0), dtype=np.float64)
 
     @property
-    def truth_kept(self) -> NDArray[np.bool_]:
+    def truth_kept(self) -> Flags:
         """Whether the true state stayed in its section with every tie rule, shape (N,)."""
         return np.asarray(np.all([each.truth_kept for each in self.results.values()], axis=0), dtype=np.bool_)
 
     @property
-    def set_emptied(self) -> NDArray[np.bool_]:
+    def set_emptied(self) -> Flags:
         """Whether the set became empty with a tie rule, shape (N,)."""
         return np.asarray(np.any([each.set_emptied for each in self.results.values()], axis=0), dtype=np.bool_)
 

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from guidance.thruster import modulus
+from infoset.arrays import Floats, Integers
 from sim import Record, Scenario
 from sim.engagement import Step
-
-Floats = NDArray[np.float64]
 
 MOST_STEPS = 400
 """Number of steps above which a flight is long: its time axis is logarithmic in the time before the arrival."""
@@ -73,7 +72,7 @@ def least_to_go_s(scenario: Scenario) -> float:
     return 0.5 * scenario.set_model.step_s
 
 
-def evenly(places: NDArray[Any], count: int) -> NDArray[np.int64]:
+def evenly(places: NDArray[Any], count: int) -> Integers:
     """Return at most `count` indices of rising values, evenly distributed over them, with the first and the last."""
     wanted = np.linspace(places[0], places[-1], count)
     return np.unique(np.abs(places - wanted[:, None]).argmin(axis=1))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
@@ -22,11 +22,10 @@ from experiments.interception.course import (
 )
 from experiments.interception.record_titles import angle_name, outcome_title, record_titles
 from infoset import Convention, InformationSet, Section
+from infoset.arrays import Floats, Integers
 from infoset.sensors import SENSORS
 from sim import Record, Scenario, StepRecord
 from sim.gravity import on_board_model
-
-Floats = NDArray[np.float64]
 
 MOST_RECORDS = 2
 TOLERANCE = 5e-4
@@ -291,7 +290,7 @@ def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[
     }
 
 
-def _simplified(points: Floats, counts: NDArray[np.int64], tolerance: float) -> tuple[Floats, NDArray[np.int64]]:
+def _simplified(points: Floats, counts: Integers, tolerance: float) -> tuple[Floats, Integers]:
     """Return outlines without the vertices near the line through their neighbours, and their numbers of vertices.
 
     Every second vertex is looked at in each pass, so that neighbours are not removed at once.

@@ -30,6 +30,7 @@ from experiments.common.file_kinds import ZIP, read_input, use_of_file
 from experiments.common.output import library_version, write_file
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from infoset import ConvexPolygons, Section
+from infoset.arrays import Floats, Integers
 from infoset.limits import LARGEST, SMALLEST
 from infoset.sensors import SENSORS
 from sim import AxisStep, Inconsistency, Record, Results, Scenario, StepRecord
@@ -43,7 +44,6 @@ LARGEST_HEADER_BYTES = 1_000_000
 LONGEST_NAME, LONGEST_REASON = 200, 1000
 REMEDY = "make a record with `infoset engage --record FILE.npz`"
 
-Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -249,7 +249,7 @@ def _optional(mask: str, name: str, values: Sequence[Any], unknown: Any = 0.0) -
     return {mask: known, name: np.array([value or unknown for value in values], dtype=np.float64)}
 
 
-def _offsets(counts: list[int]) -> NDArray[np.int64]:
+def _offsets(counts: list[int]) -> Integers:
     return np.cumsum([0, *counts], dtype=np.int64)
 
 

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from infoset import Model
+from infoset.arrays import Flags
 from sim import HitEstimate, Scenario
 
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 """Levels of the quantiles in tables and JSON, by name."""
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

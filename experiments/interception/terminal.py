@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.columns import Columns
 from rich.console import Console, Group
 from rich.live import Live
@@ -16,9 +15,8 @@ from rich.text import Text
 
 from experiments.interception.course import kept_steps
 from experiments.interception.record_titles import outcome_title, record_titles
+from infoset.arrays import Floats
 from sim import Record, StepRecord
-
-Floats = NDArray[np.float64]
 
 MOMENTS_IN_PRINT = 5
 ROWS = 14

@@ -11,7 +11,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from experiments.common.errors import InputError
@@ -21,9 +20,8 @@ from experiments.interception.figures.approach import count_down
 from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
 from experiments.interception.figures.sets import Plane, angle_unit, draw_plane, level_planes, planes_at
 from experiments.interception.record_titles import angle_name, record_titles
+from infoset.arrays import Floats
 from sim import Record
-
-Floats = NDArray[np.float64]
 
 GIF, MP4 = ".gif", ".mp4"
 DURATION_S = 8.0

@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import (
     IMPULSE,
@@ -40,8 +39,6 @@ from experiments.interception.figures.b_plane import GUARANTEE_LOOK, RADIUS_SHOW
 from experiments.interception.figures.distributions import RADIUS_LOOK
 from experiments.interception.record_titles import outcome_title, record_titles
 from sim import Record, Scenario
-
-Floats = NDArray[np.float64]
 
 MOST_VECTORS = 2000
 """Number of points above which they are pixels in the PDF file."""

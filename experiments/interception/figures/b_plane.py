@@ -14,16 +14,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Ellipse, Patch
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import INK, SET_EDGE, TRUTH, WIDTH_MM, new_figure, place_axes, plain, style
 from experiments.common.screen import number
 from experiments.interception.figures.distributions import RADIUS_LOOK, axis_limit
 from guidance import NoiseKind
+from infoset.arrays import Floats
 from sim import Results
 from sim.statistics import shows
-
-Floats = NDArray[np.float64]
 
 B_PLANE = {noise: f"figure-b-plane-{noise.value}" for noise in NoiseKind}
 """Name of the figure of each noise."""

@@ -8,13 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import INK, LIMIT, SET_EDGE, SET_FILL, new_figure, place_axes, style
+from infoset.arrays import Floats
 from sim import Scenario
 from sim.bound import LowerBound
-
-Floats = NDArray[np.float64]
 
 _HEIGHT_MM = 66.0
 _LOOKS: tuple[dict[str, Any], ...] = (

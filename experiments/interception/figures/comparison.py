@@ -10,15 +10,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import INK, SET_EDGE, SET_FILL, new_figure, place_axes, style
 from experiments.interception.comparison import Comparison
 from experiments.interception.figures.distributions import draw_radius
 from guidance import NoiseKind
+from infoset.arrays import Floats
 from sim.statistics import shows
-
-Floats = NDArray[np.float64]
 
 _ROW_MM = 9.0
 _LETTER_MM = 1.4

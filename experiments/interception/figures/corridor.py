@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import IMPULSE, SET_EDGE, SET_FILL, TRUTH, new_figure, place_axes, style
 from experiments.interception.course import Courses, marks
@@ -20,8 +19,6 @@ from experiments.interception.figures.approach import MARK_LOOK, count_down, nam
 from experiments.interception.figures.b_plane import GUARANTEE_LOOK
 from experiments.interception.figures.distributions import RADIUS_LOOK
 from sim.statistics import shows
-
-Floats = NDArray[np.float64]
 
 _POSSIBLE_MM, _IMPULSES_MM, _GAP_MM, _BETWEEN_MM = 46.0, 19.0, 3.0, 21.0
 _DECADES = 4.0

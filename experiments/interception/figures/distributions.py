@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -11,21 +13,23 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
-from numpy.typing import NDArray
 
-from experiments.common.figure_style import CURVE_LOOKS, INK, new_figure, place_axes, style, width_mm
+from experiments.common.figure_style import CURVE_LOOKS, INK, figure_grid, separate_labels, style, width_mm
 from experiments.interception.curves import Curve
+from infoset.arrays import Floats
 from sim import empirical_distribution
 
-Floats = NDArray[np.float64]
-
-_HEIGHT_MM, _NUMBER_MM = 59.0, 5.0
+_HEIGHT_MM, _NUMBER_MM = 60.0, 5.0
 """Height of the axes, and diameter of a curve number, mm."""
 
 _LEVELS = np.linspace(0.15, 0.85, 29)
 _INSIDE = 0.05, 0.95
 """Horizontal range of curve numbers, as shares of the axes."""
 
+MOST_POINTS = 2000
+"""Most points of a curve; more would only make the file larger."""
+_NUMBER_BOX = {"boxstyle": "circle,pad=0.18", "facecolor": "white", "linewidth": 0.8}
+_DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
 RADIUS_LOOK: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
 """Line of the radius of the body."""
 
@@ -34,45 +38,85 @@ _LEAST_SHOWN = 0.01
 """Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
 
 
-def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95, radius_m: float | None = None) -> Figure:
-    """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their confidence bands.
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Runs that are drawn as one curve.
+
+    Parameters
+    ----------
+    name : str
+        Entry in the legend.
+    look : dict
+        Style of the line.
+    miss_m, impulse_m_s : ndarray, shape (n,)
+        Miss and impulse spent of each run.
+    guaranteed_miss_m : ndarray, shape (m,)
+        Known values of the guaranteed miss, drawn with a dotted line.
+    guaranteed_name : str
+        Entry in the legend of the dotted line.
+    number : int
+        Number that is written on the curve; 0 for none.
+    """
+
+    name: str
+    look: dict[str, Any]
+    miss_m: Floats
+    impulse_m_s: Floats
+    guaranteed_miss_m: Floats = field(default_factory=lambda: np.zeros(0))
+    guaranteed_name: str = ""
+    number: int = 0
+
+
+def draw_distributions(curves: Sequence[Curve], radius_m: float | None = None) -> Figure:
+    """Draw the distribution functions of the curves of the experiment with `draw_samples`, each with its number."""
+    return draw_samples([_sample(curve) for curve in curves], radius_m)
+
+
+def _sample(curve: Curve) -> Sample:
+    meter = "with" if curve.range_meter else "no"
+    name = f"{curve.number}  {curve.noise.value} noise, {meter} range meter, {len(curve.results)} runs"
+    results = curve.results
+    return Sample(name, CURVE_LOOKS[curve.number], results.miss_m, results.impulse_m_s, number=curve.number)
+
+
+@style()
+def draw_samples(samples: Sequence[Sample], radius_m: float | None = None) -> Figure:
+    """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their 95 % confidence bands.
 
     Where a few values are far beyond the others, the axis ends before them and says how many; where the curves lie
     decades apart, the axis of the miss is logarithmic.
 
     Parameters
     ----------
-    confidence : float
-        Of the Dvoretzky-Kiefer-Wolfowitz bands, in (0, 1).
+    samples : sequence of Sample
+        At least one.
     radius_m : float or None
         Radius of the body, m, which is a line in (a); None draws none.
     """
-    if not curves:
+    if not samples:
         raise ValueError("at least one curve is needed")
-    with style():
-        figure = new_figure(height_mm=36.0 + _HEIGHT_MM)
-        (row,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 29.0, 7.0), gaps_mm=(7.0, 0.0))
-        notes = (
-            _draw_panel(row[0], curves, lambda curve: curve.results.miss_m, confidence, from_zero=True),
-            _draw_panel(row[1], curves, lambda curve: curve.results.impulse_m_s, confidence, from_zero=False),
-        )
-        labels = ("miss, m", "impulse spent, m/s")
-        for axes, title, label, note in zip(row, ("(a) miss", "(b) impulse spent"), labels, notes, strict=True):
-            axes.set_title(title)
-            axes.set_xlabel(f"{label}\n{note}" if note else label)
-            axes.set_ylabel("distribution function (share of runs)")
-        row[1].yaxis.label.set_visible(False)
-        row[1].tick_params(labelleft=False)
-        handles, names = _handles(curves, confidence)
-        radius = draw_radius(row[0], radius_m)
-        figure.legend(
-            [*handles, *radius],
-            [*names, *(str(line.get_label()) for line in radius)],
-            loc="lower center",
-            ncols=2,
-            columnspacing=2.5,
-            handler_map={tuple: HandlerTuple(ndivide=None, pad=0.15)},
-        )
+    figure, (left, right) = figure_grid(_HEIGHT_MM + 38.0, 1, 2, (14.0, 4.0, 31.0, 7.0), (7.0, 0.0))
+    _draw_panel(left, samples, [sample.miss_m for sample in samples], [sample.guaranteed_miss_m for sample in samples])
+    _draw_panel(right, samples, [sample.impulse_m_s for sample in samples])
+    right.yaxis.label.set_visible(False)
+    right.tick_params(labelleft=False)
+    handles: list[Any] = []
+    labels = []
+    for sample in samples:
+        handles.append(Line2D([], [], **sample.look))
+        labels.append(sample.name)
+        if sample.guaranteed_miss_m.size:
+            handles.append(Line2D([], [], **sample.look | _DOTTED))
+            labels.append(sample.guaranteed_name)
+    handles.append(tuple(Line2D([], [], color=sample.look["color"], linewidth=0.7) for sample in samples))
+    labels.append("thin lines: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
+    for line in draw_radius(left, radius_m):
+        handles.append(line)
+        labels.append(str(line.get_label()))
+    for axes in (left, right):
+        separate_labels(axes)
+    spread = {tuple: HandlerTuple(ndivide=None, pad=0.15)}
+    figure.legend(handles, labels, loc="lower center", ncols=2, columnspacing=2.5, handler_map=spread)
     return figure
 
 
@@ -136,7 +180,7 @@ def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tup
     return left, right
 
 
-def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: str, label: str = "") -> None:
+def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: str, label: str = "_band") -> None:
     """Draw the two thin edges of a confidence band, between its samples and away from 0 and 1.
 
     Parameters
@@ -153,37 +197,58 @@ def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: 
             linewidth=0.5,
             alpha=0.75,
             zorder=2.0,
-            label=label or "_band",
+            label=label,
         )
 
 
 def _draw_panel(
-    axes: Axes, curves: Sequence[Curve], value: Callable[[Curve], Floats], confidence: float, *, from_zero: bool
-) -> str:
-    """Draw one distribution, and return a note about the values beyond the axis."""
-    samples = [np.asarray(value(curve), dtype=np.float64) for curve in curves]
-    left, right = scale_axis(axes, samples, from_zero=from_zero)
-    for curve, sample in zip(curves, samples, strict=True):
-        _draw_curve(axes, curve, sample, confidence, (left, right))
-    _number(axes, curves, samples)
-    beyond = [
-        (curve.number, int((sample > right).sum()), len(sample)) for curve, sample in zip(curves, samples, strict=True)
+    axes: Axes, samples: Sequence[Sample], known: Sequence[Floats], guaranteed: Sequence[Floats] = ()
+) -> None:
+    """Draw the distributions of the misses, with the guaranteed ones, or of the impulses."""
+    title, label = ("(a) miss", "miss, m") if guaranteed else ("(b) impulse spent", "impulse spent, m/s")
+    everything = [*known, *(values for values in guaranteed if values.size)]
+    ends = scale_axis(axes, everything, from_zero=bool(guaranteed))
+    for sample, values in zip(samples, known, strict=True):
+        _draw_curve(axes, sample.look, values, ends, sample.number)
+    for sample, values in zip(samples, guaranteed, strict=False):
+        if values.size:
+            _draw_curve(axes, sample.look | _DOTTED, values, ends)
+    if samples[0].number:
+        _number(axes, samples, known)
+    notes = [
+        beyond("runs", known, ends[1], [sample.number for sample in samples]),
+        beyond("dotted", guaranteed, ends[1]),
     ]
-    lost = [f"{count} of {runs} of curve {number}" for number, count, runs in beyond if count]
-    return "runs beyond the axis: " + ", ".join(lost) if lost else ""
+    axes.set_title(title)
+    axes.set_xlabel("\n".join([label, *filter(None, notes)]))
+    axes.set_ylabel("distribution function (share of runs)")
 
 
-def _draw_curve(axes: Axes, curve: Curve, sample: Floats, confidence: float, ends: tuple[float, float]) -> None:
-    distribution = empirical_distribution(sample, confidence)
-    right = max(ends[1], float(distribution.values[-1]))
-    look = CURVE_LOOKS[curve.number]
-    draw_band(axes, distribution.values, distribution.lower, distribution.upper, look["color"], f"band {curve.number}")
-    values = np.concatenate([[min(ends[0], float(distribution.values[0]))], distribution.values, [right]])
-    probability = np.concatenate([[0.0], distribution.probability, [1.0]])
-    axes.plot(values, probability, drawstyle="steps-post", zorder=3.0, label=f"curve {curve.number}", **look)
+def beyond(name: str, samples: Sequence[Floats], right: float, numbers: Sequence[int] = ()) -> str:
+    """Return a note with the number of values beyond an axis, or an empty text without such values."""
+    counts = [
+        f"{int((sample > right).sum())} of {sample.size}{f' of curve {number}' if number else ''}"
+        for sample, number in zip_longest(samples, numbers)
+        if (sample > right).any()
+    ]
+    return f"{name} beyond the axis: {', '.join(counts)}" if counts else ""
 
 
-def _number(axes: Axes, curves: Sequence[Curve], samples: Sequence[Floats]) -> None:
+def _draw_curve(
+    axes: Axes, look: dict[str, Any], sample: Floats, ends: tuple[float, float], number: int | None = None
+) -> None:
+    """Draw a distribution function; without a number, no confidence band."""
+    every = empirical_distribution(sample)
+    kept = np.unique(np.linspace(0, sample.size - 1, min(sample.size, MOST_POINTS)).astype(np.int64))
+    values, share = every.values[kept], every.probability[kept]
+    if number is not None:
+        draw_band(axes, values, every.lower[kept], every.upper[kept], look["color"], f"band {number}")
+    values = np.concatenate([[min(ends[0], float(values[0]))], values, [max(ends[1], float(values[-1]))]])
+    label = f"curve {number}"
+    axes.plot(values, np.concatenate([[0.0], share, [1.0]]), drawstyle="steps-post", zorder=3.0, label=label, **look)
+
+
+def _number(axes: Axes, curves: Sequence[Sample], samples: Sequence[Floats]) -> None:
     """Put the number of each curve where it is farthest from the other curves and numbers."""
     logarithmic = axes.get_xscale() == "log"
     (low, high), across = axes.get_xlim(), np.log if logarithmic else np.asarray
@@ -217,11 +282,11 @@ def _number(axes: Axes, curves: Sequence[Curve], samples: Sequence[Floats]) -> N
             va="center",
             fontsize=8.0,
             fontweight="bold",
-            color=CURVE_LOOKS[curve.number]["color"],
+            color=curve.look["color"],
             bbox={
                 "boxstyle": "circle,pad=0.18",
                 "facecolor": "white",
-                "edgecolor": CURVE_LOOKS[curve.number]["color"],
+                "edgecolor": curve.look["color"],
                 "linewidth": 0.8,
             },
             zorder=5,
@@ -231,18 +296,3 @@ def _number(axes: Axes, curves: Sequence[Curve], samples: Sequence[Floats]) -> N
 def _gaps(points: Floats, others: Floats) -> Floats:
     """Return the distance of each point to the nearest of the others."""
     return np.asarray(np.hypot(*(points[:, None, :] - others[None, :, :]).transpose(2, 0, 1)).min(axis=1))
-
-
-def _handles(curves: Sequence[Curve], confidence: float) -> tuple[list[Any], list[str]]:
-    """Return handles and labels of the legend; the band has the colours of all curves."""
-    handles: list[Any] = [Line2D([], [], **CURVE_LOOKS[curve.number]) for curve in curves]
-    labels = [
-        f"{curve.number}  {curve.noise.value} noise, "
-        f"{'with' if curve.range_meter else 'no'} range meter, {len(curve.results)} runs"
-        for curve in curves
-    ]
-    middle = (len(handles) + 1) // 2
-    colours = [CURVE_LOOKS[curve.number]["color"] for curve in curves]
-    handles.insert(middle, tuple(Line2D([], [], color=colour, linewidth=0.7) for colour in colours))
-    labels.insert(middle, f"thin lines: {100.0 * confidence:g} % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
-    return handles, labels

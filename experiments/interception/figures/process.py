@@ -14,7 +14,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import (
     IMPULSE,
@@ -34,9 +33,8 @@ from experiments.common.figure_style import (
 from experiments.interception.course import Clock, duration_text, marks, true_predicted_misses
 from experiments.interception.figures.approach import MARK_LOOK, MOST_VECTORS, count_down
 from experiments.interception.record_titles import angle_name, outcome_title, record_titles
+from infoset.arrays import Floats, Integers
 from sim import Record
-
-Floats = NDArray[np.float64]
 
 ANGLE_RANGE_SHARE = 0.01
 RATE_RANGE_SHARE = 0.1
@@ -160,7 +158,7 @@ def _draw_sight(
     axes.plot(times, true * scale, color=TRUTH, marker=_marker(record), markersize=3.0)
 
 
-def _angle_errors(trace: Trace) -> tuple[NDArray[np.int64], Floats, Floats]:
+def _angle_errors(trace: Trace) -> tuple[Integers, Floats, Floats]:
     """Return the steps with a measured angle, and the error of each and its bound, µrad."""
     record, axis = trace
     steps = [index for index, step in enumerate(record.steps) if "angle" in step.axes[axis].measured]

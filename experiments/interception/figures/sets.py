@@ -15,15 +15,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import FuncFormatter, MaxNLocator
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import INK, MEASURED, WIDTH_MM, new_figure, place_axes, plain, style, width_mm
 from experiments.interception.course import Clock
 from experiments.interception.record_titles import angle_name, record_titles
 from infoset import Section
+from infoset.arrays import Floats
 from sim import AxisStep, Record, StepRecord
 
-Floats = NDArray[np.float64]
 Colour = tuple[float, float, float]
 
 TRUTH_MARK = "true (ω, α)"

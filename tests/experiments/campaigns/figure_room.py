@@ -17,7 +17,7 @@ def need_room(figure: Figure) -> None:
             ticks = [tick for tick in one.get_major_ticks() if low <= tick.get_loc() <= high]
             labels = [label for tick in ticks for label in (tick.label1, tick.label2)]
             shown = [label for label in labels if label.get_visible() and label.get_text()]
-            assert len(shown) >= 2 or not one.get_label_text(), one.get_label_text()
+            assert len(shown) >= 2 or not (one.label.get_visible() and one.get_label_text()), one.get_label_text()
             texts += shown
         texts += [text for text in (axes.title, axes.xaxis.label, axes.yaxis.label) if text.get_text()]
     boxes = [(text.get_text(), text.get_window_extent()) for text in texts]

@@ -219,10 +219,10 @@ def test_degenerate_section_of_a_single_step_is_visible(
 
 
 def test_distributions_draw_the_band_of_the_half_width(curves: list[Curve]) -> None:
-    figure = draw_distributions(curves, confidence=0.9)
+    figure = draw_distributions(curves)
     assert len(figure.axes) == 2
     assert_units(figure)
-    half = band_half_width(RUNS, 0.9)
+    half = band_half_width(RUNS, 0.95)
     for axes, name in zip(figure.axes, ("miss_m", "impulse_m_s"), strict=True):
         for curve in curves:
             sample = np.sort(getattr(curve.results, name))
@@ -239,7 +239,7 @@ def test_distributions_draw_the_band_of_the_half_width(curves: list[Curve]) -> N
                 np.testing.assert_array_equal(free, (expected > 0.0) & (expected < 1.0))
         assert {text.get_text() for text in axes.texts} == {"1", "2", "3", "4"}
     (legend,) = figure.legends
-    assert "90 % confidence band" in " ".join(text.get_text() for text in legend.get_texts())
+    assert "95 % confidence band" in " ".join(text.get_text() for text in legend.get_texts())
 
 
 def test_the_radius_of_the_body_is_a_line_with_a_label(curves: list[Curve]) -> None:
