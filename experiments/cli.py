@@ -147,17 +147,9 @@ def commands() -> Any:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command `infoset`, and exit with its code.
+    """Run the command `infoset`, and exit with its code; None takes the arguments from the process.
 
-    Parameters
-    ----------
-    arguments : sequence of str or None
-        What follows the name of the command; None takes them from the process.
-
-    Raises
-    ------
-    SystemExit
-        Always: 0 done, 1 a published number disagrees, 2 wrong input, 130 interrupted.
+    It always raises `SystemExit`: 0 done, 1 a published number disagrees, 2 wrong input, 130 interrupted.
     """
     try:
         commands()(args=None if arguments is None else list(arguments), prog_name="infoset")

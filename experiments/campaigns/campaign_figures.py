@@ -42,16 +42,8 @@ _START_LABELS = {
 class CampaignColumns:
     """The columns of the rows of one noise.
 
-    Parameters
-    ----------
-    miss_m, impulse_m_s : ndarray, shape (n,)
-        Miss and impulse spent, in the order of the runs.
-    guaranteed_miss_m : ndarray, shape (m,)
-        Known values of the guaranteed miss.
-    start : mapping of str to ndarray, shape (n,)
-        Components of the initial state, by column: of position, then of velocity.
-    radius_m : float or None
-        Radius of the body, m; None if it has no size.
+    `start` has the components of the initial state by column: of position, then of velocity. `guaranteed_miss_m` has
+    the known values, so it may be shorter than the other columns.
     """
 
     noise: str
@@ -91,8 +83,7 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
 def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
     """Draw quantiles of the miss and the impulse of the first n runs over n, with their confidence intervals.
 
-    A quantile is drawn from the number of runs on that shows it (`sim.statistics.shows`). Each noise has a row; there
-    must be at least one.
+    A quantile is drawn from the number of runs on that shows it (`sim.statistics.shows`). Each noise has a row.
     """
     with style():
         figure = new_figure(height_mm=58.0 * len(columns) + 14.0 * len(columns) + 10.0)
@@ -116,7 +107,7 @@ def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
 def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
     """Draw the miss over each component of the initial state: the runs, their median and their 90 % quantile.
 
-    Each noise has a row, in space one of positions and one of velocities; there must be at least one noise.
+    Each noise has a row, in space one of positions and one of velocities.
     """
     names = [*columns[0].start]
     lines = [names] if len(names) == 4 else [names[:3], names[3:]]

@@ -38,11 +38,8 @@ class Cluster:
 def connected(address: str) -> Iterator[Cluster]:
     """Connect to the Dask scheduler at an address such as tcp://host:8786.
 
-    Raises
-    ------
-    InputError
-        If Dask is not installed, the scheduler does not answer in time or has no workers, or a worker has other
-        versions of the packages.
+    Raise `InputError` if Dask is not installed, the scheduler does not answer in time or has no workers, or a worker
+    has other versions of the packages.
     """
     parts = _ADDRESS.fullmatch(address)
     if parts is None or not 0 < int(parts["port"]) < 65536:

@@ -44,10 +44,7 @@ _WARM_UP = 8
 
 
 def scenario_of(options: Flight) -> tuple[Scenario, list[str]]:
-    """Return the scenario that the options describe, with the campaign's noise, and lines about it for the screen.
-
-    A resumed folder keeps its model.
-    """
+    """Return the scenario that the options describe, with the campaign's noise, and lines about it for the screen."""
     resumed = None
     if options.resume and (options.out / MANIFEST).is_file():
         resumed = read_manifest(options.out).scenario.set_model.kind
@@ -65,13 +62,7 @@ class Flown:
 
 
 def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
-    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr.
-
-    Parameters
-    ----------
-    notes : sequence of str
-        Lines that are printed first.
-    """
+    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr."""
     need_free(options.out, resume=options.resume)
     note = partial(say, quiet=options.quiet)
     files = {SCENARIO_FILE: scenario_to_toml(campaign.scenario)}
@@ -128,14 +119,8 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
 class _Workers:
     """Workers that simulate engagements.
 
-    Parameters
-    ----------
-    executor : Executor or None
-        Executor of the chunks; None uses threads of this process.
-    count : int or None
-        Number of threads, or of chunks that the executor gets at a time.
-    cores : int
-        Number of engagements that are simulated at the same time.
+    Threads of this process are no executor; `count` is then their number, otherwise the number of chunks that the
+    executor gets at a time. `cores` engagements are simulated at the same time.
     """
 
     executor: Executor | None
@@ -166,10 +151,7 @@ def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]
 
 
 def _estimate(campaign: Campaign, cores: int) -> str:
-    """Return a line with the time and the disk space of a campaign, measured on a few of its engagements.
-
-    `InputError` if the disk has too little space.
-    """
+    """Return a line with the time and the disk space of a campaign, measured on a few of its engagements."""
     manifest, folder = campaign.manifest(), Path(campaign.folder)
     chunk = campaign.chunk_at(manifest.chunks // 2, manifest)
     pilot = range(min(ENGAGEMENTS_AT_ONCE, campaign.runs))

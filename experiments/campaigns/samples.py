@@ -35,18 +35,12 @@ class Sample:
 
     Parameters
     ----------
-    noise : str
-        Name of the noise.
-    runs : int
-        Number of engagements.
     quantiles : mapping of str to sequence of QuantileEstimate
         Quantiles by quantity; without the guaranteed miss if it is not known in any run.
     worst : mapping of str to float
         Largest value of each quantity.
     outcomes : mapping of str to int
         Number of runs with each outcome.
-    sets : SetCounts
-        Runs by what happened to their sets.
     hits : HitEstimate or None
         Probability of a hit; None if the body has no size.
     phi_held, phi_known : int
@@ -82,18 +76,9 @@ def noise_flags(folder: CampaignFolder) -> dict[str, Flags | slice]:
 
 
 def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[float] = LEVELS) -> list[Sample]:
-    """Return a summary of the stored rows for each noise with rows.
+    """Return a summary of the stored rows, of one cell or of all, for each noise with rows.
 
     One quantity of one noise is in memory at a time, with 8 bytes per engagement, and a sorted copy of it.
-
-    Parameters
-    ----------
-    folder : CampaignFolder
-        A campaign or a sweep, finished or not.
-    cell : int or None
-        Number of a cell of the sweep; None uses all rows.
-    levels : sequence of float
-        Levels of the quantiles.
     """
     noises = noises_of(folder)
     counts = {noise: _Counts() for noise in noises}

@@ -39,19 +39,11 @@ _WHOLE = (("thruster", "delay_steps"),)
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
-    """Read the value of --vary.
+    """Read the value of --vary: `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas.
 
-    Parameters
-    ----------
-    text : str
-        `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas. Of a key that is a pair,
-        `table.key.least` or `table.key.greatest` is varied. `one.key=other.key=FROM:TO:COUNT` gives both keys the same
-        values. `sensor.scale` is a factor of all error bounds of a sensor.
-
-    Raises
-    ------
-    InputError
-        If the text has another form, or the scenario has no such key; the message suggests the most similar key.
+    Of a key that is a pair, `table.key.least` or `table.key.greatest` is varied. `one.key=other.key=FROM:TO:COUNT`
+    gives both keys the same values. `sensor.scale` is a factor of all error bounds of a sensor. Raise `InputError` if
+    the text has another form, or the scenario has no such key; the message suggests the most similar key.
     """
     known = _known_keys(scenario)
     pieces = [piece.strip() for piece in text.split(",")]
@@ -74,10 +66,7 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
 def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...]:
     """Return the scenario of each combination of the axes' values; the last axis varies fastest.
 
-    Raises
-    ------
-    InputError
-        If a cell is not a valid scenario; the message is that of a scenario file.
+    Raise `InputError`, with the message of a scenario file, if a cell is not a valid scenario.
     """
     known, scaled = _known_keys(scenario), _error_bounds(scenario)
     text = scenario_to_toml(scenario)

@@ -103,11 +103,7 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> 
 
     With one axis there is a panel for each quantity, with the quantiles as lines; with two axes there is a map of the
     decisions, and a heat map for each other quantile that the runs show. The panel of the requirement is the first.
-
-    Raises
-    ------
-    ValueError
-        If there are more axes, or no quantile.
+    Raise ValueError if there are more axes, or no quantile.
     """
     if len(table.axes) not in (1, 2) or not shown:
         raise ValueError("only a sweep with one or two axes can be drawn, with at least one quantile")
@@ -421,15 +417,10 @@ def _closed_form(table: SweepTable) -> Grid:
 
 
 def bound_lines(across: Axis, up: Axis, values: Grid, required: AnyRequirement, log_values: bool) -> list[Floats]:
-    """Return the lines on which interpolated values of a map equal the bound of the requirement.
+    """Return the lines on which interpolated values of a map, shape (columns, rows), equal the requirement's bound.
 
     The interpolation is linear on the scales of both axes, and with `log_values` that of the logarithms of the values,
     as in `sweep_table.limits`.
-
-    Parameters
-    ----------
-    values : masked array, shape (columns, rows)
-        Values of the cells.
     """
     x, y = (np.log(axis.values) if axis.scale == "log" else np.array(axis.values) for axis in (across, up))
     logarithmic = log_values and isinstance(required, Requirement)
@@ -464,13 +455,7 @@ def _map_panel(figure: Figure, axes: Axes, table: SweepTable, noise: str, quanti
 
 
 def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, is_dark: Any, heights: Floats) -> None:
-    """Write the values into the cells of a map, `_NO_VALUE` where they are not known, unless there are too many.
-
-    Parameters
-    ----------
-    heights : ndarray, shape (rows, columns)
-        Positions of the numbers on the vertical axis.
-    """
+    """Write the values into the cells of a map at heights of shape (rows, columns), unless there are too many cells."""
     if values.size > MOST_NUMBERS:
         return
     room_mm = width_mm(axes) / len(across.values)

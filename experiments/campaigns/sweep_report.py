@@ -45,15 +45,7 @@ def figure_names(noises: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class SweepReport:
-    """The stored runs of a sweep, their quantiles, and a requirement.
-
-    Parameters
-    ----------
-    table : SweepTable
-        The quantiles of its cells, and the decisions about the requirement.
-    shown : sequence of QuantileName
-        Quantiles that the figure shows.
-    """
+    """The stored runs of a sweep, the decisions about a requirement, and the quantiles that the figure shows."""
 
     folder: CampaignFolder
     table: SweepTable

@@ -33,12 +33,10 @@ _MOST_WHOLE = 1e9
 
 @dataclass(frozen=True)
 class SweepTable:
-    """Every cell of a sweep.
+    """Every cell of a sweep; the last of the axes varies fastest over the cells.
 
     Parameters
     ----------
-    axes : tuple of Axis
-        Keys that vary; the last varies fastest over the cells.
     cells : tuple of tuple of Sample
         Samples of each cell, one for each noise; empty for a cell without runs.
     verdicts : tuple of mapping of str to Verdict
@@ -186,13 +184,9 @@ def _of_cell(verdict: Verdict, noises: int) -> Verdict:
 class Limit:
     """The end of the values of an axis that meet a requirement.
 
-    Parameters
-    ----------
-    value : float or None
-        By interpolation between the estimates of two neighbouring cells, without a confidence; None if undecided cells
-        lie between them, or an estimate is not known or is on the other side of the bound than the decision.
-    lower, upper : float
-        Values of the two decided cells around the limit: one meets the requirement, the other does not.
+    It lies between the values `lower` and `upper` of two decided cells, one of which meets the requirement. `value` is
+    an interpolation between the estimates of two neighbouring cells, without a confidence. It is None if undecided
+    cells lie between them, or an estimate is not known or is on the other side of the bound than the decision.
     """
 
     value: float | None
@@ -203,14 +197,8 @@ class Limit:
 def limits(axis: Axis, verdicts: Sequence[Verdict | None], required: AnyRequirement) -> list[Limit]:
     """Return the limits along an axis, each between a cell that meets the requirement and one that does not.
 
-    Cells without runs are treated as undecided.
-
-    Parameters
-    ----------
-    axis : Axis
-        Axis whose scale is that of the interpolation.
-    verdicts : sequence of Verdict or None
-        Verdict for each value of the axis. The logarithms of the estimates are interpolated if `spans_decades`.
+    Cells without runs are treated as undecided. The interpolation has the scale of the axis; the logarithms of the
+    estimates are interpolated if `spans_decades`.
     """
     decided = [
         (index, verdict)
@@ -236,10 +224,7 @@ def limits(axis: Axis, verdicts: Sequence[Verdict | None], required: AnyRequirem
 
 
 def _agrees(verdict: Verdict, required: AnyRequirement) -> bool:
-    """Return whether the estimate is known and on the same side of the bound as the decision.
-
-    It can be on the other side if runs were added after the decision.
-    """
+    """Whether the estimate is known and on the same side of the bound as the decision; added runs can change it."""
     if verdict.value is None:
         return False
     is_below = isinstance(required, Requirement) == (verdict.decision is Decision.MET)
@@ -278,17 +263,7 @@ def interpolated_text(axis: Axis, limit: Limit) -> str:
 
 @dataclass(frozen=True)
 class Answer:
-    """Whether a requirement is met along the first axis, at fixed values of the others.
-
-    Parameters
-    ----------
-    at : str
-        Values of the other axes; empty if there are none.
-    met : str
-        Decisions along the axis and the limits, as text.
-    limits : sequence of Limit
-        The limits between decided cells.
-    """
+    """Whether a requirement is met along the first axis, at the values `at` of the others."""
 
     at: str
     met: str

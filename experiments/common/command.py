@@ -23,15 +23,9 @@ EXAMPLE = 50
 def command(options: type, module: str) -> Callable[..., None]:
     """Return the function that Typer registers for a command.
 
-    The module is imported when the command runs, so ``--help`` does not wait for it.
-
-    Parameters
-    ----------
-    options : dataclass
-        Its fields are the options and arguments, declared with ``Annotated[type, typer.Option(...)]``. Its docstring
-        is the help text.
-    module : str
-        Name of the module whose function ``run`` takes the options.
+    The fields of the dataclass `options`, declared with ``Annotated[type, typer.Option(...)]``, are the options and
+    arguments, and its docstring is the help text. The module, whose function ``run`` takes the options, is imported
+    when the command runs, so ``--help`` does not wait for it.
     """
     parameters = inspect.signature(options).parameters.values()
     hints = get_type_hints(options, include_extras=True)

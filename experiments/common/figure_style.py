@@ -111,12 +111,7 @@ def place_axes(
 ) -> list[list[Axes]]:
     """Return a grid of axes at fixed positions by row, the top one first, without the cost of an automatic layout.
 
-    Parameters
-    ----------
-    margins_mm : tuple of float
-        Left, right, bottom, top.
-    gaps_mm : tuple of float
-        Between columns and between rows.
+    Margins are left, right, bottom and top; gaps are between columns and between rows.
     """
     width, height = (float(size) * _MM_PER_INCH for size in figure.get_size_inches())
     left, right, bottom, top = margins_mm
@@ -196,19 +191,10 @@ def place_labels(
 ) -> None:
     """Write labels where they cover no other label, no mark and as little of the lines as possible.
 
-    The limits of the axes become fixed.
-
-    Parameters
-    ----------
-    labels : sequence of tuple
-        Text; the points at which it can stand, shape (k, 2), the better ones first; and points of lines that it should
-        not cover, shape (n, 2), each of which weighs 3 % of another label.
-    marks : ndarray, shape (m, 2)
-        Points that weigh as much as another label.
-    centred : bool
-        Whether a label stands preferably on its point, as on a contour, and not next to it.
-    look : dict
-        Further arguments of `matplotlib.axes.Axes.annotate`.
+    The limits of the axes become fixed. A label is its text; the points at which it can stand, shape (k, 2), the better
+    ones first; and points of lines that it should not cover, shape (n, 2), each of which weighs 3 % of another label. A
+    mark weighs as much as another label. A `centred` label stands preferably on its point, as on a contour. `look` are
+    arguments of `matplotlib.axes.Axes.annotate`.
     """
     figure: Any = axes.figure
     positions = ((0, 0, 0.0), *_POSITIONS) if centred else _POSITIONS
@@ -257,10 +243,7 @@ def width_mm(axes: Axes) -> float:
 
 
 def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
-    """Return a figure as a vector PDF and a PNG of 200 dpi, each with its file ending.
-
-    The same figure gives the same bytes.
-    """
+    """Return a figure as PDF and as PNG of 200 dpi, each with its file ending; the same figure gives the same bytes."""
     options: list[tuple[str, dict[str, Any]]] = [
         ("pdf", {"metadata": {"CreationDate": None}}),
         ("png", {"metadata": {"Software": None}, "dpi": PNG_DPI}),

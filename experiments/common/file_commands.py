@@ -16,16 +16,8 @@ FileName = Annotated[str, typer.Argument(help="A file, or a built-in name.")]
 def file_commands(noun: str, module: str, built_in: str, text: str, example: str) -> typer.Typer:
     """Return the commands that list, show and check the files of a kind.
 
-    Parameters
-    ----------
-    noun : str
-        Name of such a file.
-    module : str
-        Name of the module whose functions `list_files`, `show` and `check` run. It is imported when a command runs.
-    built_in : str
-        Built-in name of such a file, for an example.
-    text, example : str
-        Help text, and an example of a command.
+    The functions `list_files`, `show` and `check` of the module run them; it is imported when a command runs.
+    `built_in` is a built-in name and `example` a command, both for examples.
     """
     name = f"infoset {noun}s"
     app = typer.Typer(name=f"{noun}s", epilog=f"Example: infoset {example}")

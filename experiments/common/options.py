@@ -94,10 +94,7 @@ def read_number(
 ) -> Any:
     """Return the number in a text; raise `InputError`, with an example, if it is none or outside the limits.
 
-    Parameters
-    ----------
-    text : Any
-        The text of the command line; a value of `kind`, which is the default of the option, is returned unchanged.
+    A value of `kind`, which is the default of the option, is returned unchanged.
     """
     if not isinstance(text, str):
         return text

@@ -36,12 +36,7 @@ Cell = str | int | float | bool | None
 class Output:
     """The files of one command, listed when the command ends.
 
-    Parameters
-    ----------
-    folder : Path or None
-        The folder of ``--out``.
-    files : mapping of str to Path
-        Single files, by the option that names them; the path ``-`` is stdout.
+    Single files are named by the option that gives them; the path ``-`` is stdout.
     """
 
     def __init__(self, folder: Path | None, files: Mapping[str, Path], overwrite: bool) -> None:
@@ -110,23 +105,9 @@ def output(
 ) -> Iterator[Output]:
     """Check every file that a command will write before the work begins, and list them on stderr at the end.
 
-    Parameters
-    ----------
-    folder : Path or None
-        The folder to fill. It is created; if the work fails, it is removed again as long as it is empty.
-    names : sequence of str
-        Names of the files that will be written into the folder.
-    files : mapping of str to Path or None
-        Single files, by the option that names them. The path ``-`` is stdout, which only one may be.
-    overwrite : bool
-        Whether the folder may contain files, and files be replaced.
-    quiet : bool
-        Whether the list of written files is left out.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be written, or would replace an existing one.
+    A file of `names` is written into `folder`, which is created; if the work fails, it is removed again as long as it
+    is empty. `files` are single files by the option that names them; the path ``-`` is stdout, which only one may be.
+    Raise `InputError` if a file cannot be written, or would replace an existing one without `overwrite`.
     """
     single = {option: path for option, path in (files or {}).items() if path is not None}
     printed = [option for option, path in single.items() if str(path) == STDOUT]
@@ -190,10 +171,7 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
 
 
 def write_template(file: Path, content: str, next_steps: str, *, overwrite: bool, quiet: bool) -> None:
-    """Write a template and print what to do with it; the path ``-`` is stdout.
-
-    `InputError` as in `write_file`.
-    """
+    """Write a template and print what to do with it; the path ``-`` is stdout."""
     if str(file) == STDOUT:
         typer.echo(content, nl=False)
         return
@@ -218,17 +196,9 @@ def hit_key(hits: HitEstimate | None) -> dict[str, object]:
 
 
 def to_json(value: object) -> str:
-    """Return a value as indented JSON, keys in the order given.
+    """Return a value as indented JSON, keys in the order given; raise ValueError if a number is not finite.
 
-    Parameters
-    ----------
-    value : object
-        Dicts, lists, strings, finite numbers, booleans and None; arrays become lists, enumerations their values.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite: JSON has no NaN and no infinity.
+    Arrays become lists, enumerations their values, dataclasses dicts.
     """
     return json.dumps(value, indent=2, allow_nan=False, default=json_value) + "\n"
 
@@ -263,15 +233,8 @@ def trajectories_csv(
 ) -> str:
     """Return trajectories as CSV, one line for each craft and time.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the columns that identify a trajectory: ``craft``.
-    columns : sequence of str
-        Names of the columns of the arrays, with their units.
-    tracks : iterable of tuple
-        Values of the first columns of a trajectory, and an array of shape (times, columns) in which a value that does
-        not exist is NaN.
+    A track has the values of the columns `names`, which identify it, and an array of shape (times, columns) in which a
+    value that does not exist is NaN. `columns` are the headings of the arrays, with their units.
     """
     rows = [
         [*track, *(None if math.isnan(value) else value for value in row)]

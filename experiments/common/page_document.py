@@ -26,22 +26,11 @@ _ESCAPES = str.maketrans({"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u202
 
 
 def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_script: str | None = None) -> str:
-    """Return a page as HTML.
+    """Return a page as HTML; raise ValueError if a number is not finite.
 
-    Parameters
-    ----------
-    scripts : sequence of str
-        Names of scripts of the folder `assets`, after the common blocks.
-    data : mapping
-        What the scripts draw, as in `experiments.common.output.to_json`. The keys ``heading`` and
-        ``about`` (a list of lines) stand at the top of the page.
-    own_script : str, optional
-        Text of a script of this page only.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite.
+    The scripts are those of the folder `assets` after the common blocks, and the text of a script of this page only.
+    The data are values for `experiments.common.output.to_json`; the keys ``heading`` and ``about`` (a list of lines)
+    stand at the top of the page.
     """
     style = asset("page.css")
     programs = [asset(name) for name in (*BLOCKS, *scripts)] + ([] if own_script is None else [own_script])

@@ -18,16 +18,9 @@ _FLAT = np.cos(np.radians(4.0))
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A path.
+    """A path: points in SI of shape (n, 3) at the times of the page, and the index of its line style and mark.
 
-    Parameters
-    ----------
-    look : int
-        Index of the line style and the mark.
-    points : ndarray, shape (n, 3)
-        Points at the times of the page, SI; a path that ends earlier has fewer.
-    choice : int or None
-        Index of the choice that the path belongs to; None belongs to all choices.
+    A path that ends earlier has fewer points. `choice` is the index of the choice that it belongs to; None is all.
     """
 
     name: str
@@ -49,12 +42,8 @@ class Mark:
 class Sets:
     """A set that changes with time.
 
-    Parameters
-    ----------
-    faces : sequence of sequence of ndarray
-        The faces of each set: polygons of shape (k, 3) in space, or (k, 2) in the plane of the view, SI.
-    of_frame : sequence of int
-        Index of the set at each of the times of the page.
+    The faces of a set are polygons of shape (k, 3) in space, or (k, 2) in the plane of the view, SI. `of_frame` is the
+    index of the set at each of the times of the page.
     """
 
     name: str
@@ -64,13 +53,7 @@ class Sets:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Paths in space or in a plane.
-
-    Parameters
-    ----------
-    plane : tuple of int, or None
-        The horizontal and the vertical axis; None is space.
-    """
+    """Paths in space, or in the plane of a horizontal and a vertical axis."""
 
     caption: str
     axes: tuple[str, str, str]
@@ -96,14 +79,8 @@ class Curve:
 class Graph:
     """Curves over time.
 
-    Parameters
-    ----------
-    levels : sequence of float
-        Values at which horizontal lines are drawn, SI.
-    band : ndarray, shape (n, 2), or None
-        Smallest and largest possible value at each time, SI.
-    stairs : bool
-        Whether the values are constant between the times.
+    `levels` are values of horizontal lines, SI. `band` has the smallest and the largest possible value at each time,
+    SI, shape (n, 2). With `stairs` the values are constant between the times.
     """
 
     caption: str
@@ -127,14 +104,8 @@ def motion_page(
 ) -> str:
     """Return a page of moving craft as HTML.
 
-    Parameters
-    ----------
-    choices : sequence of str
-        Names of alternative controls, to show one of them.
-    own_script : str or None
-        Text of the script that starts the page, if it is not the common one.
-    own_data : mapping of str to object, or None
-        Further data for that script.
+    `choices` are names of alternative controls, of which the reader selects one. `own_script` is the text of the script
+    that starts the page, if it is not the common one, and `own_data` further data for it.
     """
     name, factor = time_unit(float(np.ptp(time_s)))
     data = {

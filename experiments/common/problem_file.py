@@ -81,15 +81,7 @@ def problem_form(
     checks: Callable[[Known], Iterator[Problem]] = no_checks,
     written: Sequence[str] = (),
 ) -> Form[Tables]:
-    """Return the form of the problem files of a kind.
-
-    Parameters
-    ----------
-    tables : type
-        The pydantic model of the whole file; it has `schema`, `kind` and `name` among its keys.
-    checks, written
-        As in `Form`.
-    """
+    """Return the form of the problem files of a kind; the parameters are those of `Form`."""
     return Form(
         "problem",
         "infoset problems list",

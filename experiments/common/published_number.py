@@ -57,14 +57,7 @@ class Band:
     def of_digits(cls, text: str, units: float, beyond: float = 0.0) -> Band:
         """Return the numbers that a printed number stands for.
 
-        Parameters
-        ----------
-        text : str
-            Digits as printed.
-        units : float
-            Half width, in units of the last digit.
-        beyond : float
-            Added half width, for the rounding of the inputs of the computation.
+        The half width is `units` of the last digit, plus `beyond` for the rounding of the inputs of the computation.
         """
         # A few ulp more, so that a number on the boundary is inside.
         half_width = (units * last_digit(text) + beyond) * (1.0 + 1e-9)
@@ -79,8 +72,6 @@ class PublishedNumber:
     ----------
     source : str
         Table or equation.
-    name : str
-        Quantity, with its unit.
     printed : str
         Digits as printed, or of the number of another `origin`.
     ours : float or None
@@ -128,17 +119,7 @@ class PublishedNumber:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """All numbers of a paper.
-
-    Parameters
-    ----------
-    paper : str
-        Name on the command line.
-    problems : tuple of (str, str)
-        Name and hash of the problems or scenarios of the computation.
-    remarks : tuple of str
-        Misprints and omissions other than numbers.
-    """
+    """All numbers of a paper, the name and hash of each problem or scenario, and remarks about other misprints."""
 
     paper: str
     title: str
@@ -171,16 +152,9 @@ class Reference:
         beyond: float = 0.0,
         note: str = "",
     ) -> PublishedNumber:
-        """Return a number whose tolerance is the rounding of its last printed digit.
+        """Return a number whose tolerance is the rounding of the last digit of `printed`, or of `corrected`.
 
-        Parameters
-        ----------
-        source, name, printed, ours, unexplained, note
-            As in `PublishedNumber`.
-        corrected : str or None
-            The correct number, whose last digit then sets the tolerance.
-        beyond : float
-            Added to the tolerance, for the rounding of the inputs of the computation.
+        `beyond` is added to the tolerance, for the rounding of the inputs of the computation.
         """
         band = Band.of_digits(printed, self.units, beyond)
         right = None if corrected is None else Band.of_digits(corrected, self.units, beyond)

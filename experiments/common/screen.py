@@ -162,13 +162,7 @@ def number(value: float | None) -> str:
 
 
 def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[str]:
-    """Return a line about the quantiles that so many runs do not show; no line if they show all.
-
-    Parameters
-    ----------
-    runs : int
-        Number of runs of a noise; --runs is this number times `noises`.
-    """
+    """Return a line about the quantiles that so many runs of a noise do not show; no line if they show all."""
     hidden = [level for level in levels if not shows(runs, level)]
     if not hidden:
         return []

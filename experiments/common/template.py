@@ -14,16 +14,11 @@ _WIDTH = 44
 
 
 def template(form: Form[Tables], head: Sequence[str]) -> str:
-    """Return a valid file of a form.
+    """Return a valid file of a form, with some lines at its top.
 
     Optional keys and tables are comments, except those in ``form.written``. A key with several examples is written with
     the first one in the first table that has it, with the second one in the second table, and so on; an array has as
     many tables as that needs.
-
-    Parameters
-    ----------
-    head : sequence of str
-        Lines at the top of the file.
     """
     lines, used = [*(f"# {line}" for line in head), ""], Counter[str]()
     top = {name: field for name, field in keys_of(form.tables).items() if name not in tables_of(form.tables)}

@@ -53,19 +53,9 @@ def load_tables(
 ) -> Tables:
     """Read a built-in file or a file of the user; the numbers stay as written.
 
-    Parameters
-    ----------
-    name_or_path : str or path
-        A built-in name, or the path of a TOML file. A name wins over a file of that name, unless the argument has a
-        path separator or ends in ``.toml``.
-    settings : sequence of str or None, optional
-        KEY=VALUE: values in place of those of the file, in its units, with the keys of `read_tables`. They are added to
-        the description.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is invalid; the message lists all its problems.
+    A built-in name wins over a file of that name, unless the argument has a path separator or ends in ``.toml``.
+    `settings` are KEY=VALUE: values in place of those of the file, in its units, with the keys of `read_tables`; they
+    are added to the description. Raise `InputError` if there is no such file, or it is invalid, with all its problems.
     """
     text, source = _text_of(form, name_or_path)
     values = _read_settings(settings or ())
@@ -94,21 +84,12 @@ def _text_of(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> tuple[
 
 
 def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str, str] | None = None) -> Tables:
-    """Check the text of a file, and return its values, numbers as written.
+    """Check the text of a file, and return its values, numbers as written; messages name `source`.
 
-    Parameters
-    ----------
-    source : str
-        Name of the file in messages.
-    values : mapping of str to str or None, optional
-        TOML values that replace those of the text, by key, before the text is checked. A key is written with its table,
-        ``thruster.budget_m_s``; in an array of tables with the number of the table, ``craft.2.weight``. ``.least`` and
-        ``.greatest`` after a key are the ends of a pair. Texts may be written without quotes.
-
-    Raises
-    ------
-    InputError
-        With all problems of the text: place, value and what to do.
+    `values` are TOML values that replace those of the text, by key, before the text is checked. A key is written with
+    its table, ``thruster.budget_m_s``; in an array of tables with the number of the table, ``craft.2.weight``.
+    ``.least`` and ``.greatest`` after a key are the ends of a pair. Texts may be written without quotes. Raise
+    `InputError` with all problems of the text: path, value and what to do.
     """
     document = _parse(form, text, source)
     kind = kind_of(document)
@@ -151,10 +132,7 @@ def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str,
 
 
 def _read_settings(settings: Sequence[str]) -> dict[str, str]:
-    """Return the values of ``--set KEY=VALUE`` by key, as written.
-
-    `InputError` if a setting has another form, or a key is set twice.
-    """
+    """Return the values of ``--set KEY=VALUE`` by key, as written."""
     values: dict[str, str] = {}
     for setting in settings:
         key, mark, text = (part.strip() for part in setting.partition("="))

@@ -23,16 +23,9 @@ Tables = TypeVar("Tables", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Problem:
-    """One problem of a file.
+    """One problem of a file: path of the key, what is wrong with which value, and what to do.
 
-    Parameters
-    ----------
-    path : tuple of str
-        Table and key; an array of tables has the index of the table, from 0, after its name.
-    text : str
-        What is wrong, and with which value.
-    remedy : str
-        What to do.
+    In an array of tables, the path has the index of the table, from 0, after its name.
     """
 
     path: KeyPath
@@ -42,15 +35,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Known:
-    """The values of a file; those that are invalid are None.
-
-    Parameters
-    ----------
-    document : dict
-        The file as parsed.
-    bad : frozenset of tuple of str
-        Paths of the invalid tables and keys.
-    """
+    """The values of a file as parsed; those whose paths are in `bad` are None."""
 
     document: dict[str, Any]
     bad: frozenset[KeyPath]
@@ -94,10 +79,8 @@ class Form(Generic[Tables]):
     ----------
     noun : str
         Name of such a file in messages: ``scenario``.
-    listed_by : str
-        Command that lists the built-in files.
-    begun_by : str
-        Command that prints or writes a valid file to start from.
+    listed_by, begun_by : str
+        Commands that list the built-in files, and that print or write a valid file to start from.
     tables : type
         The pydantic model of the whole file, made of `experiments.common.toml_values.Table`.
     checks : callable, optional
@@ -106,8 +89,6 @@ class Form(Generic[Tables]):
         Optional tables and keys that the template contains, not as comments: ``chaser.position_m``.
     kind : str, optional
         Required value of ``kind``; `SCENARIO` for scenario files, which do not have this key.
-    schema : int, optional
-        Version of the file format.
     """
 
     noun: str
@@ -121,15 +102,7 @@ class Form(Generic[Tables]):
 
 
 def keys_of(tables: type[BaseModel], path: KeyPath = ()) -> dict[str, Any]:
-    """Return the keys of a table as written, with their pydantic fields.
-
-    Parameters
-    ----------
-    tables : type
-        The model of the whole file.
-    path : tuple of str, optional
-        The table in it; empty is the top of the file.
-    """
+    """Return the keys of a table as written, with their pydantic fields; an empty path is the top of the file."""
     model = tables
     for part in path:
         if part.isdigit():

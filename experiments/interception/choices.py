@@ -29,17 +29,9 @@ MODEL_KEY = "information_set.model"
 def scenario_with(options: Any) -> Scenario:
     """Read the scenario of a command and replace what its options set; None keeps the value of the scenario.
 
-    Parameters
-    ----------
-    options : dataclass
-        Options of the command: `scenario` and `settings`, and `strategy`, `model`, `tie`, `sections` and `range_meter`
-        if the command has them. ``--strategy FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy`
-        returns it.
-
-    Raises
-    ------
-    InputError
-        If the scenario is unsound, or an option does not fit it.
+    The command may have the options `strategy`, `model`, `tie`, `sections` and `range_meter`. ``--strategy
+    FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it. Raise `InputError` if the scenario
+    is unsound, or an option does not fit it.
     """
     strategy, model, tie, sections, range_meter = (
         getattr(options, name, None) for name in ("strategy", "model", "tie", "sections", "range_meter")
@@ -71,13 +63,7 @@ def scenario_with(options: Any) -> Scenario:
 
 
 def with_model(scenario: Scenario, model: Model) -> Scenario:
-    """Return a scenario with a set model; a model other than the scenario's starts from its default initial set.
-
-    Raises
-    ------
-    InputError
-        If the scenario does not meet the conditions of the model.
-    """
+    """Return a scenario with a set model; a model other than the scenario's starts from its default initial set."""
     set_model = scenario.set_model
     if model is set_model.kind:
         return scenario
@@ -90,14 +76,8 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
     """Return the scenario of a study, whose default model is the guaranteed one, whatever the scenario file says.
 
     With the model `paper`, quantiles can include runs whose set lost the true state. The list contains a line for the
-    screen if the default replaces the model of the file.
-
-    Parameters
-    ----------
-    options : dataclass
-        As in `scenario_with`. ``--model`` and ``--set`` may choose the model.
-    resumed : Model or None
-        Model of the folder that is resumed, which is then the default.
+    screen if the default replaces the model of the file. ``--model`` and ``--set`` may choose the model; if a folder is
+    resumed, its model is the default.
     """
     scenario = scenario_with(options)
     chosen = any(text.partition("=")[0].strip() == MODEL_KEY for text in options.settings or ())
@@ -116,8 +96,8 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
 def own_strategy(text: str | None, scenario: Scenario, option: str = "--strategy") -> Strategy | None:
     """Return the strategy that ``--strategy FILE.py:CLASS`` names; None for a built-in name.
 
-    `InputError` if the file has no such strategy, its code raises an exception, or it decides for both lateral axes
-    and the scenario is in a plane.
+    Raise `InputError` if the file has no such strategy, its code raises an exception, or it decides for both lateral
+    axes and the scenario is in a plane.
     """
     if text is None or not is_own_strategy(text):
         return None
@@ -132,16 +112,8 @@ def own_strategy(text: str | None, scenario: Scenario, option: str = "--strategy
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
     """Return the strategies of a list: by name, with the strategy of a Python file, None for a built-in one.
 
-    Parameters
-    ----------
-    names : str or None
-        Built-in names and ``FILE.py:CLASS``, separated by commas; "all" is all built-in names, None those of
-        `COMPARED`.
-
-    Raises
-    ------
-    InputError
-        If there is no such strategy, or one is named twice.
+    `names` are built-in names and ``FILE.py:CLASS``, separated by commas; "all" is all built-in names, None those of
+    `COMPARED`. Raise `InputError` if there is no such strategy, or one is named twice.
     """
     valid = strategy_names()
     if names == "all":

@@ -18,12 +18,9 @@ Flight = tuple[str, TieRule | None]
 
 @dataclass(frozen=True)
 class Comparison:
-    """One strategy with one kind of noise; all strategies have the same runs.
+    """One strategy with one kind of noise: results by tie rule of the game noise, or one result with random noise.
 
-    Parameters
-    ----------
-    results : mapping of TieRule or None to Results
-        By tie rule of the game noise; the one key of random noise is None.
+    All strategies have the same runs.
     """
 
     strategy: str

@@ -30,13 +30,7 @@ TICKS_S = (0.01, 0.1, 1.0, 10.0, 60.0, 600.0, 3600.0, 21600.0, 86400.0, 864000.0
 
 @dataclass(frozen=True)
 class Clock:
-    """The time axis of pictures of engagements.
-
-    Parameters
-    ----------
-    counts_down : bool
-        Whether the axis is logarithmic in the time before the nominal arrival; otherwise it is linear in the time.
-    """
+    """The time axis of pictures of engagements: linear in the time, or logarithmic in the time before the arrival."""
 
     counts_down: bool
 
@@ -154,10 +148,7 @@ def possible_misses(record: Record) -> tuple[Floats, Mapping[str, Floats]]:
 class Courses:
     """Possible misses and impulses of many runs of a scenario over time, an observer of `simulate`.
 
-    Parameters
-    ----------
-    runs : int
-        Number of runs; at most `MOST_COURSES` are kept.
+    At most `MOST_COURSES` runs are kept.
 
     Attributes
     ----------

@@ -11,13 +11,7 @@ from sim import Results, Scenario
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve of the experiment.
-
-    Parameters
-    ----------
-    number : int
-        1 random noise, 2 random with range meter, 3 game noise, 4 game with range meter.
-    """
+    """One curve of the experiment: 1 random noise, 2 random with range meter, 3 game noise, 4 game with range meter."""
 
     number: int
     noise: NoiseKind

@@ -31,13 +31,9 @@ def load_strategy(text: str, option: str = "--strategy") -> Strategy:
     """Import a file and create a strategy of one of its classes, from a text ``FILE.py:CLASS``.
 
     The strategy can be pickled: another process imports the file again. Its module is named after the file, and the
-    folder of the file is searched for the modules that it imports, as by ``python FILE.py``.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or class, the class is not a `Strategy`, or the code of the file raises an exception.
-        The methods of the strategy raise it too, instead of the exceptions of the file.
+    folder of the file is searched for the modules that it imports, as by ``python FILE.py``. Raise `InputError` if
+    there is no such file or class, the class is not a `Strategy`, or the code of the file raises an exception. The
+    methods of the strategy raise it too, instead of the exceptions of the file.
     """
     name, _, class_name = text.rpartition(":") if ":" in text else (text, "", "")
     file = Path(name)

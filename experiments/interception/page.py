@@ -37,13 +37,7 @@ STEPS_OF_A_BOX = 65535
 
 
 def interception_page(records: Sequence[Record]) -> str:
-    """Return the replay page of one engagement, or of two side by side, as HTML.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        One or two.
-    """
+    """Return the replay page of one engagement, or of two side by side, as HTML."""
     names = list(dict.fromkeys(record.scenario.name for record in records))
     clock = Clock.of(records)
     titles = record_titles(records)
@@ -192,16 +186,9 @@ def _omega_alpha(section: Section, axis: str) -> Floats:
 
 @dataclass(frozen=True)
 class Stages:
-    """The sections of one step before and after its measurement.
+    """The sections of one step predicted from the step before, and after its measurement, equal to the recorded ones.
 
-    Parameters
-    ----------
-    before : tuple of Section
-        Predicted from the previous step.
-    measured : tuple of Section
-        After the measurement: equal to the recorded sections.
-    miss_m : mapping of str to ndarray, shape (sections, 2)
-        Predicted-miss interval of each measured section, m, for each lateral axis.
+    `miss_m` is the predicted-miss interval of each measured section, m, shape (sections, 2), for each lateral axis.
     """
 
     before: tuple[Section, ...]
@@ -213,12 +200,8 @@ def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stag
     """Yield the stages of each step of a record, computed again from its measurements.
 
     The last stages have an empty `measured`: the set predicted from the last step. With `kept`, the sections are those
-    of these steps and of the predictions from them; the other stages are empty.
-
-    Raises
-    ------
-    InputError
-        If the sets differ from the recorded ones: another version of the library wrote the record.
+    of these steps and of the predictions from them; the other stages are empty. Raise `InputError` if the sets differ
+    from the recorded ones: another version of the library wrote the record.
 
     Notes
     -----
@@ -266,12 +249,8 @@ def _of_batch(values: Sequence[float]) -> Floats:
 def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:
     """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX` across the box.
 
-    An outline has at least one vertex. A box is the least of each coordinate, then the greatest.
-
-    Parameters
-    ----------
-    tolerance : float
-        Vertices are left out that are nearer to the line through their neighbours, as a part of the box.
+    An outline has at least one vertex. A box is the least of each coordinate, then the greatest. Vertices are left out
+    that are nearer than `tolerance`, a part of the box, to the line through their neighbours.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
     if not len(counts):

@@ -61,7 +61,9 @@ def scenario_text(name: str) -> str:
 
 
 def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Scenario:
-    """Read a built-in scenario or a scenario file.
+    """Read a built-in scenario or a scenario file, each number rounded once after the change to SI units.
+
+    Raise `InputError` if there is no such scenario or file, or it is not valid; the message lists all its problems.
 
     Parameters
     ----------
@@ -70,16 +72,6 @@ def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] 
         path separator or ends in ``.toml``.
     settings : sequence of str or None, optional
         KEY=VALUE: values in place of those of the file, for example ``["thruster.greatest_impulse_m_s=5"]``.
-
-    Returns
-    -------
-    Scenario
-        In SI units, each number rounded once.
-
-    Raises
-    ------
-    InputError
-        If there is no such scenario or file, or the file is not a valid scenario; the message lists all its problems.
     """
     return _to_scenario(load_tables(FORM, name_or_path, settings), str(name_or_path))
 
@@ -87,10 +79,8 @@ def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] 
 def read_scenario(text: str, source: str, values: Mapping[str, str] | None = None) -> Scenario:
     """Return the scenario of the text of a scenario file, as `load_scenario`; messages name `source`.
 
-    Parameters
-    ----------
-    values : mapping of str to str or None, optional
-        TOML values that replace those of the text, by key, for example ``{"uncertainty.x_km.least": "5200.0"}``.
+    `values` are TOML values that replace those of the text, by key, for example ``{"uncertainty.x_km.least":
+    "5200.0"}``.
     """
     return _to_scenario(read_tables(FORM, text, source, values), source)
 
@@ -238,12 +228,8 @@ def scenario_to_toml(scenario: Scenario) -> str:
     """Return the TOML of a scenario; it is read back as the same scenario, bit for bit.
 
     It has every key, except the keys of space in a plane, the keys of the other error law of the angle sensor, and keys
-    of `LATER_KEYS` that have their default.
-
-    Raises
-    ------
-    InputError
-        If no file can contain the scenario: a number is not finite, or its angle sensor has another nominal range.
+    of `LATER_KEYS` that have their default. Raise `InputError` if no file can contain the scenario: a number is not
+    finite, or its angle sensor has another nominal range.
     """
     model, sensor = scenario.set_model, scenario.set_model.angle_sensor
     if sensor.nominal_range_m != scenario.nominal_range_m:

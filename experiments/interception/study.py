@@ -14,18 +14,9 @@ QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 
 @dataclass(frozen=True)
 class SetCounts:
-    """Numbers of runs by what happened to their information sets.
+    """Numbers of runs: all, with the true state inside the set at every step, with an empty set, and with a failure.
 
-    Parameters
-    ----------
-    runs : int
-        All runs.
-    truth_kept : int
-        Runs whose true state was inside the set at every step.
-    set_emptied : int
-        Runs whose set became empty.
-    failed : int
-        Runs whose set became empty or lost the true state.
+    A set has failed if it became empty or lost the true state.
     """
 
     runs: int = 0

@@ -48,13 +48,7 @@ def play(records: Sequence[Record], console: Console, steps_per_s: float) -> Non
 
 
 def frame(records: Sequence[Record], step: int, console: Console) -> Group:
-    """Return one time of engagements, side by side if the terminal is wide enough.
-
-    Parameters
-    ----------
-    step : int
-        An engagement that has ended shows its last step.
-    """
+    """Return one step of engagements, side by side if the terminal is wide enough; the last step if it has ended."""
     braille = "utf" in console.encoding.lower()
     least = _LEAST_COLUMNS * max(len(record.steps[0].axes) for record in records)
     beside = len(records) if console.width >= len(records) * (least + 6) else 1
@@ -172,15 +166,7 @@ def _numbers(record: Record, index: int) -> Table:
 
 
 class Dots:
-    """A plane of dots.
-
-    Parameters
-    ----------
-    columns, rows : int
-        Size in characters.
-    x, y : tuple of float
-        Limits of the plane.
-    """
+    """A plane of dots; its size is in characters."""
 
     def __init__(
         self, columns: int, rows: int, x: tuple[float, float], y: tuple[float, float], *, braille: bool = True

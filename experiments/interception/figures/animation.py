@@ -32,18 +32,7 @@ _SECOND_MM = 58.0
 
 
 def animation_path(option: str, path: Path | None, ending: str) -> None:
-    """Check the name of an animation file.
-
-    Parameters
-    ----------
-    ending : str
-        ``.gif`` or ``.mp4``.
-
-    Raises
-    ------
-    InputError
-        If its suffix differs, or the program that writes it is missing.
-    """
+    """Raise `InputError` if an animation file has another suffix, or the program that writes it is missing."""
     if path is None:
         return
     if path.suffix != ending:
@@ -64,14 +53,8 @@ def animate(
 ) -> bytes:
     """Return an animation of engagements, side by side, of eight seconds.
 
-    Parameters
-    ----------
-    ending : str
-        ``.gif`` (by Pillow, with 16 colours) or ``.mp4`` (by ffmpeg).
-    most_frames : int
-        Frames are evenly distributed over the steps, about 0.2 s of computing each.
-    width_px : int or None
-        Width of a frame; None is 425, or 640 for two records.
+    A ``.gif`` is written by Pillow, with 16 colours, an ``.mp4`` by ffmpeg. Frames are evenly distributed over the
+    steps, and take about 0.2 s of computing each. The default width of a frame is 425 pixels, or 640 for two records.
     """
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, most_frames)

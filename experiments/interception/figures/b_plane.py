@@ -56,7 +56,7 @@ GUARANTEE_LOOK: dict[str, Any] = {"color": "#2f6b3a", "linestyle": (0, (7, 1.5))
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Misses of one sample.
+    """Misses of one sample of N runs.
 
     Parameters
     ----------
@@ -92,16 +92,11 @@ def greatest_guarantee(bounds_m: Sequence[float]) -> float | None:
 
 
 def ellipse(across_m: Floats, level: float) -> tuple[Floats, Floats, float] | None:
-    """Return the ellipse that contains a share of the points.
+    """Return the ellipse that contains a share of the points; None if the points are on a line.
 
-    It has the centre and the axes of the covariance of the points; its size is the quantile of the Mahalanobis radii of
-    the points.
-
-    Returns
-    -------
-    tuple of (ndarray, ndarray, float), or None
-        Centre (y, z) and semi-axes, m, and the angle of the first semi-axis from y toward z, rad. None if the points
-        are on a line.
+    It has the centre (y, z), m, and the axes of the covariance of the points; its size is the quantile of their
+    Mahalanobis radii. The result is the centre, the semi-axes, m, and the angle of the first semi-axis from y toward z,
+    rad.
     """
     centre = across_m.mean(axis=0)
     variances, axes = np.linalg.eigh(np.cov(across_m.T)) if len(across_m) > 2 else (np.zeros(2), np.eye(2))
@@ -114,17 +109,11 @@ def ellipse(across_m: Floats, level: float) -> tuple[Floats, Floats, float] | No
 
 @style()
 def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figure:
-    """Draw the miss of each run as a point in the plane across the approach.
+    """Draw the miss of each run as a point in the plane across the approach, one panel for each cloud.
 
     Ellipses contain 50 % and 99 % of the runs. The radii of the circles are the median and the 90 % quantile of the
-    miss, and the greatest guaranteed miss. All panels have the same limits, unless the median misses differ much.
-
-    Parameters
-    ----------
-    clouds : sequence of Cloud
-        One panel each, at least one.
-    radius_m : float or None
-        Radius of the body, m, drawn as a disc; None draws none.
+    miss, and the greatest guaranteed miss. All panels have the same limits, unless the median misses differ much. The
+    radius of the body, m, is drawn as a disc.
     """
     if not clouds:
         raise ValueError("at least one cloud is needed")
@@ -236,15 +225,7 @@ def draw_discs(axes: Axes, half: float, radius_m: float | None, guaranteed_m: fl
 
 
 def disc_handles(radius_m: float | None, guaranteed: Sequence[bool], half: float, of: str) -> list[Line2D | Patch]:
-    """Return the entries of the legend for the discs.
-
-    Parameters
-    ----------
-    guaranteed : sequence of bool
-        For each guaranteed miss, whether it is within the axes.
-    of : str
-        What the guaranteed miss belongs to: ``of the run``.
-    """
+    """Return the entries of the legend for the discs; `guaranteed` says which guaranteed misses are within the axes."""
     handles: list[Line2D | Patch] = []
     if guaranteed:
         where = "" if all(guaranteed) else ", if within the axes" if any(guaranteed) else ": beyond the axes"

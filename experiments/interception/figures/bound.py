@@ -39,13 +39,7 @@ def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
 
 
 def ripples(labels_m: Floats, bounds_m: Floats) -> list[tuple[Floats, Floats]]:
-    """Split a curve at labels that were not evaluated.
-
-    Parameters
-    ----------
-    labels_m, bounds_m : ndarray, shape (n,)
-        Labels in rising order, and their bounds. The stretches that are returned have labels that lie close together.
-    """
+    """Split a curve over rising labels where labels were not evaluated: those of a stretch lie close together."""
     gaps = np.diff(labels_m)
     if not len(gaps):
         return [(labels_m, bounds_m)]

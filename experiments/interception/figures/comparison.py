@@ -38,17 +38,7 @@ _NOISES = ((NoiseKind.RANDOM, "random noise"), (NoiseKind.GAME, "game noise, wor
 def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = None) -> Figure:
     """Draw the distributions of (a, b) the miss and (c, d) the impulse spent, one row per strategy.
 
-    Parameters
-    ----------
-    compared : sequence of Comparison
-        Of each strategy one under random and one under game noise.
-    radius_m : float or None
-        Radius of the body, m, which is a line in (a) and (b); None draws none.
-
-    Returns
-    -------
-    Figure
-        Four axes: random noise left, game noise right. Misses are on a logarithmic axis.
+    Random noise is left, game noise right. Misses are on a logarithmic axis, with a line at the radius of the body, m.
     """
     names = list(dict.fromkeys(each.strategy for each in compared))
     if not names:

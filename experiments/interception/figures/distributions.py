@@ -40,22 +40,9 @@ _LEAST_SHOWN = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Runs that are drawn as one curve.
+    """Runs that are drawn as one curve, with the entry `name` in the legend.
 
-    Parameters
-    ----------
-    name : str
-        Entry in the legend.
-    look : dict
-        Style of the line.
-    miss_m, impulse_m_s : ndarray, shape (n,)
-        Miss and impulse spent of each run.
-    guaranteed_miss_m : ndarray, shape (m,)
-        Known values of the guaranteed miss, drawn with a dotted line.
-    guaranteed_name : str
-        Entry in the legend of the dotted line.
-    number : int
-        Number that is written on the curve; 0 for none.
+    The known values of the guaranteed miss are drawn with a dotted line. The number is written on the curve; 0 is none.
     """
 
     name: str
@@ -84,14 +71,7 @@ def draw_samples(samples: Sequence[Sample], radius_m: float | None = None) -> Fi
     """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their 95 % confidence bands.
 
     Where a few values are far beyond the others, the axis ends before them and says how many; where the curves lie
-    decades apart, the axis of the miss is logarithmic.
-
-    Parameters
-    ----------
-    samples : sequence of Sample
-        At least one.
-    radius_m : float or None
-        Radius of the body, m, which is a line in (a); None draws none.
+    decades apart, the axis of the miss is logarithmic. The radius of the body, m, is a line in (a).
     """
     if not samples:
         raise ValueError("at least one curve is needed")
@@ -158,11 +138,7 @@ def decades_apart(samples: Sequence[Floats]) -> bool:
 def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tuple[float, float]:
     """Scale the axis of the values so that every sample is visible, and return its limits.
 
-    Parameters
-    ----------
-    from_zero : bool
-        Whether a linear axis starts at zero; only such an axis becomes logarithmic, where the samples are decades
-        apart.
+    Only an axis that starts at zero becomes logarithmic, where the samples are decades apart.
     """
     if from_zero and decades_apart(samples):
         greatest = max(float(sample.max()) for sample in samples)
@@ -181,13 +157,7 @@ def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tup
 
 
 def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: str, label: str = "_band") -> None:
-    """Draw the two thin edges of a confidence band, between its samples and away from 0 and 1.
-
-    Parameters
-    ----------
-    values, lower, upper : ndarray, shape (n,)
-        The samples in rising order, and the band at and after each.
-    """
+    """Draw the two thin edges of a confidence band at and after each of the rising values, away from 0 and 1."""
     for edge, empty in ((lower, 0.0), (upper, 1.0)):
         axes.plot(
             values,

@@ -31,17 +31,8 @@ def simulate_in_threads(
 ) -> list[Results]:
     """Simulate scenarios in parallel, one thread per core; the kernels release the interpreter lock.
 
-    Parameters
-    ----------
-    jobs : sequence
-        Scenario, own strategy and progress callback of each simulation, the slowest first.
-    courses : sequence of Courses
-        Observer of each simulation; empty without observers.
-
-    Raises
-    ------
-    InputError
-        If results are not finite.
+    A job is a scenario, an own strategy and a progress callback, the slowest first. `courses` are observers of the
+    simulations. Raise `InputError` if results are not finite.
     """
     stopped = Event()
 

@@ -15,14 +15,9 @@ from sim.scenario import strategy_name
 
 @dataclass(frozen=True)
 class WorstMisses:
-    """The engagements with the greatest misses of a strategy.
+    """The engagements with the greatest misses of a strategy: of those whose set never became empty, and of all.
 
-    Parameters
-    ----------
-    set_kept : WorstEngagement or None
-        The greatest miss of the engagements whose set never became empty; None if there was none.
-    overall : WorstEngagement or None
-        The greatest miss of all engagements; None if no miss was finite.
+    The first is None if there was none, the second if no miss was finite.
     """
 
     set_kept: WorstEngagement | None
@@ -46,11 +41,6 @@ def find_worst_misses(
     """Search for the greatest miss with the set never empty, and for the greatest miss of all engagements.
 
     The second search is simulated only if the set became empty in the first one. Otherwise both are the same.
-
-    Raises
-    ------
-    InputError
-        If the search needs too much memory.
     """
 
     def search(keep_set: bool, name: str) -> WorstEngagement | None:
