@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from scipy.stats import pearsonr, spearmanr
 
 from experiments.campaigns.campaign_figures import (
-    MOST_POINTS,
     CampaignColumns,
     correlations,
     draw_campaign_distributions,
@@ -23,6 +22,7 @@ from experiments.campaigns.campaign_figures import (
 )
 from experiments.campaigns.samples import START
 from experiments.common.screen import BeginProgress
+from experiments.interception.figures.distributions import MOST_POINTS
 from experiments.interception.scenario_file import load_scenario
 from sim import Campaign, CampaignNoise, Scenario
 from tests.experiments.campaigns.figure_room import need_room
