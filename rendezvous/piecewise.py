@@ -55,12 +55,7 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> tuple[Flo
     A panel is halved until the last two coefficients are below 1e-11 of the greatest value on all panels, or below 1e-7
     of it and no longer decreasing (rounding), or below the effect of the rounding of times. Sinusoids on panels of one
     radian have an error below 1e-13 at once: the remainder of the interpolation is at most (1/2)^12 / (2^11 12!) =
-    2.5e-16 of their amplitude.
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite, or no break is later than another.
+    2.5e-16 of their amplitude. Raise `ValueError` if a value is not finite, or no break is later than another.
     """
     starts, ends = breaks_s[:-1], breaks_s[1:]
     starts, ends = starts[ends > starts], ends[ends > starts]
@@ -105,12 +100,8 @@ def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> f
 
     `control` returns u, shape (k, 3), m/s^2, at k times, s. It is smooth between `breaks_s`, which do not decrease, and
     its motion turns by about a radian at most between two of them (`LinearMotion.breaks`). Between short panels at late
-    times the error is the effect of the rounding of times.
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite, or no break is later than another.
+    times the error is the effect of the rounding of times. Raise `ValueError` if a value is not finite, or no break is
+    later than another.
 
     Notes
     -----

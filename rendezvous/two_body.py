@@ -16,10 +16,7 @@ from rendezvous.relative_motion.elliptic_orbit import eccentric_of_mean
 class OrbitalElements:
     """Elements of an ellipse and the true anomaly; `raan` is the right ascension of the ascending node.
 
-    Raises
-    ------
-    ValueError
-        If the semi-major axis is not positive, or the eccentricity outside [0, 1).
+    The constructor raises `ValueError` if the semi-major axis is not positive, or the eccentricity outside [0, 1).
     """
 
     semi_major_axis_m: float
@@ -71,12 +68,8 @@ def perigee_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_
 def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: float) -> Floats:
     """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting; `duration_s` may be negative.
 
-    Lagrange's f and g functions of the change of the eccentric anomaly.
-
-    Raises
-    ------
-    ValueError
-        If a state is not on an ellipse.
+    Lagrange's f and g functions of the change of the eccentric anomaly. Raise `ValueError` if a state is not on an
+    ellipse.
     """
     mu = gravitational_parameter_m3_s2
     position, velocity = states[..., :3], states[..., 3:]

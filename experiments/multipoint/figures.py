@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from experiments.common.display_units import length_unit
 from experiments.common.figure_style import (
@@ -26,8 +25,7 @@ from experiments.common.figure_style import (
 )
 from experiments.multipoint.file import Axes as FrameAxes
 from experiments.multipoint.scene import CostCurve, Scene
-
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 _TRACK_POINTS = 241
 _COMPONENTS = tuple({**look, "marker": "none"} for look in LINE_LOOKS[:3])

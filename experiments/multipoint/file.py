@@ -9,7 +9,6 @@ from enum import Enum
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError, input_errors
@@ -39,11 +38,10 @@ from experiments.common.toml_values import (
     si,
     wrong,
 )
+from infoset.arrays import Floats
 from rendezvous.multipoint import DriftingTargets, KeplerTargets, KeplerTour, Meet, Target, TimeLimits, Tour, Visits
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 from rendezvous.two_body import OrbitalElements, coast
-
-Floats = NDArray[np.float64]
 
 KIND = "multipoint"
 MOST_TARGETS = 200

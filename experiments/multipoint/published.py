@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.published_number import COMPUTED, Origin, Progress, PublishedNumber, Reference, Reproduction
 from experiments.multipoint.file import load_multipoint
+from infoset.arrays import Floats
 from rendezvous.multipoint import (
     DriftingTargets,
     KeplerTargets,
@@ -25,8 +25,6 @@ from rendezvous.multipoint import (
     solve_segments,
 )
 from rendezvous.relative_motion import TimeVaryingMotion
-
-Floats = NDArray[np.float64]
 
 PAPER = "multipoint"
 TITLE = "Mironov and Mironov (2007), visits to several moving targets"

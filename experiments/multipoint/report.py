@@ -6,15 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, trajectories_csv
 from experiments.common.screen import Part, number_table
 from experiments.multipoint.command import BEST, GIVEN
 from experiments.multipoint.file import Axes, MultipointProblem
 from experiments.multipoint.scene import Scene
-
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.display_units import Unit, time_unit
 from experiments.multipoint.file import Axes
+from infoset.arrays import Floats
 from rendezvous.multipoint import Path, Visits
-
-Floats = NDArray[np.float64]
 
 _POINTS = 1601
 _CURVE_POINTS = 41

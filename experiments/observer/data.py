@@ -11,16 +11,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.errors import InputError, shown
 from experiments.common.toml_values import LARGEST
 from experiments.observer.command import MOST_STEPS, Errors
 from experiments.observer.file import ObserverProblem
 from infoset import Zonotope
+from infoset.arrays import Floats
 from infoset.observer_sets import Set, polytope_of
-
-Floats = NDArray[np.float64]
 
 LARGEST_CSV_BYTES = 10_000_000
 LARGEST_STATE = 1e40
@@ -53,10 +51,7 @@ class Data:
 def data_of(problem: ObserverProblem, file: Path | None, errors: Errors, seed: int) -> Data:
     """Return the measurements of a CSV file, else those of the problem, else simulated ones.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or does not fit the system.
+    Raise `InputError` if the file cannot be read, or does not fit the system.
     """
     if file is not None:
         return read_csv(file, len(problem.c), problem.b.shape[1])
@@ -117,10 +112,7 @@ def _padded(inputs: Floats | None, steps: int, size: int) -> Floats:
 def read_csv(file: Path, outputs: int, inputs: int) -> Data:
     """Read measurements and inputs from a CSV file.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column is missing or unknown, or a cell is not a number.
+    Raise `InputError` if the file cannot be read, a column is missing or unknown, or a cell is not a number.
     """
     try:
         with file.open("rb") as opened:

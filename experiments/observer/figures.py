@@ -7,12 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from experiments.common.figure_style import IMPULSE, INK, MEASURED, SET_EDGE, SET_FILL, TRUTH, figure_grid, plain, style
 from experiments.observer.report import Report
-
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 _MOST_OUTLINES = 60
 

@@ -8,7 +8,6 @@ from decimal import Decimal
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
@@ -30,11 +29,11 @@ from experiments.common.toml_values import (
 )
 from experiments.observer.command import MOST_STEPS
 from infoset import ConvexPolygons, LinearObserver, Zonotope
+from infoset.arrays import Floats
 from infoset.linear_observer import MOST_STATES
 from infoset.observer_sets import Set
 from infoset.polytope import Polytope
 
-Floats = NDArray[np.float64]
 Row = tuple[Decimal, ...]
 
 KIND = "observer"

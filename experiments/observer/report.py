@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 from experiments.common.output import Cell, to_csv
@@ -14,8 +13,7 @@ from experiments.common.screen import Part, number_table
 from experiments.observer.data import Data
 from experiments.observer.file import ObserverProblem
 from infoset import Estimate, Inconsistency
-
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 _SHOWN_STEPS = 12
 _ROUNDING = 1e-12

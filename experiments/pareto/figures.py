@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from experiments.common.display_units import length_unit
@@ -23,6 +22,7 @@ from experiments.common.figure_style import (
     new_figure,
     style,
 )
+from infoset.arrays import Floats
 from rendezvous.pareto import (
     Coalitions,
     DurationSweep,
@@ -32,8 +32,6 @@ from rendezvous.pareto import (
     pareto_set,
     simplex_weights,
 )
-
-Floats = NDArray[np.float64]
 
 _AXES = ("x (against the motion)", "y (outward)", "z (normal)")
 _PLANES = ((0, 1), (0, 2), (1, 2))

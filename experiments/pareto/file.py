@@ -8,7 +8,6 @@ from decimal import Decimal
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import input_errors
@@ -35,8 +34,6 @@ from experiments.common.toml_values import (
 )
 from rendezvous.pareto import Component, Craft, Encounter, Meeting
 from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire
-
-Floats = NDArray[np.float64]
 
 KIND = "pareto-encounter"
 MOST_CRAFT = 50

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from importlib import resources
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.display_units import length_unit
 from experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
+from infoset.arrays import Floats
 from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
-
-Floats = NDArray[np.float64]
 
 MOMENTS = 121
 _SET_POINTS = 600

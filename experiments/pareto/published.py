@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.published_number import (
     CUT_OR_ROUNDED,
@@ -18,10 +17,9 @@ from experiments.common.published_number import (
     last_digit,
 )
 from experiments.pareto.file import load_pareto
+from infoset.arrays import Floats
 from rendezvous.pareto import Encounter, EncounterSolution, solve_encounter
 from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire
-
-Floats = NDArray[np.float64]
 
 PAPER = "pareto"
 TITLE = "Barseghyan and Stepanyan (2008), encounter of three craft"

@@ -6,14 +6,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, trajectories_csv
 from experiments.common.screen import Part, number, number_table
 from experiments.pareto.file import TERMINAL, ParetoProblem
+from infoset.arrays import Floats
 from rendezvous.pareto import BoundCheck, Coalitions, DurationSweep, EncounterSolution, Feasibility, distances
-
-Floats = NDArray[np.float64]
 
 _ZERO = 1e-9
 """Components of a meeting smaller than this part of the largest one are printed as zero."""

@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from experiments.common.errors import InputError, input_errors, shown
 from experiments.common.output import TRAJECTORIES, output_of, to_json
@@ -19,6 +18,7 @@ from experiments.pareto.figures import draw_controls, draw_costs, draw_front, dr
 from experiments.pareto.file import TERMINAL, ParetoProblem, load_pareto
 from experiments.pareto.page import pareto_page
 from experiments.pareto.report import Report, report_json, report_parts, trajectories
+from infoset.arrays import Floats
 from rendezvous.pareto import (
     BoundCheck,
     EncounterSolution,
@@ -34,8 +34,6 @@ from rendezvous.pareto import (
     total_impulse,
 )
 from rendezvous.pareto.coalitions import MOST_CRAFT
-
-Floats = NDArray[np.float64]
 
 FIGURES = ("figure-trajectories", "figure-controls", "figure-front", "figure-costs")
 SWEEP = (0.5, 2.0, 31)

@@ -21,7 +21,7 @@ EvaderPolicy = Callable[[int, float], Steering | None]
 
 
 def evader_policy(name: str, seed: int) -> EvaderPolicy:
-    """Return the policy of the evader.
+    """Return the policy of the evader; raise `InputError` if the policy is unknown or the file is not a script.
 
     Parameters
     ----------
@@ -29,11 +29,6 @@ def evader_policy(name: str, seed: int) -> EvaderPolicy:
         A policy, or a file that ends in ``.csv``.
     seed : int
         Root seed of the random policy.
-
-    Raises
-    ------
-    InputError
-        If the policy is unknown or the file is not a script.
     """
     if name.endswith(".csv"):
         script = _script(name)

@@ -10,13 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM, length_unit, time_unit
 from experiments.common.figure_style import IMPULSE, LIMIT, MEASURED, TRUTH, figure_grid, new_figure, style
+from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict, orbital_axes
-
-Floats = NDArray[np.float64]
 
 PURSUER: dict[str, Any] = {"color": TRUTH, "linestyle": "-"}
 EVADER: dict[str, Any] = {"color": MEASURED, "linestyle": (0, (5, 1.5))}

@@ -96,10 +96,7 @@ def _columns(problem: PursuitProblem) -> str:
 def read_axis(option: str, text: str) -> Axis:
     """Read KEY=FROM:TO:N.
 
-    Raises
-    ------
-    InputError
-        If the text has another form, the parameter is unknown, or a value is out of range.
+    Raise `InputError` if the text has another form, the parameter is unknown, or a value is out of range.
     """
     example = f"for example {option} {COLUMNS if option == '--x' else ROWS}"
     key, _, span = text.partition("=")

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from experiments.common.display_units import S_PER_HOUR, split_unit
 from experiments.common.figure_style import INK, LIMIT, new_figure, style
+from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
-
-Floats = NDArray[np.float64]
 
 _BOTTOM, _BOTTOM_WITH_LEGEND, _TOP = 0.18, 0.25, 0.93
 _SHADES = LinearSegmentedColormap.from_list("blues", ["#f4f8fc", "#b4d0e8", "#4f8bbf", "#0b3c74"])

@@ -14,13 +14,7 @@ _DEGREES = ("deg", 180.0 / np.pi)
 
 
 def pursuit_page(name: str, description: str, solution: Solution) -> str:
-    """Return the page of a game as HTML.
-
-    Raises
-    ------
-    ValueError
-        If the solution has neither a capture nor a fallback.
-    """
+    """Return the page of a game as HTML; raise `ValueError` if the solution has neither a capture nor a fallback."""
     sampled = history(solution, MOMENTS)
     pursuer, evader = sampled.pursuer, sampled.evader
     players = (("pursuer", 0, pursuer), ("evader", 1, evader))

@@ -15,7 +15,6 @@ from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import proj3d  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from experiments.common.figure_style import (
@@ -30,9 +29,9 @@ from experiments.common.figure_style import (
     style,
 )
 from experiments.reachability.report import Member, Report
+from infoset.arrays import Floats
 from rendezvous.reachability import SetKind
 
-Floats = NDArray[np.float64]
 Shadow = tuple[list[int], Floats]
 """Times at which a set is the same, and its vertices."""
 

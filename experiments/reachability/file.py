@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
@@ -32,6 +31,7 @@ from experiments.common.toml_values import (
     key,
     si,
 )
+from infoset.arrays import Floats
 from infoset.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
     MOST_PERIODS,
@@ -46,7 +46,6 @@ from rendezvous.reachability import (
 )
 from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerHempel
 
-Floats = NDArray[np.float64]
 Rows = tuple[tuple[Decimal, ...], ...]
 
 KIND = "reachable-rendezvous"

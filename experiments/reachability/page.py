@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.page_motion import Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
 from experiments.reachability.report import POINTS, Report
+from infoset.arrays import Floats
 from rendezvous.reachability import SetKind
-
-Floats = NDArray[np.float64]
 
 _TOLERANCE = 1e-2
 _MOST_SETS = 24

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.output import Cell
 from experiments.reachability.file import Rendezvous, load_rendezvous
 from experiments.reachability.report import Member, fly_members
+from infoset.arrays import Floats
 from rendezvous.reachability import OptimalControls, Solution, minimum_energy, minimum_l1, nearest
-
-Floats = NDArray[np.float64]
 
 PROBLEM = "rendezvous-2021"
 COLUMNS = ("table", "ours", "quantity", "period", "printed", "corrected", "computed")

@@ -7,16 +7,14 @@ from decimal import Decimal
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.output import Cell
 from experiments.common.published_number import Progress, PublishedNumber, Reference, Reproduction
 from experiments.reachability.file import Rendezvous, load_rendezvous
 from experiments.reachability.printed_tables import PROBLEM, Comparison, compare_published, corrected
 from experiments.reachability.report import fly_members
+from infoset.arrays import Floats
 from rendezvous.reachability import ReachabilityProblem, solve
-
-Floats = NDArray[np.float64]
 
 PAPER = "reachability"
 TITLE = "Shorikov and Goranov (2021), rendezvous through reachable sets"

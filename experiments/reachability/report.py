@@ -8,12 +8,12 @@ from functools import cached_property
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.common.display_units import Unit, length_unit
 from experiments.common.errors import InputError
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, library_version, trajectories_csv
 from experiments.reachability.file import KIND, Rendezvous
+from infoset.arrays import Floats
 from infoset.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
@@ -41,7 +41,6 @@ from rendezvous.reachability import (
     vertices,
 )
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 SINGLE = {
@@ -186,10 +185,7 @@ class Report:
 def make_report(rendezvous: Rendezvous, request: Request, progress: Progress = lambda _done: None) -> Report:
     """Solve a problem, select optimal controls and simulate them; ``progress`` receives the fraction done.
 
-    Raises
-    ------
-    InputError
-        If the constraints conflict, or a request is impossible.
+    Raise `InputError` if the constraints conflict, or a request is impossible.
     """
     try:
         return _report(rendezvous, request, progress)

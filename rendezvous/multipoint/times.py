@@ -50,6 +50,9 @@ class Effort(Enum):
 class TimeLimits:
     """Limits of the times.
 
+    The constructor raises `ValueError` if nothing limits the last time: the energy then has no minimum, because it
+    decreases to zero as time increases.
+
     Parameters
     ----------
     latest_s : float or None
@@ -58,11 +61,6 @@ class TimeLimits:
         Least time between a departure and the next arrival.
     price_per_s : float
         kappa, m^2/s^4, not negative; kappa times the duration is added to the energy.
-
-    Raises
-    ------
-    ValueError
-        If nothing limits the last time: the energy then has no minimum, because it decreases to zero as time increases.
     """
 
     latest_s: float | None = None
@@ -176,6 +174,9 @@ def optimise_times(
 ) -> BestTimes:
     """Minimise the energy, or energy and price, over the times of N visits in one order.
 
+    Raise `NoRoomError` if the visits do not fit before the latest time, `ValueError` if there is no latest time and no
+    guess, and, with the final effort, `NotSettledError` if the conditions of a minimum are not satisfied.
+
     Parameters
     ----------
     fly : callable
@@ -190,15 +191,6 @@ def optimise_times(
         Objective, m^2/s^3, below which a descent stops.
     progress : callable or None
         Called with the share of starts that are followed.
-
-    Raises
-    ------
-    NoRoomError
-        If the visits do not fit before the latest time.
-    ValueError
-        If there is no latest time and no guess.
-    NotSettledError
-        If the conditions of a minimum are not satisfied; with the final effort only.
 
     Notes
     -----
@@ -268,10 +260,7 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
     """Return the time available for travel, s; infinite without a latest time.
 
-    Raises
-    ------
-    NoRoomError
-        If the visits, with stays `dwell_s`, do not fit into the `limits`.
+    Raise `NoRoomError` if the visits, with stays `dwell_s`, do not fit into the `limits`.
     """
     if limits.latest_s is None:
         return float(np.inf)

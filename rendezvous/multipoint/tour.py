@@ -31,10 +31,7 @@ class Meet(Enum):
 class Target:
     """A target; `dwell_s` is the duration of the stay with it, coasting, for a rendezvous only.
 
-    Raises
-    ------
-    ValueError
-        If the dwell is negative or not finite, or that of a flyby is not zero.
+    The constructor raises `ValueError` if the dwell is negative or not finite, or that of a flyby is not zero.
     """
 
     name: str
@@ -53,10 +50,7 @@ class Target:
 class MovingTargets(ABC):
     """Targets whose motion is known, with their states at an epoch. They coast in the same dynamics as the chaser.
 
-    Raises
-    ------
-    ValueError
-        If there is no target, two have one name, or a state is not six finite numbers.
+    The constructor raises `ValueError` if there is no target, two have one name, or a state is not six finite numbers.
     """
 
     targets: tuple[Target, ...]
@@ -106,13 +100,7 @@ class DriftingTargets(MovingTargets):
 
 
 class Visits(ABC):
-    """A chaser's start (`start_s`, `start_state`) and its targets.
-
-    Raises
-    ------
-    ValueError
-        If the start is not finite.
-    """
+    """A chaser's start (`start_s`, `start_state`) and its targets; `ValueError` if the start is not finite."""
 
     targets: MovingTargets
     start_state: Floats
@@ -167,10 +155,8 @@ class Tour(Visits):
 def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) -> Nodes:
     """Return the nodes of a path that reaches `targets` in an `order`, first to last, at N times.
 
-    Raises
-    ------
-    ValueError
-        If there is no visit, a target does not exist or is visited twice, or the number of times is not that of visits.
+    Raise `ValueError` if there is no visit, a target does not exist or is visited twice, or the number of times is not
+    that of visits.
     """
     which, times = np.asarray(order), np.asarray(time_s, dtype=np.float64)
     if not len(which) or times.shape != which.shape:

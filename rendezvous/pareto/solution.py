@@ -165,12 +165,8 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
 
     (2.1) to (2.7) of Barseghyan and Stepanyan (2008) for any free components. States are divided by (T, T, T, 1, 1, 1)
     before the Cholesky factor of the Gramian is computed, and the ideal is a least-squares problem of that factor, so
-    J* loses no digits. O(n) small matrices.
-
-    Raises
-    ------
-    ValueError
-        If the numbers overflow, or a Gramian is singular: the craft's control does not reach all components.
+    J* loses no digits. O(n) small matrices. Raise `ValueError` if the numbers overflow, or a Gramian is singular: the
+    craft's control does not reach all components.
     """
     common, opening, base = encounter.common, encounter.opening, encounter.base
     factors: dict[tuple[int, float], tuple[Floats, Floats, Floats]] = {}

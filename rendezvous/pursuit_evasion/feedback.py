@@ -34,12 +34,7 @@ class Observation:
     """The pursuer's observation of the evader when it plans.
 
     `delay_s` is its age; the pursuer assumes that the evader has been optimal since. The errors are standard deviations
-    of each component.
-
-    Raises
-    ------
-    ValueError
-        If a value is negative or not finite.
+    of each component. The constructor raises `ValueError` if a value is negative or not finite.
     """
 
     delay_s: float = 0.0
@@ -101,14 +96,9 @@ def fly(
 
     `steering` is that of the evader; None is optimal against the true state of the pursuer. No `observation` observes
     the evader exactly; otherwise `seed` is that of its errors. `solution` is that of the game, if it is known.
-    `progress` is called with the fraction of the predicted time that has passed.
-
-    Raises
-    ------
-    ValueError
-        If the game has no capture and therefore no first plan, or `replan_s` is not positive.
-    PathError
-        If the evader's path cannot be followed.
+    `progress` is called with the fraction of the predicted time that has passed. Raise `ValueError` if the game has no
+    capture and therefore no first plan, or `replan_s` is not positive, and `PathError` if the evader's path cannot be
+    followed.
 
     Notes
     -----

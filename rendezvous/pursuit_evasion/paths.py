@@ -92,12 +92,8 @@ class SteeredPath:
 def steered_path(craft: Craft, direction: Direction, duration: float) -> SteeredPath:
     """Return the path of a craft that steers by a rule: full thrust along the direction, or none where that is zero.
 
-    SciPy's DOP853 to 1e-12: some 3 ms a revolution.
-
-    Raises
-    ------
-    PathError
-        If the direction turns so fast that integration takes too long, or the path comes too near the planet's centre.
+    SciPy's DOP853 to 1e-12: some 3 ms a revolution. Raise `PathError` if the direction turns so fast that integration
+    takes too long, or the path comes too near the planet's centre.
     """
     calls = 0
 
@@ -159,10 +155,7 @@ class History:
 def history(solution: Solution, count: int = 400) -> History:
     """Sample the capture or the fallback of a `solution` at `count` equally spaced times, from the start to the end.
 
-    Raises
-    ------
-    ValueError
-        If the solution has neither.
+    Raise `ValueError` if the solution has neither.
     """
     capture = solution.capture or solution.fallback
     if capture is None:

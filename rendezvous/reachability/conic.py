@@ -87,10 +87,7 @@ class ConeProgram:
     def solve(self) -> Optimum:
         """Return a solution, by an interior-point method (Clarabel).
 
-        Raises
-        ------
-        NoSolutionError
-            If the answer fails the check of `need_solution` under all settings tried.
+        Raise `NoSolutionError` if the answer fails the check of `need_solution` under all settings tried.
         """
         failed = NoSolutionError("a convex program was not solved")
         for point, multipliers in self.attempts():
@@ -131,10 +128,7 @@ class ConeProgram:
     def need_solution(self, point: Floats, multipliers: Floats, cost: Floats | None = None) -> None:
         """Check the conditions of optimality: see `broken_and_apart` for the arguments.
 
-        Raises
-        ------
-        NoSolutionError
-            If a constraint is broken by more than 1e-9, or the duality gap is over 1e-8.
+        Raise `NoSolutionError` if a constraint is broken by more than 1e-9, or the duality gap is over 1e-8.
         """
         broken, apart = self.broken_and_apart(point, multipliers, cost)
         if not (broken <= _BROKEN and apart <= _APART):

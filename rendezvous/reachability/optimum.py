@@ -112,13 +112,9 @@ def block_reaches_zero(block: Block) -> bool:
 def admissible(block: Block) -> Block:
     """Return a block whose constraints can be satisfied: the block itself, or one relaxed by rounding.
 
-    If no control satisfies the constraints by 1e-9 of their sizes, all of them are relaxed until one does.
-
-    Raises
-    ------
-    EmptyTubeError
-        If the relaxation is more than 1e-9. The first time at which constraints conflict is found by bisection, with a
-        linear program per step.
+    If no control satisfies the constraints by 1e-9 of their sizes, all of them are relaxed until one does. Raise
+    `EmptyTubeError` if the relaxation is more than 1e-9. The first time at which constraints conflict is found by
+    bisection, with a linear program per step.
     """
     lifted = lift(block)
     relaxation = least_relaxation(lifted)[0]
@@ -165,10 +161,8 @@ class LeastNorm:
 def least_norm(lifted: Lifted, weights: Floats) -> LeastNorm:
     """Minimise |weights x(T)| over all controls of a block, a set without equations; weights, shape (n,), are positive.
 
-    Raises
-    ------
-    NoSolutionError
-        If the norm found is not within 1e-8 of its lower bound, or its controls violate a constraint.
+    Raise `NoSolutionError` if the norm found is not within 1e-8 of its lower bound, or its controls violate a
+    constraint.
 
     Notes
     -----

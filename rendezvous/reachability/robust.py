@@ -99,14 +99,9 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
 
     With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
     an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
-    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds.
-
-    Raises
-    ------
-    NoRobustPlanError
-        If no plan satisfies the constraints.
-    ValueError
-        If there are too many periods, or thrust is in a ball.
+    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds. Raise
+    `NoRobustPlanError` if no plan satisfies the constraints, and `ValueError` if there are too many periods, or thrust
+    is in a ball.
     """
     _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:

@@ -113,12 +113,7 @@ def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
     """Return the analytic centre, shape (d,), of a set without equations, and the Hessian of its barrier there.
 
     `start`, shape (d,), is inside. Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which
-    is self-concordant.
-
-    Raises
-    ------
-    NoSolutionError
-        If Newton's method does not converge.
+    is self-concordant. Raise `NoSolutionError` if Newton's method does not converge.
     """
     point = start.copy()
     if not space.size:
@@ -169,12 +164,8 @@ def _barrier(space: Lifted, point: Floats) -> tuple[float, Floats, Floats]:
 def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
     """Return all vertices of the set of `optimal` controls, shape (v, T, m).
 
-    Raises
-    ------
-    TooManyVerticesError
-        If there are more than `most`, if the set has too many dimensions, or if thrust is in a ball.
-    UncertainHullError
-        If rounding decides which points are vertices.
+    Raise `TooManyVerticesError` if there are more than `most`, if the set has too many dimensions, or if thrust is in a
+    ball, and `UncertainHullError` if rounding decides which points are vertices.
     """
     corners = []
     for part in optimal.blocks:
@@ -210,12 +201,8 @@ def samples(optimal: OptimalControls, count: int, generator: np.random.Generator
     """Draw `count` random members, at least 1, of the set of `optimal` controls, shape (count, T, m).
 
     Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
-    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
-
-    Raises
-    ------
-    ValueError
-        If the count is less than 1.
+    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step. Raise
+    `ValueError` if the count is less than 1.
     """
     if count < 1:
         raise ValueError(f"at least one sample must be drawn, not {count}")

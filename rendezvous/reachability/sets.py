@@ -155,14 +155,9 @@ class ExactSets:
 
     Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X; G-(t) = {x in X: A x in G-(t + 1) - B U}, whose
     half-spaces need no inverse of A; the tube is the intersection of both. Where zero is not reached the tube is a face
-    of G+ that rounding would lose; it is then the image of the vertices of the optimal controls.
-
-    Raises
-    ------
-    TooLargeError
-        If the block exceeds the budget of the meter, or a hull is expected to.
-    UncertainHullError
-        If rounding decides which points are vertices of a set.
+    of G+ that rounding would lose; it is then the image of the vertices of the optimal controls. The constructor raises
+    `TooLargeError` if the block exceeds the budget of the meter, or a hull is expected to, and `UncertainHullError` if
+    rounding decides which points are vertices of a set.
     """
 
     def __init__(self, optimum: BlockOptimum, meter: Meter) -> None:

@@ -30,12 +30,8 @@ class LinearMotion(ABC):
     """x' = A(t) x + B(t) u + w(t), x = (position, velocity) in a frame; by default B = (0, 1)' and w = 0.
 
     Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front. The
-    `frame` is that of states and controls.
-
-    Raises
-    ------
-    ValueError
-        If the frame interleaves positions and velocities.
+    `frame` is that of states and controls. The constructor raises `ValueError` if the frame interleaves positions and
+    velocities.
     """
 
     frame: Frame = HILL
@@ -90,10 +86,7 @@ class LinearMotion(ABC):
 def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
     """Return end - start, s, none negative.
 
-    Raises
-    ------
-    ValueError
-        If a time is not finite, or an end is before its start.
+    Raise `ValueError` if a time is not finite, or an end is before its start.
     """
     durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
     if not np.isfinite(durations).all():
@@ -111,13 +104,7 @@ def state_scales(durations: Floats) -> Floats:
 
 
 def checked_rate(rate_rad_s: float) -> None:
-    """Check an orbit rate.
-
-    Raises
-    ------
-    ValueError
-        If it is not positive and finite.
-    """
+    """Check an orbit rate; raise `ValueError` if it is not positive and finite."""
     if not (np.isfinite(rate_rad_s) and rate_rad_s > 0.0):
         raise ValueError(f"the orbit rate must be positive and finite, found {rate_rad_s!r} rad/s")
 
@@ -125,10 +112,7 @@ def checked_rate(rate_rad_s: float) -> None:
 def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
     """Return times, s, of panels of equal length and at most one radian, for a motion that turns by `radians` in all.
 
-    Raises
-    ------
-    ValueError
-        If there are more than 200 000 panels.
+    Raise `ValueError` if there are more than 200 000 panels.
     """
     if not radians <= MOST_PANELS:
         raise ValueError(

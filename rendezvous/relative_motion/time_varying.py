@@ -97,12 +97,8 @@ class TimeVaryingMotion(LinearMotion):
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
 
-        Panels are halved where A at their Gauss points turns by more than a radian over them.
-
-        Raises
-        ------
-        ValueError
-            If A(t) is not finite, or there are more than 200 000 panels.
+        Panels are halved where A at their Gauss points turns by more than a radian over them. Raise `ValueError` if
+        A(t) is not finite, or there are more than 200 000 panels.
         """
         starts, ends = np.array([start_s]), np.array([end_s])
         nodes = _gauss_collocation()[0]

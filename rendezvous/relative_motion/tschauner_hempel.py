@@ -38,10 +38,7 @@ class TschaunerHempel(LinearMotion):
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start.
 
-        Raises
-        ------
-        ValueError
-            If a time is not finite.
+        Raise `ValueError` if a time is not finite.
         """
         if not (np.isfinite(start_s).all() and np.isfinite(end_s).all()):
             raise ValueError("a time is not finite")
