@@ -23,14 +23,7 @@ class Tapes(NamedTuple):
 
 
 class History:
-    """Events of a batch: the kinds are common to all engagements, the values belong to one engagement each.
-
-    Parameters
-    ----------
-    channels : int
-        Number of lateral axes C.
-    batch : int
-        Number of engagements B.
+    """Events of a batch of B engagements: the kinds are common to all of them, the values belong to one each.
 
     Attributes
     ----------
@@ -39,13 +32,12 @@ class History:
     errors : ndarray, shape (>= events,)
         Error bound of each measured rate, rad/s; zero for the other kinds.
     values : ndarray, shape (>= events, C, B)
-        Measured angle, rad, impulse, m/s, or measured rate, rad/s, along each axis; unused for the other kinds.
+        Measured angle, rad, impulse, m/s, or measured rate, rad/s, along each of C lateral axes; unused for the other
+        kinds.
     applies : ndarray of bool, shape (>= events, B)
         Whether the event applies to the engagement; a prediction applies to all.
-    events : int
-        Number of events.
-    elapsed : int
-        Number of predictions.
+    events, elapsed : int
+        Number of events, and of the predictions among them.
     sights : ndarray, shape (C, B, columns)
         Fields of the last sight of each axis and engagement after the first `seen` events, for measured rates.
     seen : int

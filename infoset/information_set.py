@@ -22,15 +22,7 @@ class InformationSetView(SetQueries):
     def axis(self, name: str) -> InformationSetView:
         """Return the view of the plane of x and one lateral axis, "y" or "z", with the queries of a planar set.
 
-        Parameters
-        ----------
-        name : str
-            One of `axes`.
-
-        Raises
-        ------
-        ValueError
-            If the set does not have the axis.
+        A ValueError is raised if the set does not have the axis.
         """
         if name not in self.axes:
             raise ValueError(f"name must be one of the lateral axes, {', '.join(self.axes)}: got {name!r}")
@@ -39,10 +31,7 @@ class InformationSetView(SetQueries):
     def copy(self) -> InformationSet:
         """Return an independent information set that starts from the state of this one.
 
-        Raises
-        ------
-        TypeError
-            If this is the view of one axis of a set in space.
+        A TypeError is raised if this is the view of one axis of a set in space.
         """
         if self.axes != self._state.model.axes:
             raise TypeError(
@@ -126,8 +115,8 @@ class InformationSet(InformationSetView):
         phi_m : ndarray, shape (B,)
             m; zero while no label has passed below the range threshold.
         exists : ndarray of bool, shape (B,)
-            Whether the bound is valid: some label has passed below the threshold, the model is guaranteed, and the
-            data never contradicted it.
+            Whether the bound is valid: some label has passed below the threshold, the model is guaranteed, and the data
+            never contradicted it.
 
         Notes
         -----
@@ -152,26 +141,19 @@ class InformationSet(InformationSetView):
     ) -> None:
         """Remove the ranges that contradict a range measurement: keep x_m/(1 + b) <= x <= x_m/(1 - b).
 
+        It narrows the interval of labels and leaves the polygons of the others unchanged.
+
         Parameters
         ----------
         range_m : array_like, shape () or (B,)
-            Measured range x_m, m.
+            Measured range x_m, m; a ValueError is raised if it is negative.
         relative_error : float
             Bound b, in [0, 1).
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
         alpha_rad : array_like, shape () or (B,), in space (2,) or (2, B), or None
-            Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
-            a measured angle, alpha is bounded by the greatest possible displacement across x.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If a value is not finite, the range is negative, or the error bound is not in [0, 1).
-
-        Notes
-        -----
-        A range measurement narrows the interval of labels and leaves the polygons of the others unchanged.
+            Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without a
+            measured angle, alpha is bounded by the greatest possible displacement across x.
         """
         PART.need("relative_error", relative_error)
         measured = real_array("range_m", range_m, (self.batch,))
@@ -226,7 +208,8 @@ class InformationSet(InformationSetView):
             self._recover(emptied, event, *before)
 
     def measure_rate(self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True) -> None:
-        """Cut every section by a measurement of the line-of-sight rate: |omega - omega_m| <= error.
+        """Cut every section by a measurement of the line-of-sight rate (Kumkov and Patsko, 2001): |omega - omega_m| <=
+        error.
 
         Parameters
         ----------
@@ -236,10 +219,6 @@ class InformationSet(InformationSetView):
             Error bound of the rate, rad/s.
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
-
-        References
-        ----------
-        Kumkov and Patsko (2001).
         """
         NOT_NEGATIVE.need("error_rad_s", error_rad_s)
         measured = self._spread(omega_rad_s, "omega_rad_s")
@@ -273,10 +252,7 @@ class InformationSet(InformationSetView):
     def drop_below_threshold(self) -> Flags:
         """Remove the sections whose range will be below the threshold after the next step.
 
-        Returns
-        -------
-        ndarray of bool, shape (B, S)
-            Stored sections that were removed.
+        Return which stored sections were removed, shape (B, S).
         """
         state, active, least_label = self._state, self.tracking, self._least_label_next()
         computes_phi = self._computes_phi
@@ -310,8 +286,6 @@ class InformationSet(InformationSetView):
     def predict(self) -> None:
         """Predict the set over one step, for all disturbances within the bound.
 
-        Notes
-        -----
         The exact set of disturbances is a thin lens in (V, z). As in the paper, the segment between its ends is used.
         """
         active = self.tracking
@@ -359,14 +333,8 @@ class InformationSet(InformationSetView):
     def _recover(self, empty: Flags, event: int | None, lower: Floats, upper: Floats) -> None:
         """Discard the measurement that emptied a set: restore the last consistent set, predict and enlarge it.
 
-        Parameters
-        ----------
-        empty : ndarray of bool, shape (B,)
-            Sets to recover.
-        event : int or None
-            Number of the measurement in the history; None for a range, which the history does not contain.
-        lower, upper : ndarray, shape (B,)
-            Limits of the labels before the measurement, m.
+        `event` is None for a range, which the history does not contain. `lower` and `upper`, shape (B,), are the limits
+        of the labels before the measurement, m.
         """
         if not empty.any():
             return

@@ -46,10 +46,7 @@ _IMPORT = re.compile(rf"^\s*from ((?:{'|'.join(PACKAGES)})[\w.]*) import (\([^)]
 class Kernels:
     """Decorators that compile the kernels of a package: without the GIL, divisions unchecked as in C.
 
-    Parameters
-    ----------
-    fastmath : str
-        Liberties that LLVM may take with floating-point numbers.
+    `fastmath` has the liberties that LLVM may take with floating-point numbers.
     """
 
     def __init__(self, *fastmath: str) -> None:
@@ -65,8 +62,6 @@ class Kernels:
     def entry(self, function: F) -> F:
         """Compile a kernel that allocates no array, nor does anything it calls; its machine code is stored on disk.
 
-        Notes
-        -----
         Without Numba's atomic reference counts, which may cost more than the work.
         """
         return self._stored(function, {"_nrt": False})
@@ -112,8 +107,6 @@ def _callable_from_python(kernel: Any) -> Any:
 class _Typing(Context):
     """Numba's typing, except that a built-in function is looked up once for each type of its arguments.
 
-    Notes
-    -----
     Numba tries all definitions of an operator at each use, also those for texts, lists and sets: a tenth of the time.
     Definitions that Numba compiles inherit the fast-math options of the kernel.
     """
@@ -202,8 +195,6 @@ class _LinkedCompiler(_Compiler):
 def cache_folder(kernel: Callable[..., object]) -> Path | None:
     """Return the folder for the machine code of a kernel's module; None if no folder can be written.
 
-    Notes
-    -----
     The folder is in NUMBA_CACHE_DIR, else in the user's cache folder, else in a private folder for temporary files:
     machine code must not come from a folder in which other users can write.
     """
@@ -293,8 +284,6 @@ def _text(file: Path) -> str:
 class _Compilation(event.Listener):
     """What happens during a compilation: no garbage collection, and one notice in a process that compiles for long.
 
-    Notes
-    -----
     Garbage collection would take a tenth of the time: the compiler makes many objects, and most of them stay.
     """
 

@@ -47,10 +47,8 @@ class Step:
 
     Parameters
     ----------
-    tracking : ndarray of bool, shape (B,)
-        Engagements that still measure and decide.
-    flying : ndarray of bool, shape (B,)
-        Engagements before their closest approach.
+    tracking, flying : ndarray of bool, shape (B,)
+        Engagements that still measure and decide, and those before their closest approach.
     measured : mapping of str to ndarray, shape (B,)
         Values measured in this step, by sensor; without the sensors that measured in no engagement.
     predicted_miss : PredictedMiss
@@ -75,19 +73,9 @@ class Step:
 class Engagements:
     """A batch of engagements in flight.
 
-    Parameters
-    ----------
-    strategy : Strategy or None
-        Guidance strategy; None is the scenario's.
-    truth : KeplerMotion or None
-        True motion; None is Kepler motion with the Sun of the scenario.
-    noise : MeasurementNoise or None
-        Measurement noise; None is the scenario's.
-    guarantee : bool
-        Compute the bound Phi in the guaranteed model; it doubles the run time.
+    `strategy`, `truth` and `noise` replace the strategy, the Kepler motion and the measurement noise of the scenario.
+    `guarantee` computes the bound Phi in the guaranteed model; it doubles the run time.
 
-    Notes
-    -----
     One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the true motion advances,
     and its closest approach is detected. Of the true motion, the strategy gets the measurements only.
     """

@@ -28,12 +28,8 @@ LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 @dataclass(frozen=True)
 class _Look:
-    """True states of the flights that measure in a step; in space slopes have the shape (2, B).
-
-    Parameters
-    ----------
-    events : int
-        Number of events of the history up to the measurements of the step.
+    """True states of the flights that measure in a step, after a number of events; in space slopes have the shape (2,
+    B).
     """
 
     step: int
@@ -46,8 +42,6 @@ class _Look:
 class TruthSection:
     """Measurements and impulses of a batch of flights, for the margins of the true states in their sections.
 
-    Notes
-    -----
     Angles do not depend on scale: a true motion with closing speed e (1 + eta) has the angles of a model motion at
     range x / (1 + eta), so its label is e T, with T the time at which x = 0.
     """
