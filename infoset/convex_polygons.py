@@ -282,7 +282,7 @@ class ConvexPolygons(PolygonArrays):
         """
         one, two = self._with(other)
         not_negative("tolerance", tolerance)
-        values = one._compare(kernels.is_subset, two)
+        values = one._measure(kernels.is_subset, *two._flat())
         return np.asarray((values[..., 0] > 0.0) | ((values[..., 1] <= tolerance) if tolerance else False))
 
     def equals(self, other: ConvexPolygons, tolerance: float = 0.0) -> Flags:
@@ -327,7 +327,7 @@ class ConvexPolygons(PolygonArrays):
             points = finite_values("other", other, "...", 2)
             other = ConvexPolygons.unchecked(points[..., None, :], np.ones(points.shape[:-1], dtype=np.int64))
         one, two = self._with(other)
-        return one._compare(kernels.gap, two)[..., 0]
+        return one._measure(kernels.gap, *two._flat())[..., 0]
 
     def closest_point(self, point: ArrayLike) -> Floats:
         """Return the point of the set nearest to a point, shape (2,) or (..., 2). O(n), rounded; a point inside is
@@ -338,7 +338,10 @@ class ConvexPolygons(PolygonArrays):
     def hausdorff_distance(self, other: ConvexPolygons) -> Floats:
         """Return the Hausdorff distance, shape (...); inf between an empty and a nonempty set. O(n m), rounded."""
         one, two = self._with(other)
-        both = one._compare(kernels.is_subset, two)[..., 1], two._compare(kernels.is_subset, one)[..., 1]
+        both = (
+            one._measure(kernels.is_subset, *two._flat())[..., 1],
+            two._measure(kernels.is_subset, *one._flat())[..., 1],
+        )
         return np.asarray(np.maximum(*both))
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:

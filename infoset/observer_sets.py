@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from infoset import observer_steps
+from infoset import observer_steps, polygon_batches
 from infoset.arrays import Flags, Floats, Integers
 from infoset.convex_polygons import ConvexPolygons
 from infoset.polytope import Polytope
@@ -58,35 +57,6 @@ class Motion:
         return Motion(np.eye(len(self.matrix)), -self.shifts, self.terms, _negative(self.disturbance))
 
 
-class Sets(Protocol):
-    """The sets of B runs; methods return new sets."""
-
-    @property
-    def is_empty(self) -> Flags:
-        """Whether each set is empty, shape (B,)."""
-        ...
-
-    def predicted(self, motion: Motion) -> Sets:
-        """Return the sets after a step."""
-        ...
-
-    def cut(self, strips: Strips, excess: Floats) -> Sets:
-        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
-        ...
-
-    def preimage_cut(self, later: Sets, motion: Motion) -> Sets:
-        """Return the states that lead to a state of the later set for some disturbance."""
-        ...
-
-    def support(self, direction: Floats) -> Floats:
-        """Return max direction . x of each set, shape (B,); -inf for the empty set."""
-        ...
-
-    def chebyshev_centres(self, states: int) -> Floats:
-        """Return the centres of largest balls, shape (B, n); NaN for the empty set."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Polygons:
     """Sets of two states: exact polygons, compiled."""
@@ -133,7 +103,7 @@ class Polygons:
         return result
 
     def cut(self, strips: Strips, excess: Floats) -> Polygons:
-        """Return the sets within the strips."""
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
         result = self._room(2 * len(strips.normals))
         observer_steps.update_all(
             self.vertices,
@@ -167,11 +137,13 @@ class Polygons:
         return result
 
     def support(self, direction: Floats) -> Floats:
-        """Return max direction . x of each set, shape (B,)."""
-        return observer_steps.support_all(self.vertices, self.counts, direction)
+        """Return max direction . x of each set, shape (B,); -inf for the empty set."""
+        values = np.empty((len(self.counts), 3))
+        polygon_batches.support(self.vertices, self.counts, values, np.tile(direction, (len(values), 1)))
+        return values[:, 0]
 
     def chebyshev_centres(self, states: int) -> Floats:
-        """Return the centres of largest discs."""
+        """Return the centres of largest discs, shape (B, 2); NaN for the empty set."""
         centres, _ = ConvexPolygons.unchecked(self.vertices, self.counts).chebyshev_centre()
         return np.ma.filled(centres, np.nan)
 
@@ -225,7 +197,7 @@ class Polytopes:
         return Polytopes(tuple(results))
 
     def cut(self, strips: Strips, excess: Floats) -> Polytopes:
-        """Return the sets within the strips."""
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
         results: list[FacetsAndVertices | None] = []
         for b, start in enumerate(self.members):
             member = start
@@ -262,15 +234,19 @@ class Polytopes:
         return Polytopes(tuple(results))
 
     def support(self, direction: Floats) -> Floats:
-        """Return max direction . x of each set, shape (B,)."""
+        """Return max direction . x of each set, shape (B,); -inf for the empty set."""
         return np.array([-np.inf if member is None else (member.vertices @ direction).max() for member in self.members])
 
     def chebyshev_centres(self, states: int) -> Floats:
-        """Return the centres of largest balls: a linear program for each run."""
+        """Return the centres of largest balls, shape (B, n), by a linear program each; NaN for the empty set."""
         nowhere = np.full(states, np.nan)
         return np.array(
             [nowhere if member is None else member.polytope.chebyshev_centre()[0] for member in self.members]
         )
+
+
+Sets = Polygons | Polytopes
+"""The sets of B runs; both classes have the same methods, which return new sets."""
 
 
 def polygon_of(shape: Set) -> ConvexPolygons:

@@ -81,21 +81,13 @@ def predict_all(
         else:
             count = polygon.map_linearly(points, count, xx, xy, yx, yy, scratch)
         if len(other) > 0:
-            copy(scratch, count, second)
+            polygon.copy(scratch, count, second)
             count = polygon_sum.add_polygon(second, count, other, len(other), scratch)
         for g in range(len(generators)):
             count = polygon_sum.add_segment(scratch, count, generators[g, 0], generators[g, 1])
         if count > MOST_VERTICES:
             count = polygon_hull.reduce_outward(scratch, count, MOST_VERTICES)
         made[b] = enlarge(scratch, count, shift_x, shift_y, slack_x, slack_y, out[b])
-
-
-@inlined
-def copy(points: Points, count: int, out: Points) -> None:
-    """Copy the vertices of a polygon."""
-    for i in range(count):
-        out[i, 0] = points[i, 0]
-        out[i, 1] = points[i, 1]
 
 
 @inlined
@@ -207,7 +199,7 @@ def enlarge_carefully(
     made = polygon_hull.hull(corners, 4 * count, hull)
     if made > count + 4:
         made = polygon_hull.reduce_outward(hull, made, count + 4)
-    copy(hull, made, out)
+    polygon.copy(hull, made, out)
     return made
 
 
@@ -234,7 +226,7 @@ def update_all(
     for b in range(counts.size):
         count = counts[b]
         points = out[b]
-        copy(vertices[b], count, points)
+        polygon.copy(vertices[b], count, points)
         x, y = reach(points, count)
         for r in range(len(normals)):
             least, greatest = lower[b, r], upper[b, r]
@@ -276,7 +268,7 @@ def cut_to_preimage(
         if count == 0 or later_counts[b] == 0:
             continue
         points, other = out[b], later[b]
-        copy(vertices[b], count, points)
+        polygon.copy(vertices[b], count, points)
         x, y = reach(points, count)
         other_x, other_y = reach(other, later_counts[b])
         terms_x = max(other_x, abs(matrix[0, 0]) * x + abs(matrix[0, 1]) * y)
@@ -300,14 +292,3 @@ def cut_to_preimage(
             if count == 0:
                 break
         made[b] = count
-
-
-@compiled
-def support_all(vertices: Floats, counts: Integers, direction: Floats) -> Floats:
-    """Return the greatest height of each polygon along a direction; -inf for the empty set."""
-    heights = np.full(counts.size, -np.inf)
-    for b in range(counts.size):
-        if counts[b] > 0:
-            top = polygon.support_index(vertices[b], counts[b], direction[0], direction[1])
-            heights[b] = polygon.height(vertices[b], top, direction[0], direction[1])
-    return heights

@@ -48,6 +48,14 @@ def move(points: Points, source: int, target: int) -> None:
 
 
 @inlined
+def copy(points: Points, count: int, out: Points) -> None:
+    """Copy the vertices of a polygon."""
+    for i in range(count):
+        out[i, 0] = points[i, 0]
+        out[i, 1] = points[i, 1]
+
+
+@inlined
 def append(out: Points, count: int, x: float, y: float) -> int:
     """Add a vertex unless it repeats the last one; return the new count."""
     if count > 0 and out[count - 1, 0] == x and out[count - 1, 1] == y:

@@ -324,18 +324,11 @@ class PolygonArrays:
         room = int(made.max(initial=0))
         return self.unchecked(out[:, :room].reshape(*self.shape, room, 2), made.reshape(self.shape))
 
-    def _measure(self, kernel: Callable[..., None], vectors: Floats | None = None) -> Floats:
+    def _measure(self, kernel: Callable[..., None], *arguments: object) -> Floats:
         """Apply a kernel that computes up to three numbers for each polygon, shape (..., 3)."""
         vertices, counts = self._flat()
         out = np.zeros((counts.size, 3))
-        kernel(vertices, counts, np.zeros((counts.size, 2)) if vectors is None else vectors, out)
-        return out.reshape(*self.shape, 3)
-
-    def _compare(self, kernel: Callable[..., None], other: Self) -> Floats:
-        """Apply a kernel that computes up to three numbers for each pair of polygons, shape (..., 3)."""
-        vertices, counts = self._flat()
-        out = np.zeros((counts.size, 3))
-        kernel(vertices, counts, out, *other._flat())
+        kernel(vertices, counts, out, *arguments)
         return out.reshape(*self.shape, 3)
 
 

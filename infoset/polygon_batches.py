@@ -15,14 +15,6 @@ from infoset.arrays import Floats, Integers
 
 
 @compiled
-def copy(vertices: Floats, count: int, out: Floats) -> None:
-    """Copy the vertices of a polygon."""
-    for i in range(count):
-        out[i, 0] = vertices[i, 0]
-        out[i, 1] = vertices[i, 1]
-
-
-@compiled
 def reverse(vertices: Floats, count: int) -> None:
     """Reverse the order of vertices, in place; the first one stays."""
     for i in range(1, (count + 1) // 2):
@@ -78,7 +70,7 @@ def cut(
 ) -> None:
     """Cuts by bands, widened by `slack` units of rounding of the heights of the vertices."""
     for i in range(counts.size):
-        copy(vertices[i], counts[i], out[i])
+        polygon.copy(vertices[i], counts[i], out[i])
         wider = 0.0
         if slack > 0.0:
             for j in range(counts[i]):
@@ -112,7 +104,7 @@ def invert(matrix: Floats, out: Floats) -> None:
 def add_segments(vertices: Floats, counts: Integers, out: Floats, made: Integers, halves: Floats) -> None:
     """Minkowski sums with segments from -half to +half, any number for each polygon: `halves` has shape (B, g, 2)."""
     for i in range(counts.size):
-        copy(vertices[i], counts[i], out[i])
+        polygon.copy(vertices[i], counts[i], out[i])
         made[i] = counts[i]
         for half in halves[i]:
             made[i] = polygon_sum.add_segment(out[i], made[i], half[0], half[1])
@@ -157,7 +149,7 @@ def intersect_rows(rows: Floats, out: Floats, made: Integers) -> None:
 def reduce_outward(vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: int) -> None:
     """Outer polygons of few vertices."""
     for i in range(counts.size):
-        copy(vertices[i], counts[i], out[i])
+        polygon.copy(vertices[i], counts[i], out[i])
         made[i] = polygon_hull.reduce_outward(out[i], counts[i], cap)
 
 
@@ -182,7 +174,7 @@ def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Fl
 
 
 @compiled
-def holds(vertices: Floats, counts: Integers, point: Floats, out: Floats) -> None:
+def holds(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
     """Whether points are in polygons, exactly decided, as 1 or 0; and signed distances from the boundaries."""
     for i in range(counts.size):
         points, count = polygon_exact.tidy(vertices[i], counts[i])
@@ -212,7 +204,7 @@ def gap(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_co
 
 
 @compiled
-def nearest(vertices: Floats, counts: Integers, point: Floats, out: Floats) -> None:
+def nearest(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
     """Nearest points of polygons, and their distances."""
     for i in range(counts.size):
         out[i, 2] = np.inf
@@ -222,7 +214,7 @@ def nearest(vertices: Floats, counts: Integers, point: Floats, out: Floats) -> N
 
 
 @compiled
-def support(vertices: Floats, counts: Integers, direction: Floats, out: Floats) -> None:
+def support(vertices: Floats, counts: Integers, out: Floats, direction: Floats) -> None:
     """Support functions and support vectors."""
     for i in range(counts.size):
         if counts[i] == 0:
@@ -236,14 +228,14 @@ def support(vertices: Floats, counts: Integers, direction: Floats, out: Floats) 
 
 
 @compiled
-def margin(vertices: Floats, counts: Integers, point: Floats, out: Floats) -> None:
+def margin(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
     """Signed distances of points from the boundaries."""
     for i in range(counts.size):
         out[i, 0] = polygon.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
 
 
 @compiled
-def size(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
+def size(vertices: Floats, counts: Integers, out: Floats) -> None:
     """Areas and diameters."""
     for i in range(counts.size):
         out[i, 0] = polygon.area(vertices[i], counts[i])
@@ -251,7 +243,7 @@ def size(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> Non
 
 
 @compiled
-def centroid(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
+def centroid(vertices: Floats, counts: Integers, out: Floats) -> None:
     """Centroids."""
     for i in range(counts.size):
         if counts[i] > 0:
@@ -259,7 +251,7 @@ def centroid(vertices: Floats, counts: Integers, unused: Floats, out: Floats) ->
 
 
 @compiled
-def largest_disc(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
+def largest_disc(vertices: Floats, counts: Integers, out: Floats) -> None:
     """Centres and radii of largest discs."""
     for i in range(counts.size):
         if counts[i] > 0:

@@ -74,8 +74,7 @@ def shadow(
     for _ in range(_MOST_ROUNDS):
         hull = Polytope.from_vertices(points, _FLAT)
         size = max(float(np.ptp(points, axis=0).max()), 1e-12 * float(np.abs(points).max()))
-        rows = np.vstack([hull.normals, hull.across, -hull.across])
-        limits = np.concatenate([hull.offsets, hull.levels, -hull.levels])
+        rows, limits = hull.constraints()
         if len(rows) > most_facets:
             raise ArithmeticError(f"the projection has over {most_facets} facets")
         new = []

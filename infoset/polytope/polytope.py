@@ -21,8 +21,7 @@ from infoset._set_arguments import (
 )
 from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, real_values
-from infoset.polytope._measures import largest_ball, simplices_of, volume_of
-from infoset.polytope._nearest import nearest_difference
+from infoset.polytope._measures import largest_ball, nearest_difference, simplices_of, volume_of
 from infoset.polytope._scaling import scale_of, scale_of_box, scaled_rows, tightened, without_far
 from infoset.polytope.arrays import PolytopeArrays
 from infoset.renamed import renamed
@@ -117,8 +116,8 @@ class Polytope(PolytopeArrays):
             return self
         if other.is_empty:
             raise ValueError("the difference with an empty set is unbounded")
-        rows = np.vstack([self.normals, self.across, -self.across])
-        limits = np.concatenate([self.offsets, self.levels, -self.levels]) - other.support_function(rows)
+        rows, limits = self.constraints()
+        limits = limits - other.support_function(rows)
         most, least = np.split(limits[len(self.normals) :], 2)
         size = max(float(np.abs(one.vertices).max()) for one in (self, other))
         if (most + least < -_FLAT_WIDTH * size).any():
@@ -228,8 +227,7 @@ class Polytope(PolytopeArrays):
         if self.is_empty or len(self.normals) <= cap:
             return self
         outer = self.from_box(*self.bounding_box())
-        rows = np.vstack([self.normals, self.across, -self.across])
-        limits = np.concatenate([self.offsets, self.levels, -self.levels])
+        rows, limits = self.constraints()
         for _ in range(cap):
             beyond = outer.support_function(rows) - limits
             worst = int(beyond.argmax())
