@@ -11,7 +11,7 @@ from guidance.estimate import MissEstimate, constant_error_m, correct_outside_de
 from guidance.situation import Situation
 from infoset import RangeSensor
 from infoset.arrays import Floats
-from infoset.limits import COUNT, NotNegative, check_fields
+from infoset.limits import COUNT, Checked, NotNegative
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a state: lateral offset, its rate, range, closing speed and lateral acceleration."""
@@ -178,7 +178,7 @@ class KalmanBank:
 
 
 @dataclass(frozen=True)
-class Kalman:
+class Kalman(Checked):
     """Estimate as if errors were Gaussian, and correct the part of the expected miss outside a dead zone.
 
     Parameters
@@ -208,9 +208,6 @@ class Kalman:
     process_noise: NotNegative = 1.0
 
     name: ClassVar[str] = "kalman"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def start(self, batch: int) -> KalmanBank:
         """Start with empty filters; the first step sets their prior."""

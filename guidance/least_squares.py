@@ -11,7 +11,7 @@ from guidance.estimate import MissEstimate, constant_error_m, correct_outside_de
 from guidance.situation import Situation
 from infoset import RangeSensor
 from infoset.arrays import Flags, Floats
-from infoset.limits import COUNT, NotNegative, check_fields
+from infoset.limits import COUNT, Checked, NotNegative
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a start: lateral offset, its rate, range and closing speed at t = 0, and lateral acceleration."""
@@ -223,7 +223,7 @@ class LeastSquaresFit:
 
 
 @dataclass(frozen=True)
-class LeastSquares:
+class LeastSquares(Checked):
     """Fit one motion to all measurements, and correct the part of its miss outside a dead zone.
 
     Parameters
@@ -249,9 +249,6 @@ class LeastSquares:
     iterations: Annotated[int, COUNT] = 3
 
     name: ClassVar[str] = "least-squares"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def start(self, batch: int) -> LeastSquaresFit:
         """Start without measurements."""

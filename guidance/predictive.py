@@ -11,7 +11,7 @@ from guidance.estimate import Estimator, EstimatorKind
 from guidance.kalman import KalmanBank
 from guidance.situation import Situation
 from infoset.arrays import Floats
-from infoset.limits import Limits, check_fields
+from infoset.limits import Checked, Limits
 
 _SPACING = Limits(above=1.0)
 
@@ -28,7 +28,7 @@ class ManoeuvreState:
 
 
 @dataclass(frozen=True)
-class Predictive:
+class Predictive(Checked):
     """Correct the whole estimated zero-effort miss, at a few times before the arrival.
 
     Parameters
@@ -69,9 +69,6 @@ class Predictive:
 
     estimator: EstimatorKind = KalmanBank
     spacing: Annotated[float, _SPACING] = 1.5
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def start(self, batch: int) -> ManoeuvreState:
         """Start before the first manoeuvre."""

@@ -11,7 +11,7 @@ from guidance.estimate import Estimator, EstimatorKind
 from guidance.kalman import KalmanBank
 from guidance.situation import Situation
 from infoset.arrays import Floats
-from infoset.limits import Limits, NotNegative, check_fields
+from infoset.limits import Checked, Limits, NotNegative
 
 _RATIO = Limits(above=2.0)
 
@@ -27,7 +27,7 @@ class PulseState:
 
 
 @dataclass(frozen=True)
-class ProportionalNavigation:
+class ProportionalNavigation(Checked):
     """Command an acceleration proportional to the rate of the line of sight, in pulses with a dead band.
 
     Parameters
@@ -71,9 +71,6 @@ class ProportionalNavigation:
     is_augmented: bool = False
     ratio: Annotated[float, _RATIO] = 3.0
     dead_band_m_s: NotNegative | None = None
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def start(self, batch: int) -> PulseState:
         """Start without commands."""

@@ -135,6 +135,13 @@ def check_fields(owner: object) -> None:
         rule.check(getattr(owner, rule.field))
 
 
+class Checked:
+    """A dataclass whose constructor calls `check_fields`."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
 @cache
 def _rules(owner: type) -> tuple[_Rule, ...]:
     hints = get_type_hints(owner, include_extras=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats
-from infoset.limits import ADDED_LATER, Fraction, NotNegative, Part, Positive, check_fields
+from infoset.limits import ADDED_LATER, Checked, Fraction, NotNegative, Part, Positive, check_fields
 
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
 Measurements = Mapping[str, Floats]
@@ -452,7 +452,7 @@ def _direction(alpha_rad: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class RangeSensor(Sensor):
+class RangeSensor(Checked, Sensor):
     """A range meter with a bounded relative error.
 
     Parameters
@@ -474,9 +474,6 @@ class RangeSensor(Sensor):
 
     period_s: Positive
     relative_error: Fraction
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def true_value(self, sight: Geometry) -> Floats:
         """Return the range, m."""
@@ -500,7 +497,7 @@ class RangeSensor(Sensor):
 
 
 @dataclass(frozen=True)
-class RateSensor(Sensor):
+class RateSensor(Checked, Sensor):
     """A sensor of the line of sight's angular rate with a bounded error.
 
     Parameters
@@ -521,9 +518,6 @@ class RateSensor(Sensor):
 
     period_s: Positive
     error_rad_s: Positive
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def true_value(self, sight: Geometry) -> Floats:
         """Return the rate of the line of sight, rad/s."""

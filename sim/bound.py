@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ FEW_CANDIDATES = 16
 """Number of last common steps up to which all are tried: between few impulses, the bound has several maxima."""
 STEPS_A_BLOCK = 8
 """Acceleration is constant over blocks of an eighth of the time to the last common measurement."""
+_BOUND, _UNLIMITED = attrgetter("bound_m"), attrgetter("unlimited_bound_m")
 
 
 class BoundError(RuntimeError):
@@ -65,7 +67,12 @@ class TruthPair:
     @property
     def bound_m(self) -> float:
         """Miss that at least one of the two has with any strategy, m."""
-        return max(0.0, 0.5 * self.apart_m - self.correction_m)
+        return max(0.0, self.unlimited_bound_m)
+
+    @property
+    def unlimited_bound_m(self) -> float:
+        """The bound without its limit at zero, m."""
+        return 0.5 * self.apart_m - self.correction_m
 
     @property
     def arrival_s(self) -> float:
@@ -182,7 +189,7 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
                 # Refine around the best label: half a width to each side, repeatedly.
                 width *= 0.5 if (index - len(grid)) % 2 == 0 else 1.0
                 side = 1.0 if (index - len(grid)) % 2 else -1.0
-                label_m = max(tried, key=_bound_m).label_m + side * width
+                label_m = max(tried, key=_BOUND).label_m + side * width
                 labels.append(min(max(label_m, model.bounds.x_m[0]), model.bounds.x_m[1]))
             pair = pair_at(scenario, labels[index], speed, try_first_before_s=before_s)
             before_s = pair.arrival_s - pair.last_common_step * model.step_s
@@ -191,17 +198,13 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
             done += 1
             if progress is not None:
                 progress(done / total)
-        best.append(max(tried, key=_bound_m))
-    best.sort(key=_bound_m, reverse=True)
+        best.append(max(tried, key=_BOUND))
+    best.sort(key=_BOUND, reverse=True)
     return LowerBound(
         tuple(best),
         tuple(pair for _, pair in sorted(by_label.items(), key=lambda item: item[0])),
         model.disturbance_m_s2,
     )
-
-
-def _bound_m(pair: TruthPair) -> float:
-    return pair.bound_m
 
 
 def label_grid(scenario: Scenario, vx_m_s: float) -> Floats:
@@ -232,22 +235,17 @@ def pair_at(
     approach = _Approach(scenario, label_m, vx_m_s)
     if last_common_step is not None:
         pairs = [approach.pair(last_common_step, axes) for axes in approach.choices]
-        return max(pairs, key=_unlimited_bound_m)
+        return max(pairs, key=_UNLIMITED)
     candidates = approach.candidates
     if scenario.thruster.impulses_s and len(candidates) <= FEW_CANDIDATES:
         every = [approach.pair(step, axes) for axes in approach.choices for step in candidates.tolist()]
-        return max(every, key=_unlimited_bound_m)
+        return max(every, key=_UNLIMITED)
     start = len(candidates) - 1
     if try_first_before_s is not None:
         wanted = (approach.arrival_s - try_first_before_s) / scenario.set_model.step_s
         start = int(np.abs(candidates - wanted).argmin())
     pairs = [_climb(partial(approach.pair, axes=axes), candidates, start) for axes in approach.choices]
-    return max(pairs, key=_unlimited_bound_m)
-
-
-def _unlimited_bound_m(pair: TruthPair) -> float:
-    """Return the bound without its limit at zero, m."""
-    return 0.5 * pair.apart_m - pair.correction_m
+    return max(pairs, key=_UNLIMITED)
 
 
 def _climb(pair_of: Callable[[int], TruthPair], candidates: Integers, start: int) -> TruthPair:
@@ -262,7 +260,7 @@ def _climb(pair_of: Callable[[int], TruthPair], candidates: Integers, start: int
             return -np.inf
         if index not in known:
             known[index] = pair_of(int(candidates[index]))
-        return _unlimited_bound_m(known[index])
+        return known[index].unlimited_bound_m
 
     at, stride = start, 1
     while stride:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.limits import Fraction, Positive, check_fields
-from sim.statistics import estimate_hits, number_text, shows
+from infoset.limits import Checked, Fraction, Positive
+from sim.statistics import estimate_hits, least_count, number_text, shows
 from sim.stopping_rule import DIGITS, NUMBER, QUANTITIES, QuantileName, parse_quantile
 
 CONFIDENCE = 0.95
@@ -48,7 +48,7 @@ class Decision(Enum):
 
 
 @dataclass(frozen=True)
-class Requirement:
+class Requirement(Checked):
     """An upper bound of a quantile, in the unit of its quantity, written `miss_m p99<10`.
 
     It is a requirement on a share of the runs: at least 99 % of the misses are less than 10 m.
@@ -57,8 +57,8 @@ class Requirement:
     quantile: QuantileName
     bound: Positive
 
-    def __post_init__(self) -> None:
-        check_fields(self)
+    unknown: ClassVar[float] = math.inf
+    """Value of a run without the quantity, for example without a bound Phi: it does not satisfy the bound."""
 
     def __str__(self) -> str:
         return f"{self.quantile}<{number_text(self.bound)}"
@@ -85,47 +85,28 @@ class Requirement:
         """Column of the results that it uses."""
         return self.quantile.quantity
 
-    @property
-    def unknown(self) -> float:
-        """Value of a run without the quantity, for example without a bound Phi: it does not satisfy the bound."""
-        return math.inf
-
     def holds(self, values: Floats) -> Flags:
         """Return for each of the quantity's `values` whether it is below the bound."""
         return np.asarray(values < self.bound)
 
 
 @dataclass(frozen=True)
-class HitRequirement:
+class HitRequirement(Checked):
     """A lower bound of the probability of a hit, written `hit>=0.95`: the least share of the runs that hit."""
 
     share: Fraction
 
-    def __post_init__(self) -> None:
-        check_fields(self)
+    name: ClassVar[str] = "hit"
+    quantity: ClassVar[str] = "hit"
+    unknown: ClassVar[float] = 0.0
 
     def __str__(self) -> str:
         return f"hit>={number_text(self.share)}"
 
     @property
-    def name(self) -> str:
-        """Name of what is bounded."""
-        return self.quantity
-
-    @property
-    def quantity(self) -> str:
-        """Column of the results that it uses."""
-        return "hit"
-
-    @property
     def bound(self) -> float:
         """Bound of the probability."""
         return self.share
-
-    @property
-    def unknown(self) -> float:
-        """Value of a run without the quantity."""
-        return 0.0
 
     def holds(self, values: Floats) -> Flags:
         """Return for each of the `values` of the column, 0 or 1, whether the run hits."""
@@ -333,21 +314,11 @@ def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Integers
 @functools.lru_cache(maxsize=32)
 def _critical_counts(first: int, last: int, share: float, watched: bool) -> tuple[Integers, Integers]:
     runs = np.arange(first, last + 1)
-    fewest_met = _least(runs, lambda count: p_values(runs, count, share, watched=watched)[0] <= _TAIL)
-    most_missed = _least(runs, lambda count: p_values(runs, count, share, watched=watched)[1] > _TAIL) - 1
+    fewest_met = least_count(runs, lambda count: p_values(runs, count, share, watched=watched)[0] <= _TAIL)
+    most_missed = least_count(runs, lambda count: p_values(runs, count, share, watched=watched)[1] > _TAIL) - 1
     for counts in (fewest_met, most_missed):
         counts.setflags(write=False)
     return fewest_met, most_missed
-
-
-def _least(most: Integers, is_enough: Callable[[Integers], Flags]) -> Integers:
-    """Return the least count from 0 to `most` that is enough, or `most` + 1; greater counts are enough too."""
-    low, high = np.zeros_like(most), most + 1
-    while (low < high).any():
-        middle = np.minimum((low + high) // 2, most)
-        enough = is_enough(middle)
-        low, high = np.where(enough | (low >= high), low, middle + 1), np.where(enough, np.minimum(middle, high), high)
-    return low
 
 
 def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike, *, watched: bool) -> tuple[Floats, Floats]:

@@ -10,7 +10,7 @@ from typing import Annotated
 from guidance.noise import NoiseKind, TieRule
 from guidance.strategy import Strategy
 from guidance.thruster import Thruster
-from infoset.limits import ADDED_LATER, Limits, NotNegative, Positive, check_fields
+from infoset.limits import ADDED_LATER, Checked, Limits, NotNegative, Positive, check_fields
 from infoset.model import SetModel, StateBox
 from infoset.sensors import RangeSensor, RateSensor, Sensor
 
@@ -19,7 +19,7 @@ _ELEVATION = Limits(least=-0.5 * math.pi, most=0.5 * math.pi)
 
 
 @dataclass(frozen=True)
-class Sun:
+class Sun(Checked):
     """The attracting body of both spacecraft and object.
 
     Parameters
@@ -39,9 +39,6 @@ class Sun:
     direction_rad: Annotated[float, _DIRECTION]
     elevation_rad: Annotated[float, _ELEVATION] = field(default=0.0, metadata=ADDED_LATER)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 class Manoeuvre(Enum):
     """How the target accelerates along z, within its bound.
@@ -58,7 +55,7 @@ class Manoeuvre(Enum):
 
 
 @dataclass(frozen=True)
-class Target:
+class Target(Checked):
     """A target that manoeuvres.
 
     Parameters
@@ -76,18 +73,12 @@ class Target:
     switching_period_s: Positive = 10.0
     acceleration_y_m_s2: NotNegative | None = field(default=None, metadata=ADDED_LATER)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Body:
+class Body(Checked):
     """The size of the object, a sphere: an engagement hits if its miss is at most `radius_m`, m."""
 
     radius_m: Positive
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)

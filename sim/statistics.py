@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from statistics import NormalDist
@@ -11,7 +11,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.arrays import Floats
+from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import COUNT, FRACTION, Limits, real_values
 
 
@@ -215,13 +215,16 @@ def _least_count(size: int, level: float, probability: float) -> int:
     """Return the least k such that a binomial variable is at most k with at least this probability."""
     from scipy.special import bdtr  # slow to load, and few commands need it
 
-    low, high = 0, size
-    while low < high:
-        middle = (low + high) // 2
-        if bdtr(middle, size, level) >= probability:
-            high = middle
-        else:
-            low = middle + 1
+    return int(least_count(np.array(size), lambda count: bdtr(count, size, level) >= probability))
+
+
+def least_count(most: Integers, is_enough: Callable[[Integers], Flags]) -> Integers:
+    """Return the least count from 0 to `most` that is enough, or `most` + 1; greater counts are enough too."""
+    low, high = np.zeros_like(most), most + 1
+    while (low < high).any():
+        middle = np.minimum((low + high) // 2, most)
+        enough = is_enough(middle)
+        low, high = np.where(enough | (low >= high), low, middle + 1), np.where(enough, np.minimum(middle, high), high)
     return low
 
 

@@ -11,7 +11,7 @@ from decimal import Decimal
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.limits import Fraction, Positive, check_fields
+from infoset.limits import Checked, Fraction, Positive, check_fields
 from sim.statistics import estimate_quantiles, level_name, number_text
 
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
@@ -48,7 +48,7 @@ class QuantileName:
 
 
 @dataclass(frozen=True)
-class StoppingRule:
+class StoppingRule(Checked):
     """Stop when the confidence interval of a quantile is narrower than a width, written `miss_m p99 ci<0.5`.
 
     The width is in the unit of the quantity, the `confidence` of the interval in (0, 1).
@@ -57,9 +57,6 @@ class StoppingRule:
     quantile: QuantileName
     width: Positive
     confidence: Fraction = 0.95
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def __str__(self) -> str:
         return f"{self.quantile} ci<{number_text(self.width)}"
