@@ -77,7 +77,6 @@ class CampaignWriter(CampaignFolder):
         file = self.path / SHARDS / f"chunk-{chunk.index:07d}-{zlib.crc32(content):08x}.parquet"
         write_whole(file, content)
         self._files[chunk.index] = file
-        self._checked.add(chunk.index)
 
     def discard_damaged(self) -> None:
         """Delete the damaged shards, so that their chunks are simulated again."""
