@@ -15,12 +15,11 @@ from typer.core import TyperGroup
 from experiments.campaigns.command import Campaign, Report, Sweep
 from experiments.common.command import command
 from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
+from experiments.files_command import problems, scenarios
 from experiments.interception.command import Adversary, Bound, Compare, Engage, Experiment, Replay
-from experiments.interception.scenarios_command import app as scenarios
 from experiments.multipoint.command import Multipoint
 from experiments.observer.command import Observe
 from experiments.pareto.command import Pareto
-from experiments.problems_command import app as problems
 from experiments.pursuit.command import Pursuit, PursuitMap
 from experiments.reachability.command import Reach
 from experiments.reproduce import Reproduce

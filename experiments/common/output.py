@@ -170,16 +170,6 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
         replace_file(file, content.encode() if isinstance(content, str) else content)
 
 
-def write_template(file: Path, content: str, next_steps: str, *, overwrite: bool, quiet: bool) -> None:
-    """Write a template and print what to do with it; the path ``-`` is stdout."""
-    if str(file) == STDOUT:
-        typer.echo(content, nl=False)
-        return
-    write_file(file, content, overwrite=overwrite)
-    if not quiet:
-        typer.echo(f"wrote {file}; edit it, then: {next_steps}")
-
-
 def library_version() -> str:
     """Return the version of the installed distribution."""
     return version("infoset")

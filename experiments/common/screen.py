@@ -5,18 +5,16 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import typer
 from rich.cells import cell_len
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-from rich.table import Column, Table
+from rich.table import Table
 from rich.text import Text
 
 from experiments.common.errors import on_a_screen
-from experiments.common.output import to_json
 from sim.statistics import level_name, shows
 
 BeginProgress = Callable[[str], Callable[[float], None]]
@@ -169,28 +167,3 @@ def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[
     needed = max(round(1.0 / min(level, 1.0 - level)) for level in hidden)
     each = f" of each noise (--runs {noises * needed})" if noises > 1 else ""
     return [f"{runs} runs are too few for {', '.join(map(level_name, hidden))}; {needed} runs{each} show all quantiles"]
-
-
-def show_built_in(rows: Sequence[Mapping[str, str]], json: bool, quiet: bool) -> None:
-    """Print the built-in scenarios or problems: as JSON, as names alone, or as a table."""
-    if json:
-        typer.echo(to_json(rows), nl=False)
-    elif quiet:
-        typer.echo("\n".join(row["name"] for row in rows))
-    else:
-        *first, description = rows[0]
-        table = Table(*(Column(title, no_wrap=True) for title in first), description, box=None, pad_edge=False)
-        for row in rows:
-            table.add_row(*row.values())
-        table_console(False).print(table)
-
-
-def show_checked(summary: Mapping[str, Any], fingerprint: str, json: bool, quiet: bool) -> None:
-    """Print that a file is valid, with its name, its fingerprint and its warnings, or the summary as JSON."""
-    if json:
-        typer.echo(to_json(summary), nl=False)
-    elif not quiet:
-        console = Console(soft_wrap=True)
-        console.print(Text.assemble(("ok", "bold green"), f"  {summary['name']}  {fingerprint}"))
-        for warning in summary["warnings"]:
-            console.print(Text.assemble(("warning: ", "yellow"), warning))

@@ -13,7 +13,7 @@ from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in_files
 from experiments.common.problem_file import problem_toml
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import keys_of, tables_of
-from experiments.problem_files import FILES
+from experiments.files import form_and_loader
 
 Infoset = Callable[..., tuple[int, str, str]]
 KINDS = list(PROBLEM_COMMANDS)
@@ -35,7 +35,7 @@ def test_a_template_is_valid_and_solved_by_its_command(kind: str, infoset: Infos
 def test_a_template_has_every_key_and_optional_keys_have_their_defaults(
     kind: str, infoset: Infoset, tmp_path: Path
 ) -> None:
-    form, load = FILES[kind]
+    form, load = form_and_loader(kind)
     infoset("problems", "new", PROBLEM_COMMANDS[kind], "mine.toml")
     lines = (tmp_path / "mine.toml").read_text().splitlines()
     problem, seen = load("mine.toml"), set()
@@ -144,7 +144,7 @@ def test_records_campaigns_and_toml_files_are_told_apart(infoset: Infoset, tmp_p
 
 @pytest.mark.parametrize("name", [file.name for file in built_in_files().values() if file.kind in PROBLEM_COMMANDS])
 def test_the_written_problem_is_the_changed_one(name: str, tmp_path: Path) -> None:
-    form, load = FILES[built_in_files()[name].kind]
+    form, load = form_and_loader(built_in_files()[name].kind)
     tables = load_tables(form, name, ["name=mine"])
     (tmp_path / "problem.toml").write_text(problem_toml(tables))
     again = load_tables(form, tmp_path / "problem.toml")

@@ -11,6 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from experiments.common.errors import InputError
+from experiments.files_command import scenarios
 from experiments.interception.scenario_file import (
     load_scenario,
     scenario_hash,
@@ -18,7 +19,6 @@ from experiments.interception.scenario_file import (
     scenario_template,
     scenario_text,
 )
-from experiments.interception.scenarios_command import app
 
 NAMES = list(scenario_names())
 
@@ -26,7 +26,7 @@ NAMES = list(scenario_names())
 def root() -> typer.Typer:
     """The command as `infoset` mounts it."""
     outer = typer.Typer()
-    outer.add_typer(app, name="scenarios")
+    outer.add_typer(scenarios, name="scenarios")
 
     @outer.callback()
     def infoset() -> None:
@@ -217,7 +217,7 @@ def test_help_has_an_example(command: list[str]) -> None:
 
 def test_importing_the_command_imports_nothing_heavy() -> None:
     heavy = ["numpy", "pydantic", "rich", "numba", "matplotlib", "experiments.interception.scenario_file"]
-    module = "experiments.interception.scenarios_command"
+    module = "experiments.files_command"
     code = f"import {module}, sys; print([each for each in {heavy} if each in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"

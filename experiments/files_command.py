@@ -1,0 +1,93 @@
+"""The commands `infoset scenarios` and `infoset problems`, which list, show, check and create files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.common.command import loaded
+from experiments.common.options import AsJson, Overwrite, Quiet
+
+MODULE = "experiments.files"
+
+BuiltInName = Annotated[str, typer.Argument(help="A built-in name.")]
+FileName = Annotated[str, typer.Argument(help="A file, or a built-in name.")]
+NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
+
+
+def _commands(noun: str, built_in: str, text: str, example: str) -> typer.Typer:
+    """Return the commands that list, show and check files; `built_in` and `example` are for their examples."""
+    name = f"infoset {noun}s"
+    app = typer.Typer(name=f"{noun}s", epilog=f"Example: {name} {example}")
+
+    @app.callback(invoke_without_command=True, help=text)
+    def default(context: typer.Context, json: AsJson = False, quiet: Quiet = False) -> None:
+        if context.invoked_subcommand is None:
+            list_files(json=json, quiet=quiet)
+        elif json or quiet:
+            raise typer.BadParameter(f"put --json and --quiet after {context.invoked_subcommand!r}")
+
+    @app.command(
+        "list",
+        help=f"List the built-in {noun}s; with --quiet, print only their names.",
+        epilog=f"Example: {name} list --json",
+    )
+    def list_files(json: AsJson = False, quiet: Quiet = False) -> None:
+        loaded(MODULE, quiet).list_files(noun, json, quiet)
+
+    @app.command(
+        help=f"Print the file of a built-in {noun}, including its comments.",
+        epilog=f"Example: {name} show {built_in} > mine.toml",
+    )
+    def show(name: BuiltInName) -> None:
+        loaded(MODULE, False).show(noun, name)
+
+    @app.command(
+        help=f"Check a {noun} file. The exit code is 0 if it is valid; otherwise it is 2, and all errors are listed.",
+        epilog=f"Example: {name} check mine.toml",
+    )
+    def check(file: FileName, json: AsJson = False, quiet: Quiet = False) -> None:
+        loaded(MODULE, quiet).check(noun, file, json, quiet)
+
+    return app
+
+
+scenarios = _commands(
+    "scenario",
+    "asteroid-1997",
+    "List, show and check scenarios, and create a scenario file. Without a command, list the built-in scenarios.",
+    "new mine.toml",
+)
+problems = _commands(
+    "problem",
+    "pareto-2008",
+    "List, show and check problems of rendezvous, pursuit and estimation, and create a problem file.\n\n"
+    "Without a command, list the built-in problems.",
+    "new multipoint mine.toml",
+)
+
+
+@scenarios.command("new", epilog="Example: infoset scenarios new mine.toml")
+def new_scenario(file: NewFile, overwrite: Overwrite = False, quiet: Quiet = False) -> None:
+    """Write a scenario file with a comment on every key, as a template for your own scenario."""
+    loaded(MODULE, quiet).new(None, file, overwrite, quiet)
+
+
+@problems.command("new", epilog="Example: infoset problems new multipoint mine.toml")
+def new_problem(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND",
+            help="Kind of the problem: pareto-encounter, multipoint, reachable-rendezvous, pursuit-evasion or "
+            "observer; or the command that takes it, for example reach.",
+        ),
+    ],
+    file: NewFile,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a problem file with a comment on every key, as a template for your own problem."""
+    loaded(MODULE, quiet).new(kind, file, overwrite, quiet)
