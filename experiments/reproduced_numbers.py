@@ -9,7 +9,7 @@ from itertools import groupby
 import typer
 from rich.text import Text
 
-from experiments.common.output import library_version, output, to_json
+from experiments.common.output import library_version, output_of, to_json
 from experiments.common.published_number import Origin, PublishedNumber, Reproduction, Verdict
 from experiments.common.screen import Part, print_parts, progress_bar, table_console
 from experiments.papers import PAPERS, reproduce_paper
@@ -22,10 +22,7 @@ DISAGREED = 1
 def run(options: Reproduce) -> None:
     """Compute the numbers, write the file and print the tables."""
     papers = PAPERS if options.paper is None else (options.paper,)
-    with (
-        output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
-        progress_bar(options.quiet) as begin,
-    ):
+    with output_of(options) as written, progress_bar(options.quiet) as begin:
         reproductions = [reproduce_paper(name, begin(name)) for name in papers]
         summary = {"version": library_version(), "papers": [_summary(each) for each in reproductions]}
         written.deliver("--json", to_json(summary))

@@ -10,7 +10,7 @@ from experiments.campaigns.command import Campaign as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, campaign_errors, duration, fly, scenario_of
 from experiments.campaigns.samples import game_notes, heading, sample_json, samples, samples_table, stop_notes
 from experiments.common.errors import InputError
-from experiments.common.output import Output, output, to_json
+from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import Part, show
 from experiments.interception.choices import own_strategy
 from sim import Campaign, CampaignNoise, StoppingRule
@@ -23,7 +23,7 @@ def run(options: Options) -> None:
     """Simulate the campaign, write its summary and print the tables."""
     with (
         campaign_errors(RESUME_HINT),
-        output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
+        output_of(options) as written,
     ):
         need_arrow()
         scenario, model_notes = scenario_of(options)

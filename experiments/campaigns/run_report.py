@@ -34,7 +34,7 @@ from experiments.campaigns.sweep_report import default_requirement, figure_names
 from experiments.campaigns.sweep_table import TABLE
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
-from experiments.common.output import Output, output, to_json
+from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, progress_bar, say, show
 from experiments.interception.figures.b_plane import Cloud, draw_b_plane, greatest_guarantee
 from experiments.interception.scenario_file import scenario_to_toml
@@ -55,13 +55,7 @@ def run(options: Report) -> None:
         swept = bool(folder.manifest.axes)
         campaign_figures = (*FIGURES, B_PLANE) if folder.manifest.scenario.is_spatial else FIGURES
         figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*campaign_figures)
-        with output(
-            folder=options.out,
-            names=[*figures, "report.json", SCENARIO_FILE],
-            files={"--json": options.json},
-            overwrite=options.overwrite,
-            quiet=options.quiet,
-        ) as written:
+        with output_of(options, [*figures, "report.json", SCENARIO_FILE]) as written:
             with progress_bar(options.quiet) as begin:
                 parts = (_report_sweep if swept else _report_campaign)(folder, options, written, begin)
                 written.save(SCENARIO_FILE, scenario_to_toml(folder.manifest.scenario))

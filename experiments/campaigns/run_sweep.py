@@ -11,7 +11,7 @@ from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_er
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_report import default_requirement, quantile_options, sweep_report
 from experiments.common.errors import InputError
-from experiments.common.output import Output, output, to_json
+from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import say, show
 from experiments.interception.choices import own_strategy
 from sim import CampaignNoise, Sweep
@@ -27,7 +27,7 @@ def run(options: Options) -> None:
     """Simulate the sweep, write its table and figure, and print where the requirement is met."""
     with (
         campaign_errors(RESUME_HINT),
-        output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
+        output_of(options) as written,
     ):
         need_arrow()
         scenario, notes = scenario_of(options)

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from experiments.common.options import FileOptions
     from sim import HitEstimate, Results
 
 STDOUT = "-"
@@ -95,21 +94,19 @@ class Output:
 
 
 @contextlib.contextmanager
-def output(
-    *,
-    folder: Path | None = None,
-    names: Sequence[str] = (),
-    files: Mapping[str, Path | None] | None = None,
-    overwrite: bool = False,
-    quiet: bool = False,
+def output_of(
+    options: Any, names: Sequence[str] = (), files: Mapping[str, Path | None] | None = None
 ) -> Iterator[Output]:
     """Check every file that a command will write before the work begins, and list them on stderr at the end.
 
-    A file of `names` is written into `folder`, which is created; if the work fails, it is removed again as long as it
-    is empty. `files` are single files by the option that names them; the path ``-`` is stdout, which only one may be.
-    Raise `InputError` if a file cannot be written, or would replace an existing one without `overwrite`.
+    The files `names` are written into the folder of ``--out``, which is created; if the work fails, it is removed again
+    as long as it is empty. Single files are those of ``--json``, ``--csv`` and ``--html``, and further ones by the
+    option that names them; the path ``-`` is stdout, which only one may be. Raise `InputError` if a file cannot be
+    written, or would replace an existing one without ``--overwrite``.
     """
-    single = {option: path for option, path in (files or {}).items() if path is not None}
+    folder = options.out if names else None
+    given = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")} | dict(files or {})
+    single = {option: path for option, path in given.items() if path is not None}
     printed = [option for option, path in single.items() if str(path) == STDOUT]
     if len(printed) > 1:
         raise InputError(f"{' and '.join(printed)} cannot both be printed on stdout; name a file for one of them")
@@ -119,28 +116,20 @@ def output(
     owners: dict[Path, str] = {}
     try:
         if folder is not None:
-            _make_folder(folder, overwrite, created)
+            _make_folder(folder, options.overwrite, created)
         for option, path in wanted:
-            _check_file(path, overwrite)
+            _check_file(path, options.overwrite)
             owner = f"the file of {option}" if option else "a file of --out"
             if (other := owners.setdefault(path.resolve(), owner)) != owner:
                 raise InputError(f"{option}: {path} is also {other}; choose another name")
-        opened = Output(folder, single, overwrite)
+        opened = Output(folder, single, options.overwrite)
         yield opened
     finally:
         for path in reversed(created):
             with contextlib.suppress(OSError):
                 path.rmdir()
-    if opened.written and not quiet:
+    if opened.written and not options.quiet:
         typer.echo(on_a_screen("\n".join(_listed(opened.written))), err=True)
-
-
-def output_of(
-    options: FileOptions, names: Sequence[str], files: Mapping[str, Path | None] | None = None
-) -> contextlib.AbstractContextManager[Output]:
-    """Return the `output` of a command that writes files of these names with ``--out``, and single files."""
-    single = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")} | dict(files or {})
-    return output(folder=options.out, names=names, files=single, overwrite=options.overwrite, quiet=options.quiet)
 
 
 def _listed(files: Sequence[Path]) -> Iterator[str]:

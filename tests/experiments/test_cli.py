@@ -19,7 +19,8 @@ import pytest
 from experiments.cli import COMMANDS
 from experiments.common.command import LOADING
 from experiments.common.errors import InputError
-from experiments.common.output import output, to_csv, to_json, write_file
+from experiments.common.options import FileOptions
+from experiments.common.output import output_of, to_csv, to_json, write_file
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
 from infoset import kernels
 from sim import Scenario, simulate
@@ -429,7 +430,7 @@ def test_a_folder_that_may_not_be_written_is_found_before_the_work(
 
 def test_a_folder_made_for_work_that_failed_is_taken_away(tmp_path: Path) -> None:
     def work() -> None:
-        with output(folder=tmp_path / "a" / "b"):
+        with output_of(FileOptions(out=tmp_path / "a" / "b"), ["x"]):
             assert (tmp_path / "a" / "b").is_dir()
             raise RuntimeError("no")
 

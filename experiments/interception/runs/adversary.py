@@ -34,10 +34,7 @@ def run(options: Adversary) -> None:
     own = own_strategy(options.strategy, scenario)
     times_s = read_times(options.times, options.out)
     names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(*FIGURES))
-    with (
-        output_of(options, names, {"--record": options.record}) as written,
-        progress_bar(options.quiet) as begin,
-    ):
+    with output_of(options, names, {"--record": options.record}) as written, progress_bar(options.quiet) as begin:
         say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
         worst = find_worst_misses(scenario, own, budget=options.budget, seed=options.seed, begin=begin)

@@ -88,10 +88,8 @@ def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
     scenario, notes = study_scenario(options)
     strategies = chosen_strategies(scenario, options.strategies)
-    with (
-        output_of(options, ("scenario.toml", "results.json", *figure_files(FIGURE))) as written,
-        progress_bar(options.quiet) as begin,
-    ):
+    names = ("scenario.toml", "results.json", *figure_files(FIGURE))
+    with output_of(options, names) as written, progress_bar(options.quiet) as begin:
         say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
         try:

@@ -42,12 +42,8 @@ def run(options: Compare) -> None:
     scenario, notes = study_scenario(options)
     strategies = chosen_strategies(scenario, options.strategies)
     b_planes = B_PLANE if scenario.is_spatial else {}
-    with (
-        output_of(
-            options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, *b_planes.values()))
-        ) as written,
-        progress_bar(options.quiet) as begin,
-    ):
+    names = ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, *b_planes.values()))
+    with output_of(options, names) as written, progress_bar(options.quiet) as begin:
         say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
         reports = {name: begin(name) for name in strategies}

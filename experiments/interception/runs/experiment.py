@@ -52,13 +52,8 @@ def run(options: Experiment) -> None:
     scenario = scenario_with(options)
     own = own_strategy(options.strategy, scenario)
     b_planes = B_PLANE if scenario.is_spatial else {}
-    with (
-        output_of(
-            options,
-            ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, CORRIDOR, *b_planes.values())),
-        ) as written,
-        progress_bar(options.quiet) as begin,
-    ):
+    names = ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, CORRIDOR, *b_planes.values()))
+    with output_of(options, names) as written, progress_bar(options.quiet) as begin:
         say_warnings(scenario_warnings(scenario), options.quiet)
         if scenario.range_sensor is None:
             say(f"{scenario.name} has no [range_sensor]: curves 1 and 3 only", options.quiet)

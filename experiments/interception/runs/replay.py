@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.common.errors import InputError
-from experiments.common.output import output
+from experiments.common.output import output_of
 from experiments.common.screen import figure_files, progress_bar, say, show, table_console
 from experiments.interception.command import Replay
 from experiments.interception.figures.animation import GIF, MP4, animate, animation_path
@@ -26,22 +26,13 @@ def run(options: Replay) -> None:
     times_s = read_times(options.times, options.out)
     animation_path("--gif", options.gif, GIF)
     animation_path("--mp4", options.mp4, MP4)
-    files = {"--html": options.html, "--gif": options.gif, "--mp4": options.mp4}
-    with (
-        output(
-            folder=options.out,
-            names=figure_files(*FIGURES),
-            files=files,
-            overwrite=options.overwrite,
-            quiet=options.quiet,
-        ) as written,
-        progress_bar(options.quiet) as begin,
-    ):
+    files = {"--gif": options.gif, "--mp4": options.mp4}
+    with output_of(options, figure_files(*FIGURES), files) as written, progress_bar(options.quiet) as begin:
         records = [load_record(file) for file in options.records]
         need_times(options.times, times_s, records)
         if options.html is not None:
             written.deliver("--html", interception_page(records))
-        for option, file in (("--gif", options.gif), ("--mp4", options.mp4)):
+        for option, file in files.items():
             if file is not None:
                 written.deliver(option, animate(records, file.suffix, options.frames, options.width, begin(file.name)))
         draw_engagements(records, times_s, written, begin)
