@@ -5,14 +5,13 @@ Numbers stay decimal, as written; the change to SI units rounds them once.
 
 from __future__ import annotations
 
-import types
 import typing
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation
 from enum import Enum, EnumMeta
 from numbers import Integral
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
@@ -304,16 +303,6 @@ def key(meaning: str, *examples: str, **options: Any) -> Any:
     return Field(description=meaning, examples=list(examples), **options)
 
 
-def limited_by(owner: type, field: str | None = None) -> PlainValidator:
-    """Check a number by the limits that a dataclass declares for a field, by default that of the key's name in SI."""
-
-    def check(value: object, info: ValidationInfo) -> Decimal:
-        name = str(info.field_name)
-        return Number.of(limits_of(owner, field or si_name(name)), power_of_ten(name))(value)
-
-    return PlainValidator(check)
-
-
 ZERO, ONE = Decimal(0), Decimal(1)
 NUMBER = Number()
 POSITIVE = Number(above=ZERO)
@@ -333,16 +322,27 @@ Constant = Annotated[Any, PlainValidator(lambda value: value)]
 
 
 class Table(BaseModel):
-    """A table of a file; unknown keys are errors, members of enumerations are written by value."""
+    """A table of a file; unknown keys are errors, members of enumerations are written by value.
+
+    Numbers have the limits that the dataclass `owner` declares for the fields of their names in SI.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    _owner: ClassVar[type | None] = None
+
+    def __init_subclass__(cls, owner: type | None = None, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls._owner = owner
 
     @field_validator("*", mode="before")
     @classmethod
-    def _member(cls, value: object, info: ValidationInfo) -> object:
-        hint = cls.model_fields[str(info.field_name)].annotation
-        kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-        kind = next((kind for kind in kinds if isinstance(kind, EnumMeta)), None)
+    def _checked(cls, value: object, info: ValidationInfo) -> object:
+        name = str(info.field_name)
+        field = cls.model_fields[name]
+        kinds = typing.get_args(field.annotation) or (field.annotation,)
+        if cls._owner is not None and Decimal in kinds and not field.metadata:
+            return Number.of(limits_of(cls._owner, si_name(name)), power_of_ten(name))(value)
+        kind: Any = next((kind for kind in kinds if isinstance(kind, EnumMeta)), None)
         return value if kind is None else kind(known_name(value, tuple(member.value for member in kind)))
 
     def si(self, name: str) -> Any:

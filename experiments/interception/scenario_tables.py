@@ -29,7 +29,6 @@ from experiments.common.toml_values import (
     Whole,
     key,
     known_name,
-    limited_by,
 )
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
@@ -54,13 +53,8 @@ _APPROACH = Number(below=Decimal(0), least=-SPEED_OF_LIGHT_KM_S)
 Elevation = Annotated[Decimal, PlainValidator(Number(least=Decimal(-90), most=Decimal(90)))]
 ClosingSpeed = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), most=SPEED_OF_LIGHT_KM_S))]
 
-_PIXEL = limited_by(AngleSensor, "error_at_zero_range_rad")
-OfSun = Annotated[Decimal, limited_by(Sun)]
-OfAngleSensor = Annotated[Decimal, limited_by(AngleSensor)]
-OfRangeSensor = Annotated[Decimal, limited_by(RangeSensor)]
-OfRateSensor = Annotated[Decimal, limited_by(RateSensor)]
-OfThruster = Annotated[Decimal, limited_by(Thruster)]
-OfSetModel = Annotated[Decimal, limited_by(SetModel)]
+_NOMINAL_RANGE = Number.of(limits_of(Scenario, "nominal_range_m"), KILO)
+_PIXEL = PlainValidator(Number.of(limits_of(AngleSensor, "error_at_zero_range_rad")))
 
 _SPACE = {"space": True}
 
@@ -74,11 +68,11 @@ def _pair(field: str, *, fixed: bool = False) -> PlainValidator:
     return PlainValidator(Pair(Number.of(limits_of(StateBox, field), KILO), fixed))
 
 
-class SunTable(Table):
+class SunTable(Table, owner=Sun):
     """[sun]."""
 
-    gravitational_parameter_km3_s2: OfSun = key("gravitational parameter of the Sun", "1.324948e11")
-    distance_km: OfSun = key("distance of the Sun from the spacecraft at t0", "150.0e6")
+    gravitational_parameter_km3_s2: Decimal = key("gravitational parameter of the Sun", "1.324948e11")
+    distance_km: Decimal = key("distance of the Sun from the spacecraft at t0", "150.0e6")
     direction_deg: Degrees = key("direction of the Sun at t0, from the x axis toward z", "90.0")
     elevation_deg: Elevation = _space_key("its angle out of the plane (x, z), toward y", "0.0", ZERO)
 
@@ -86,7 +80,7 @@ class SunTable(Table):
 class NominalTable(Table):
     """[nominal]."""
 
-    range_km: Annotated[Decimal, limited_by(Scenario, "nominal_range_m")] = key("nominal range at t0", "5801.3")
+    range_km: Annotated[Decimal, PlainValidator(_NOMINAL_RANGE)] = key("nominal range at t0", "5801.3")
     closing_speed_km_s: ClosingSpeed = key("closing speed of the on-board model", "58.0")
 
 
@@ -124,84 +118,80 @@ class DispersionTable(Table):
     )
 
 
-class AngleSensorTable(Table):
+class AngleSensorTable(Table, owner=AngleSensor):
     """[angle_sensor]."""
 
-    period_s: OfAngleSensor = key("time between measurements, a multiple of guidance.step_s", "0.5")
-    error_at_nominal_range_rad: OfAngleSensor | None = key(
-        "greatest error at nominal.range_km", "0.00015", default=None
-    )
-    error_at_zero_range_rad: OfAngleSensor | None = key(
+    period_s: Decimal = key("time between measurements, a multiple of guidance.step_s", "0.5")
+    error_at_nominal_range_rad: Decimal | None = key("greatest error at nominal.range_km", "0.00015", default=None)
+    error_at_zero_range_rad: Decimal | None = key(
         "greatest error at range zero; a straight line joins both", "0.00023", default=None
     )
     pixel_error_rad: Annotated[Decimal, _PIXEL] | None = key(
         "a camera, in place of both errors above: error of an image", "5e-6", default=None
     )
-    centroid_error_m: OfAngleSensor | None = key(
+    centroid_error_m: Decimal | None = key(
         "error of the body's centre: a camera adds it divided by the distance", "0.0", default=None
     )
     bias: Bias = key('centroid error of a camera: "random", or "constant" in a run', '"random"', default=Bias.RANDOM)
-    first_image_s: OfAngleSensor | None = key(
+    first_image_s: Decimal | None = key(
         "first measurement, before the nominal arrival; without it: the start", "90.0", default=None
     )
-    last_image_s: OfAngleSensor = key("last measurement, before the nominal arrival", "0.0", default=ZERO)
-    miss_probability: OfAngleSensor = key("probability that a measurement is lost", "0.0", default=ZERO)
-    error_at_nominal_range_y_rad: OfAngleSensor | None = _space_key(
+    last_image_s: Decimal = key("last measurement, before the nominal arrival", "0.0", default=ZERO)
+    miss_probability: Decimal = key("probability that a measurement is lost", "0.0", default=ZERO)
+    error_at_nominal_range_y_rad: Decimal | None = _space_key(
         "the same for the angle of y; without it: as for z", "0.00015"
     )
-    error_at_zero_range_y_rad: OfAngleSensor | None = _space_key(
+    error_at_zero_range_y_rad: Decimal | None = _space_key(
         "the same for the angle of y; without it: as for z", "0.00023"
     )
     convention: Convention = _space_key('which two angles: "plane", "gimbal" or "cone"', '"plane"', Convention.PLANE)
     error_shape: ErrorShape | None = _space_key('errors in a "box" or a "disc"; the set allows for the box', '"box"')
 
 
-class RangeSensorTable(Table):
+class RangeSensorTable(Table, owner=RangeSensor):
     """[range_sensor]."""
 
-    period_s: OfRangeSensor = key("time between measurements, a multiple of guidance.step_s", "2.0")
-    relative_error: OfRangeSensor = key("greatest error, relative to the range", "0.05")
+    period_s: Decimal = key("time between measurements, a multiple of guidance.step_s", "2.0")
+    relative_error: Decimal = key("greatest error, relative to the range", "0.05")
 
 
-class RateSensorTable(Table):
+class RateSensorTable(Table, owner=RateSensor):
     """[rate_sensor]."""
 
-    period_s: OfRateSensor = key("time between measurements, a multiple of guidance.step_s", "1.0")
-    error_rad_s: OfRateSensor = key("greatest error of the line of sight's angular rate", "1e-6")
+    period_s: Decimal = key("time between measurements, a multiple of guidance.step_s", "1.0")
+    error_rad_s: Decimal = key("greatest error of the line of sight's angular rate", "1e-6")
 
 
 OPTIONAL_SENSORS: Mapping[str, type[Any]] = {"range_sensor": RangeSensor, "rate_sensor": RateSensor}
 """Kinds of sensors that a scenario may leave out, by table and field; keys of a table are the fields of the kind."""
 
 
-class TargetTable(Table):
+class TargetTable(Table, owner=Target):
     """[target]."""
 
     manoeuvre: Manoeuvre = key('"none", "constant", "bang-bang", "random-telegraph" or "worst-case"', '"bang-bang"')
-    acceleration_m_s2: Annotated[Decimal, limited_by(Target)] = key("its acceleration along z", "0.005")
-    switching_period_s: Annotated[Decimal, limited_by(Target)] = key(
+    acceleration_m_s2: Decimal = key("its acceleration along z", "0.005")
+    switching_period_s: Decimal = key(
         "time between changes of sign; their mean time if random", "10.0", default=Decimal(10)
     )
-    acceleration_y_m_s2: Annotated[Decimal, limited_by(Target)] | None = _space_key(
-        "its acceleration along y; without it: as along z", "0.005"
-    )
+    acceleration_y_m_s2: Decimal | None = _space_key("its acceleration along y; without it: as along z", "0.005")
 
 
-class BodyTable(Table):
+class BodyTable(Table, owner=Body):
     """[body]."""
 
-    radius_m: Annotated[Decimal, limited_by(Body)] = key("a miss of at most this radius is a hit", "80.0")
+    radius_m: Decimal = key("a miss of at most this radius is a hit", "80.0")
 
 
-class ThrusterTable(Table):
+class ThrusterTable(Table, owner=Thruster):
     """[thruster]."""
 
-    budget_m_s: OfThruster = key("sum of the absolute values of all impulses", "1000.0")
-    least_impulse_m_s: OfThruster = key("smaller impulses become zero", "0.25")
-    greatest_impulse_m_s: OfThruster = key("greater impulses are reduced to this one", "7.5")
-    execution_error_relative: OfThruster = key("greatest relative error of an executed impulse", "0.0", default=ZERO)
-    pointing_error_rad: OfThruster = _space_key("greatest error of the direction of an impulse", "0.0", ZERO)
-    last_impulse_s: OfThruster | None = key(
+    budget_m_s: Decimal = key("sum of the absolute values of all impulses", "1000.0")
+    least_impulse_m_s: Decimal = key("smaller impulses become zero", "0.25")
+    greatest_impulse_m_s: Decimal = key("greater impulses are reduced to this one", "7.5")
+    execution_error_relative: Decimal = key("greatest relative error of an executed impulse", "0.0", default=ZERO)
+    pointing_error_rad: Decimal = _space_key("greatest error of the direction of an impulse", "0.0", ZERO)
+    last_impulse_s: Decimal | None = key(
         "last impulse, before the nominal arrival; without it: no cut-off", "2.0", default=None
     )
     impulses_s: Annotated[tuple[Decimal, ...], PlainValidator(Numbers(None, Number.of(POSITIVE)))] = key(
@@ -214,15 +204,15 @@ class ThrusterTable(Table):
     )
 
 
-class GuidanceTable(Table):
+class GuidanceTable(Table, owner=SetModel):
     """[guidance]."""
 
-    step_s: OfSetModel = key("step of observation and control", "0.5")
+    step_s: Decimal = key("step of observation and control", "0.5")
     strategy: Annotated[str, PlainValidator(_strategy)] = key("name of the guidance strategy", '"symmetric-miss"')
     range_threshold_km: Positive = key("sections nearer than this are removed from the set", "5.0")
 
 
-class InformationSetTable(Table):
+class InformationSetTable(Table, owner=SetModel):
     """[information_set]."""
 
     model: Model = key('"guaranteed", which keeps the true state, or "paper", as published', '"guaranteed"')
@@ -240,8 +230,8 @@ class InformationSetTable(Table):
         '"widened"',
         default=Recovery.WIDENED,
     )
-    disturbance_m_s2: OfSetModel = key("bound of the unknown acceleration along z, target included", "0.005")
-    disturbance_y_m_s2: OfSetModel | None = _space_key("the same bound along y; without it: as along z", "0.005")
+    disturbance_m_s2: Decimal = key("bound of the unknown acceleration along z, target included", "0.005")
+    disturbance_y_m_s2: Decimal | None = _space_key("the same bound along y; without it: as along z", "0.005")
 
 
 class NoiseTable(Table):
