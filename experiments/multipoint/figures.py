@@ -24,7 +24,7 @@ from experiments.common.figure_style import (
     style,
 )
 from experiments.multipoint.file import Axes as FrameAxes
-from experiments.multipoint.scene import CostCurve, Scene
+from experiments.multipoint.report import CostCurve, Scene
 from infoset.arrays import Floats
 
 _TRACK_POINTS = 241

@@ -7,7 +7,7 @@ import numpy as np
 from experiments.common.display_units import length_unit
 from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
 from experiments.multipoint.file import Axes
-from experiments.multipoint.scene import Scene
+from experiments.multipoint.report import Scene
 
 MOMENTS = 401
 

@@ -1,18 +1,123 @@
-"""Results of `infoset multipoint`, as JSON and as a table."""
+"""Results of `infoset multipoint`: the path with its targets, the cost against each time, JSON and a table."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from experiments.common.display_units import Unit, time_unit
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, trajectories_csv
 from experiments.common.screen import Part, number_table
 from experiments.multipoint.command import BEST, GIVEN
 from experiments.multipoint.file import Axes, MultipointProblem
-from experiments.multipoint.scene import Scene
 from infoset.arrays import Floats
+from rendezvous.multipoint import BestOrder, Path, Visits
+
+_POINTS = 1601
+_CURVE_POINTS = 41
+_NEAREST = 0.12
+_JUMP = 0.3
+_MOST_CURVES = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A path with the targets.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes of the positions.
+    order : tuple of int
+        Indices of the targets in the order of the visits.
+    """
+
+    axes: Axes
+    tour: Visits
+    order: tuple[int, ...]
+    path: Path
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of the targets in the order of the visits."""
+        return [self.tour.targets.targets[target].name for target in self.order]
+
+    @property
+    def end_s(self) -> float:
+        """Return the time of the last visit."""
+        return float(self.path.nodes.arrive_s[-1])
+
+    @property
+    def time_unit(self) -> Unit:
+        """Return the unit in which times are shown."""
+        return time_unit(self.end_s - self.tour.start_s)
+
+    @cached_property
+    def times(self) -> Floats:
+        """Return equally spaced times, and the times on both sides of each visit."""
+        nodes = self.path.nodes
+        even = np.linspace(self.tour.start_s, self.end_s, _POINTS)
+        before = np.nextafter(nodes.arrive_s, -np.inf)
+        return np.unique(np.concatenate([even, nodes.arrive_s, before, nodes.leave_s[:-1]]))
+
+    def target_path(self, visit: int, times_s: Floats) -> Floats:
+        """Return the positions of the target of a visit, shape (n, 3)."""
+        targets = np.full(len(times_s), self.order[visit])
+        return np.asarray(self.tour.targets.states(targets, times_s)[:, :3])
+
+
+@dataclass(frozen=True)
+class CostCurve:
+    """Cost against the time of one visit, the other times fixed; both arrays have shape (k,)."""
+
+    time_s: Floats
+    cost: Floats
+
+
+def cost_curves(scene: Scene, progress: Callable[[float], None] = lambda _done: None) -> list[CostCurve]:
+    """Compute the cost against the time of each of the first nine visits, between its neighbours.
+
+    A curve ends where no path exists, or where the path jumps to another local minimum.
+    """
+    count = min(len(scene.order), _MOST_CURVES)
+    curves = []
+    for visit in range(count):
+        curves.append(_cost_curve(scene, visit))
+        progress((visit + 1) / count)
+    return curves
+
+
+def _cost_curve(scene: Scene, visit: int) -> CostCurve:
+    path, nodes = scene.path, scene.path.nodes
+    low = scene.tour.start_s if visit == 0 else float(nodes.leave_s[visit - 1])
+    dwell_s, now = float(nodes.leave_s[visit] - nodes.arrive_s[visit]), float(nodes.arrive_s[visit])
+    last = visit == len(scene.order) - 1
+    high = now + 0.5 * (now - low) if last else float(nodes.arrive_s[visit + 1]) - dwell_s
+    width = high - low
+    times = np.linspace(low + _NEAREST * width, high if last else high - _NEAREST * width, _CURVE_POINTS)
+    times = np.unique(np.append(times, now))
+    # From the present time outwards, so that each path starts from a near one.
+    costs = {now: path.cost}
+    for side in (times[times > now], times[times < now][::-1]):
+        fly = scene.tour.flyer(scene.order, path)
+        reached, cost, slope = now, path.cost, float(path.time_gradient[visit])
+        for time in side:
+            varied = nodes.arrive_s.copy()
+            varied[visit] = time
+            try:
+                flown = fly(varied)
+            except ValueError:
+                break
+            expected = cost + 0.5 * (time - reached) * (slope + float(flown.time_gradient[visit]))
+            if abs(flown.cost - expected) > _JUMP * max(flown.cost, cost):
+                break
+            reached, cost, slope = float(time), flown.cost, float(flown.time_gradient[visit])
+            costs[reached] = cost
+    known = np.array(sorted(costs))
+    return CostCurve(known, np.array([costs[time] for time in known]))
 
 
 @dataclass(frozen=True)
@@ -32,29 +137,12 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Results of one command.
-
-    Parameters
-    ----------
-    objective : float
-        Cost plus the price of the last time.
-    evaluations : int
-        Number of paths computed.
-    begun, left_out, unfit : int
-        Numbers of partial orders examined, of those left out because no trajectory was found, and of orders that do
-        not fit the times.
-    peak_m_s2 : float
-        Largest control.
-    """
+    """Results of one command; `peak_m_s2` is the largest control."""
 
     problem: MultipointProblem
     search: Search
     scene: Scene
-    objective: float
-    evaluations: int
-    begun: int
-    left_out: int
-    unfit: int
+    best: BestOrder
     peak_m_s2: float
 
 
@@ -68,17 +156,17 @@ def report_json(report: Report) -> dict[str, object]:
         "order_chosen": report.search.order,
         "times_chosen": report.search.times,
         "cost_m2_s3": path.cost,
-        **({"cost_with_price_m2_s3": report.objective} if problem.price_per_s > 0.0 else {}),
+        **({"cost_with_price_m2_s3": report.best.objective} if problem.price_per_s > 0.0 else {}),
         "order": report.scene.names,
         "times_s": path.nodes.arrive_s,
         "time_gradient_m2_s4": path.time_gradient,
         "nodes": [_node_json(report.scene, index) for index in range(len(report.scene.order))],
         "costate0": {"position_m_s3": path.costate_start[:3], "velocity_m_s2": path.costate_start[3:]},
         "peak_control_m_s2": report.peak_m_s2,
-        "evaluations": report.evaluations,
-        "orders_begun": report.begun,
-        "orders_left_out": report.left_out,
-        "orders_that_do_not_fit": report.unfit,
+        "evaluations": report.best.evaluations,
+        "orders_begun": report.best.nodes,
+        "orders_left_out": len(report.best.lost),
+        "orders_that_do_not_fit": report.best.unfit,
     }
 
 
@@ -131,9 +219,9 @@ def report_parts(report: Report) -> Iterator[Part]:
     yield table
     if BEST not in (report.search.order, report.search.times):
         return
-    text = f"{report.evaluations} paths computed"
+    text = f"{report.best.evaluations} paths computed"
     if report.search.order == BEST:
-        text += f", {report.begun} partial orders examined"
-        text += f", {report.left_out} left out because no trajectory was found" if report.left_out else ""
-        text += f"; {report.unfit} orders do not fit the times" if report.unfit else ""
+        text += f", {report.best.nodes} partial orders examined"
+        text += f", {len(report.best.lost)} left out because no trajectory was found" if report.best.lost else ""
+        text += f"; {report.best.unfit} orders do not fit the times" if report.best.unfit else ""
     yield text + ("; the times are a local minimum" if report.search.times == BEST else "")

@@ -16,9 +16,8 @@ from experiments.multipoint.command import BEST, GIVEN, Multipoint
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import MultipointProblem, load_multipoint
 from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.report import Report, Search, report_json, report_parts, trajectories
-from experiments.multipoint.scene import Scene, cost_curves
-from rendezvous.multipoint import MOST_TARGETS, best_order, best_order_of_slots, best_times
+from experiments.multipoint.report import Report, Scene, Search, cost_curves, report_json, report_parts, trajectories
+from rendezvous.multipoint import MOST_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
 from rendezvous.piecewise import greatest_control
 
 FIGURES = ("figure-path", "figure-control", "figure-costates", "figure-times")
@@ -45,7 +44,7 @@ def run(options: Multipoint) -> None:
             written.deliver("--html", page)
         if options.out is not None:
             drawings = _drawings(report, begin("cost against times"))
-            written.draw(drawings, begin("figures"))
+            written.draw(dict(zip(FIGURES, drawings, strict=True)), begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
@@ -82,56 +81,38 @@ def _large(number: int) -> str:
 
 def _solve(problem: MultipointProblem, search: Search, progress: Progress) -> Report:
     with input_errors(problem.source):
-        report = _searched(problem, search, progress)
-    path = report.scene.path
-    problem.need_finite(path.cost, report.objective, path.costate_start, path.arrival_states, path.time_gradient)
+        best = _best(problem, search, progress)
+        path, peak = best.path, greatest_control(best.path.control, best.path.breaks())
+    problem.need_finite(path.cost, best.objective, path.costate_start, path.arrival_states, path.time_gradient)
     bound = problem.greatest_control_m_s2
-    if bound is not None and report.peak_m_s2 > bound:
+    if bound is not None and peak > bound:
         raise InputError(
-            f"{problem.source}: greatest_control_m_s2: the minimum-energy control reaches {report.peak_m_s2:.6g} "
-            f"m/s^2, {report.peak_m_s2 / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the "
-            "visits more time"
+            f"{problem.source}: greatest_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
+            f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
         )
-    return report
+    return Report(problem, search, Scene(problem.tables.axes, problem.tour, best.order, path), best, peak)
 
 
-def _searched(problem: MultipointProblem, search: Search, progress: Progress) -> Report:
+def _best(problem: MultipointProblem, search: Search, progress: Progress) -> BestOrder:
     tour, order = problem.tour, tuple(range(len(problem.tour.targets.targets)))
     guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
-    evaluations, begun, left_out, unfit = 1, 1, 0, 0
+    if search.order == BEST and search.times == BEST:
+        return best_order(tour, problem.limits(), guesses, progress=progress)
     if search.order == BEST:
-        if search.times == BEST:
-            best = best_order(tour, problem.limits(), guesses, progress=progress)
-        else:
-            best = best_order_of_slots(tour, guesses[0], progress=progress)
-        order, path, objective, evaluations = best.order, best.path, best.objective, best.evaluations
-        begun, left_out, unfit = best.nodes, len(best.lost), best.unfit
-    elif search.times == BEST:
+        return best_order_of_slots(tour, guesses[0], progress=progress)
+    if search.times == BEST:
         timed = best_times(tour, order, problem.limits(), guesses, progress=progress)
-        path, objective, evaluations = timed.path, timed.objective, timed.evaluations
-    else:
-        assert problem.times_s is not None
-        path = tour.fly(order, problem.times_s)
-        objective = path.cost + problem.price_per_s * float(problem.times_s[-1])
-    return Report(
-        problem,
-        search,
-        Scene(problem.tables.axes, tour, order, path),
-        objective,
-        evaluations,
-        begun,
-        left_out,
-        unfit,
-        peak_m_s2=greatest_control(path.control, path.breaks()),
-    )
+        return BestOrder(order, timed.path, timed.objective, 1, timed.evaluations)
+    assert problem.times_s is not None
+    path = tour.fly(order, problem.times_s)
+    return BestOrder(order, path, path.cost + problem.price_per_s * float(problem.times_s[-1]), 1, 1)
 
 
-def _drawings(report: Report, progress: Progress) -> dict[str, Callable[[], Figure]]:
+def _drawings(report: Report, progress: Progress) -> list[Callable[[], Figure]]:
     scene = report.scene
-    drawings: tuple[Callable[[], Figure], ...] = (
+    return [
         partial(draw_path, scene),
         partial(draw_control, scene, report.problem.greatest_control_m_s2),
         partial(draw_costates, scene),
         partial(draw_times, scene, cost_curves(scene, progress)),
-    )
-    return dict(zip(FIGURES, drawings, strict=True))
+    ]

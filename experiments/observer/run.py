@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
-
-from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
@@ -22,9 +20,9 @@ def run(options: Observe) -> None:
     """Compute the sets, write the files and print the tables."""
     problem = load_observer(options.problem, options.settings)
     data = data_of(problem, options.data, options.errors, options.seed)
-    names = ["figure-bounds", *(["figure-sets"] if len(problem.a) == 2 else [])]
+    figures = {"figure-bounds": draw_bounds} | ({"figure-sets": draw_sets} if len(problem.a) == 2 else {})
     with (
-        output_of(options, ("problem.toml", "results.json", "bounds.csv", *figure_files(*names))) as written,
+        output_of(options, ("problem.toml", "results.json", "bounds.csv", *figure_files(*figures))) as written,
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(_unused_inputs(problem, data) if options.data is None else [], options.quiet)
@@ -34,7 +32,7 @@ def run(options: Observe) -> None:
         written.save("bounds.csv", report_csv(report), "--csv")
         if options.html is not None:
             written.deliver("--html", observer_page(report))
-        written.draw({name: _drawings(report)[name] for name in names}, begin("figures"))
+        written.draw({name: partial(draw, report) for name, draw in figures.items()}, begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
@@ -63,7 +61,3 @@ def _observed(problem: ObserverProblem, data: Data, smooth: bool, progress: Call
     except (ArithmeticError, ValueError) as error:
         raise InputError(f"{problem.source}: step {observer.step}: {error}") from None
     return Report(problem, data, estimates, smoothed, observer.inconsistency)
-
-
-def _drawings(report: Report) -> Mapping[str, Callable[[], Figure]]:
-    return {"figure-bounds": partial(draw_bounds, report), "figure-sets": partial(draw_sets, report)}

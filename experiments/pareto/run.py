@@ -35,7 +35,12 @@ from rendezvous.pareto import (
 )
 from rendezvous.pareto.coalitions import MOST_CRAFT
 
-FIGURES = ("figure-trajectories", "figure-controls", "figure-front", "figure-costs")
+FIGURES: dict[str, Callable[[Report], Figure]] = {
+    "figure-trajectories": lambda report: draw_trajectories(report.solution),
+    "figure-controls": lambda report: draw_controls(report.solution, report.problem.greatest_control_m_s2),
+    "figure-front": lambda report: draw_front(report.solution, report.selections, report.sweep),
+    "figure-costs": lambda report: draw_costs(report.solution, report.coalitions, report.impulses_m_s),
+}
 SWEEP = (0.5, 2.0, 31)
 """Smallest and largest duration of the sweep, relative to the duration of the problem, and their number."""
 
@@ -55,7 +60,7 @@ def run(options: Pareto) -> None:
             written.save(TRAJECTORIES, trajectories(report, options.samples), "--csv")
         if options.html is not None:
             written.deliver("--html", pareto_page(problem.name, report.solution, report.selections))
-        written.draw(_drawings(report), begin("figures"))
+        written.draw({name: partial(draw, report) for name, draw in FIGURES.items()}, begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
@@ -138,14 +143,3 @@ def _bounds(problem: ParetoProblem, solution: EncounterSolution) -> tuple[BoundC
             "duration_s longer"
         )
     return tuple(checks)
-
-
-def _drawings(report: Report) -> dict[str, Callable[[], Figure]]:
-    solution = report.solution
-    drawings: tuple[Callable[[], Figure], ...] = (
-        partial(draw_trajectories, solution),
-        partial(draw_controls, solution, report.problem.greatest_control_m_s2),
-        partial(draw_front, solution, report.selections, report.sweep),
-        partial(draw_costs, solution, report.coalitions, report.impulses_m_s),
-    )
-    return dict(zip(FIGURES, drawings, strict=True))

@@ -67,16 +67,6 @@ _AXES = ("x", "y", "z", "$v_x$", "$v_y$", "$v_z$")
 _PLANES = ((0, 1), (0, 2), (3, 4), (3, 5))
 
 
-def drawings(report: Report) -> tuple[Callable[[], Figure], ...]:
-    """Return functions that draw positions and velocities in space, the tube in planes, and the controls."""
-    return (
-        partial(draw_space, report, 0),
-        partial(draw_space, report, 3),
-        partial(draw_planes, report),
-        partial(draw_controls, report),
-    )
-
-
 def _shown(report: Report) -> list[tuple[dict[str, Any], Member, Floats]]:
     """Return the line style, the member and the trajectory of each member drawn."""
     looks = [{**look, "linewidth": 1.0} for look in LINE_LOOKS]
@@ -220,12 +210,12 @@ def draw_planes(report: Report) -> Figure:
         axes.xaxis.set_major_locator(MaxNLocator(6))
         names = [_name(times) for times, _ in shadows]
         paths = [(path[:, plane] * factors) for _, _, path in _shown(report)]
-        anchors = [outline[np.argsort(-outline[:, 1])[::_ANCHORS]] for outline in outlines]
+        anchors = [edge[np.argsort(-edge[:, 1])[::_ANCHORS]] for edge in outlines]
         place_labels(
             axes,
             [
-                (name, where, np.vstack([*paths, *(other for other in outlines if other is not outline)]))
-                for name, where, outline in zip(names, anchors, outlines, strict=True)
+                (name, where, np.vstack([*paths, *(other for other in outlines if other is not edge)]))
+                for name, where, edge in zip(names, anchors, outlines, strict=True)
             ],
             np.stack([start, end]),
             centred=True,
@@ -283,3 +273,11 @@ def draw_controls(report: Report) -> Figure:
     handles, names = row[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="upper center", ncols=len(names))
     return figure
+
+
+FIGURES: dict[str, Callable[[Report], Figure]] = {
+    "figure-positions": partial(draw_space, first=0),
+    "figure-velocities": partial(draw_space, first=3),
+    "figure-planes": draw_planes,
+    "figure-controls": draw_controls,
+}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 from rich.table import Table
 
@@ -11,7 +12,7 @@ from experiments.common.options import choice, read_number
 from experiments.common.output import TRAJECTORIES, output_of, to_csv, to_json
 from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, show
 from experiments.reachability.command import Reach
-from experiments.reachability.figures import drawings
+from experiments.reachability.figures import FIGURES
 from experiments.reachability.file import load_rendezvous
 from experiments.reachability.page import reachability_page
 from experiments.reachability.printed_tables import COLUMNS, Comparison, compare_published, is_published
@@ -28,7 +29,6 @@ from experiments.reachability.report import (
 )
 from rendezvous.reachability import Route, SetKind, effort
 
-FIGURES = ("figure-positions", "figure-velocities", "figure-planes", "figure-controls")
 TABLES = "published-tables.csv"
 _COUNTED = ("vertices", "facets")
 _NORM = "(m, m/s)"
@@ -56,7 +56,7 @@ def run(options: Reach) -> None:
         try:
             if options.html is not None:
                 written.deliver("--html", reachability_page(report))
-            written.draw(dict(zip(FIGURES, drawings(report), strict=True)), begin("figures"))
+            written.draw({name: partial(draw, report) for name, draw in FIGURES.items()}, begin("figures"))
         except ArithmeticError as error:
             raise InputError(
                 f"cannot draw the tube: {error}; the numbers are in results.json, or use --json alone"

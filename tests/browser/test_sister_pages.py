@@ -12,7 +12,7 @@ import pytest
 
 from experiments.multipoint.file import load_multipoint
 from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.scene import Scene
+from experiments.multipoint.report import Scene
 from experiments.pareto.file import load_pareto
 from experiments.pareto.page import pareto_page
 from experiments.pursuit.file import load_pursuit

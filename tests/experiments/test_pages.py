@@ -23,7 +23,7 @@ from experiments.interception.page import STEPS_OF_A_BOX, TOLERANCE, interceptio
 from experiments.interception.scenario_file import load_scenario
 from experiments.multipoint.file import load_multipoint
 from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.scene import Scene
+from experiments.multipoint.report import Scene
 from experiments.pursuit.file import load_pursuit
 from experiments.pursuit.page import pursuit_page
 from guidance import NoiseKind

@@ -16,7 +16,7 @@ from experiments.common.file_kinds import built_in_files
 from experiments.common.problem_file import problem_text
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import KIND, Axes, load_multipoint
-from experiments.multipoint.scene import Scene, cost_curves
+from experiments.multipoint.report import Scene, cost_curves
 from tests.experiments.command_line import strict
 
 FIGURES = ["figure-control", "figure-costates", "figure-path", "figure-times"]
