@@ -269,13 +269,7 @@ FORM = problem_form(
 
 @dataclass(frozen=True, eq=False)
 class MultipointProblem(ReadProblem[MultipointTables]):
-    """A problem as read.
-
-    Parameters
-    ----------
-    times_s : ndarray, shape (n,), or None
-        Times of the visits, by target as listed; None if one is missing.
-    """
+    """A problem as read; `times_s`, by target as listed, is None if a time is missing."""
 
     tour: Visits
     times_s: Floats | None

@@ -25,15 +25,7 @@ _MOST_CURVES = 9
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A path with the targets.
-
-    Parameters
-    ----------
-    axes : Axes
-        Axes of the positions.
-    order : tuple of int
-        Indices of the targets in the order of the visits.
-    """
+    """A path with the targets; `order` contains their indices, in the order of the visits."""
 
     axes: Axes
     tour: Visits

@@ -28,18 +28,9 @@ _STEP = re.compile(r"[0-9]{1,15}")
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """Measurements and inputs of N steps.
+    """Measurements y of N steps, shape (N, q), NaN if missing, and the inputs u after each, (N, p).
 
-    Parameters
-    ----------
-    measured : ndarray, shape (N, q)
-        y; NaN for a missing measurement.
-    inputs : ndarray, shape (N, p)
-        u after each measurement.
-    states : ndarray, shape (N, n), or None
-        True states of a simulation.
-    origin : str
-        Origin of the measurements, for texts.
+    A simulation also has the true states, (N, n). `origin` is a text for reports.
     """
 
     measured: Floats

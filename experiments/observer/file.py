@@ -199,18 +199,8 @@ FORM = problem_form(
 class ObserverProblem(ReadProblem[ObserverTables]):
     """A problem as read.
 
-    Parameters
-    ----------
-    measured, inputs : ndarray or None
-        y and u of the file, shape (N, q), NaN for a missing measurement, and (M, p).
-    steps : int
-        Number of measurements of a simulation.
-    missing : tuple of int
-        Steps of a simulation without a measurement.
-    step_s : float or None
-        Time between two steps.
-    names : tuple of str
-        Names of the states with their units.
+    `measured` and `inputs` are y and u of the file, shapes (N, q), NaN if missing, and (M, p). `steps` and `missing`
+    describe a simulation: the number of measurements, and the steps without one.
     """
 
     a: Floats

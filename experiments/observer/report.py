@@ -22,13 +22,7 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Results of one command.
-
-    Parameters
-    ----------
-    smoothed : sequence of Estimate, or None
-        Sets that use later measurements too; None if they are not wanted.
-    """
+    """Results of one command; `smoothed` are the sets that use later measurements too, if they are wanted."""
 
     problem: ObserverProblem
     data: Data

@@ -141,13 +141,7 @@ def draw_controls(solution: EncounterSolution, bound_m_s2: float | None = None) 
 
 @style()
 def draw_front(solution: EncounterSolution, selections: Mapping[str, Floats], sweep: DurationSweep) -> Figure:
-    """Draw the Pareto set with the chosen meetings, the Pareto front, and costs against the duration.
-
-    Parameters
-    ----------
-    selections : mapping of str to ndarray, shape (f,)
-        Pareto-optimal meetings by the rule of their choice.
-    """
+    """Draw the Pareto set with the chosen meetings, the Pareto front, and costs against the duration."""
     figure, (left, middle, right) = figure_grid(78.0, 1, 3, (16.0, 3.0, 23.0, 6.0), (19.0, 0.0))
     sampled = pareto_set(solution, simplex_weights(len(solution.costs), _SET_POINTS))
     _draw_set(left, solution, sampled.points, selections)
@@ -270,15 +264,7 @@ def _draw_sweep(axes: Axes, solution: EncounterSolution, sweep: DurationSweep) -
 
 @style()
 def draw_costs(solution: EncounterSolution, coalitions: Coalitions | None, impulses_m_s: Sequence[float]) -> Figure:
-    """Draw the costs of the meeting as bars and as a table.
-
-    Parameters
-    ----------
-    coalitions : Coalitions or None
-        For the Shapley values and the transfers.
-    impulses_m_s : sequence of float
-        Total impulse of each craft.
-    """
+    """Draw the costs of the meeting as bars and as a table."""
     count, names = len(solution.costs), _names(solution)
     table_mm = 5.0 * (count + 2)
     height_mm = 70.0 + table_mm

@@ -21,16 +21,8 @@ _ZERO = 1e-9
 class Report:
     """Results of one command.
 
-    Parameters
-    ----------
-    selections : mapping of str to ndarray, shape (f,)
-        Pareto-optimal meetings by the rule of their choice.
-    coalitions : Coalitions or None
-        None if there are too many craft.
-    bounds : tuple of BoundCheck
-        One per craft; empty if the problem has no bound.
-    peaks_m_s2, impulses_m_s : tuple of float
-        Largest control and total impulse of each craft.
+    `selections` are Pareto-optimal meetings, shape (f,), by the rule of their choice. There are no `coalitions` if
+    there are too many craft, and no `bounds` if the problem has no bound on the control.
     """
 
     problem: ParetoProblem

@@ -21,14 +21,10 @@ EvaderPolicy = Callable[[int, float], Steering | None]
 
 
 def evader_policy(name: str, seed: int) -> EvaderPolicy:
-    """Return the policy of the evader; raise `InputError` if the policy is unknown or the file is not a script.
+    """Return the policy of the evader: that of a name, or a script in a file that ends in ``.csv``.
 
-    Parameters
-    ----------
-    name : str
-        A policy, or a file that ends in ``.csv``.
-    seed : int
-        Root seed of the random policy.
+    `seed` is the root seed of the random policy. Raise `InputError` if the policy is unknown or the file is not a
+    script.
     """
     if name.endswith(".csv"):
         script = _script(name)

@@ -113,12 +113,9 @@ class PursuitProblem(ReadProblem[PursuitTables]):
     """A problem as read."""
 
     def game(self, changes: Mapping[str, float] | None = None) -> Game:
-        """Return the game in SI; `ValueError` if a value is impossible.
+        """Return the game in SI, with `changes` of values by parameter, in the unit of its name.
 
-        Parameters
-        ----------
-        changes : mapping of str to float, optional
-            Values in place of those of the file, by parameter, in the unit of its name.
+        Raise `ValueError` if a value is impossible.
         """
         return _game(self.tables, changes or {})
 

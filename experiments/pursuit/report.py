@@ -38,13 +38,7 @@ _METHODS = {
 
 @dataclass(frozen=True)
 class Feedback:
-    """Simulations with feedback, and their settings.
-
-    Parameters
-    ----------
-    policy : str
-        The policy of the evader, or the file of its script.
-    """
+    """Simulations with feedback, and their settings; `policy` is that of the evader, or the file of its script."""
 
     policy: str
     replan_s: float

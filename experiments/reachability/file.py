@@ -153,14 +153,9 @@ class ReachabilityTables(ProblemTables):
 class Rendezvous(ReadProblem[ReachabilityTables]):
     """A problem as read, in SI.
 
-    Parameters
-    ----------
-    motion : ConstantMotion or TschaunerHempel
-        Linear model of the motion.
-    disturbance : ndarray, shape (T, 6, 3), or None
-        Effect of unit components of the unknown acceleration on the state.
-    navigation_error : ndarray, shape (6,), or None
-        Largest error of each component.
+    `motion` is the linear model, `truth` the nonlinear one. `disturbance`, shape (T, 6, 3), is the effect of unit
+    components of the unknown acceleration on the state, `navigation_error`, shape (6,), the largest error of each
+    component of an estimate.
     """
 
     problem: ReachabilityProblem

@@ -18,18 +18,10 @@ COLUMNS = ("table", "ours", "quantity", "period", "printed", "corrected", "compu
 
 @dataclass(frozen=True)
 class PrintedTable:
-    """A table of the paper, as printed.
+    """A table of the paper, as printed: u(t), t = 0..3, and x(t), t = 1..4.
 
-    Parameters
-    ----------
-    ours : str
-        The optimal control that it is compared with.
-    controls : tuple
-        u(t), t = 0..3.
-    nonlinear, linear : tuple
-        x(t), t = 1..4.
-    misprints : tuple of (str, int, int, float)
-        Quantity, t, component from 1, and the correct number.
+    `ours` is the optimal control that it is compared with. A misprint has a quantity, t, the component from 1, and the
+    correct number.
     """
 
     number: int

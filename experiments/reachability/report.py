@@ -63,14 +63,8 @@ _MOST_SHOWN, _ALIKE = 5, 1e-4
 class Request:
     """What is computed for a problem.
 
-    Parameters
-    ----------
-    selection : sequence of str
-        Names of `SINGLE`, "vertices" or "samples".
-    route : Route or None
-        Representation of the sets; None chooses one.
-    noisy_flights : int
-        Number of these simulations with navigation errors, if the problem has them.
+    `selection` contains names of `SINGLE`, "vertices" or "samples". No `route` lets `solve` choose it. `noisy_flights`
+    is the number of simulations in closed loop with navigation errors, if the problem has them.
     """
 
     selection: Sequence[str]
@@ -83,15 +77,10 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """An optimal control.
+    """An optimal control, and the states, shape (T + 1, 6), of the linear and of the nonlinear model.
 
-    Parameters
-    ----------
-    linear, nonlinear : ndarray, shape (T + 1, 6)
-        States of the linear and of the nonlinear model.
-    between : float
-        Largest violation of a constraint between the periods by the linear model, as a fraction of the bound; at most
-        0 if there is none.
+    `between` is the largest violation of a constraint between the periods by the linear model, as a fraction of the
+    bound; at most 0 if there is none.
     """
 
     name: str
@@ -110,17 +99,8 @@ class Member:
 class Robustness:
     """Plans under the unknown acceleration.
 
-    Parameters
-    ----------
-    fixed_miss : float or None
-        Least terminal norm without disturbance, by controls that keep the constraints without feedback; None if there
-        are no such controls.
-    conflict : str or None
-        The reason, if there are none.
-    plan : FeedbackPlan or None
-        Plan with feedback; None if there is none.
-    refusal : str or None
-        The reason, if there is none.
+    `fixed_miss` is the least terminal norm without disturbance, by controls that keep the constraints without feedback,
+    and `plan` the plan with feedback. If there is none, `conflict` and `refusal` are the reasons.
     """
 
     fixed_miss: float | None
@@ -133,20 +113,9 @@ class Robustness:
 class Report:
     """Results of one command.
 
-    Parameters
-    ----------
-    least_periods : int or None
-        Least number of periods in which the terminal norm is zero.
-    searched_periods : int
-        Largest number of periods that was searched.
-    forward, tube : ndarray, shape (T + 1, 6, 2)
-        Bounds of the forward sets and of the tube.
-    ranges : ndarray, shape (T, 3, 2)
-        Ranges of the optimal controls.
-    flight : Flight or None
-        Simulation in closed loop.
-    noisy : tuple of Flight
-        The same with navigation errors.
+    `least_periods` is the least number of periods, up to `searched_periods`, in which the terminal norm is zero.
+    `forward` and `tube`, shape (T + 1, 6, 2), are bounds of the sets, `ranges`, shape (T, 3, 2), those of the optimal
+    controls. `flight` is the simulation in closed loop, `noisy` are those with navigation errors.
     """
 
     rendezvous: Rendezvous
