@@ -81,18 +81,10 @@ class Plan:
 class CraftCost:
     """J^2(p) = J*^2 + (p - p*)' M (p - p*) of one craft.
 
-    Parameters
-    ----------
-    ideal : ndarray, shape (f,)
-        p*: the cheapest free values for this craft alone.
-    ideal_cost_squared : float
-        J*^2, m^2/s^3.
-    root : ndarray, shape (f, f)
-        R, upper triangular, M = R' R; m/s^1.5 over the units of p.
-    effort_base, effort_slope : ndarray, shapes (c,) and (c, f)
-        The scaled effort y(p) = base + slope p, |y|^2 = J^2.
-    to_costate : ndarray, shape (6, c)
-        From y to the costate at the meeting.
+    `ideal`, shape (f,), is p*, the cheapest free values for this craft alone, and `ideal_cost_squared` is J*^2,
+    m^2/s^3. `root`, shape (f, f), is R, upper triangular, M = R' R, in m/s^1.5 over the units of p. The scaled effort
+    is y(p) = base + slope p, |y|^2 = J^2, with `effort_base`, shape (c,), and `effort_slope`, (c, f); `to_costate`, (6,
+    c), leads from y to the costate at the meeting.
     """
 
     craft: Craft

@@ -24,18 +24,11 @@ class NoRobustPlanError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class FeedbackPlan:
-    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), for a problem with a disturbance.
+    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), for x(t + 1) = A x + B u + disturbance[t] w(t).
 
-    Parameters
-    ----------
-    disturbance : ndarray, shape (T, n, q)
-        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, in the units of the states.
-    nominal : ndarray, shape (T, m)
-        Controls without disturbance, in units of the problem.
-    gains : ndarray, shape (T, T, m, q)
-        Change of the controls by past disturbances, in units of the problem.
-    lower, upper : ndarray, shape (T + 1, n)
-        Bounds of each state over all disturbances: the robust tube.
+    |w_k(t)| <= 1, and `disturbance`, shape (T, n, q), is in the units of the states. `nominal`, (T, m), are the
+    controls without disturbance and `gains`, (T, T, m, q), their changes by past disturbances, in units of the problem.
+    `lower` and `upper`, (T + 1, n), bound each state over all disturbances: the robust tube.
     """
 
     problem: ReachabilityProblem

@@ -33,15 +33,9 @@ class _Solution(Segment):
 class TimeVaryingMotion(LinearMotion):
     """x' = A(t) x + B(t) u + w(t).
 
-    Parameters
-    ----------
-    matrix_at : callable
-        A of times of shape (k,), s: shape (k, 6, 6).
-    input_at : callable or None
-        B, shape (k, 6, 3); None is an acceleration, (0, 1)'. An actuator with the cost u' R u has B = (0, 1)' R^(-1/2),
-        and controls R^(1/2) u.
-    drift_at : callable or None
-        w, shape (k, 6); None is zero.
+    `matrix_at`, `input_at` and `drift_at` return A, B and w, shapes (k, 6, 6), (k, 6, 3) and (k, 6), at k times, s.
+    Without `input_at` u is an acceleration, B = (0, 1)', and without `drift_at` w is zero. An actuator with the cost u'
+    R u has B = (0, 1)' R^(-1/2), and controls R^(1/2) u.
 
     Notes
     -----
