@@ -18,9 +18,8 @@ from experiments.common.options import choice
 from experiments.common.output import STDOUT, library_version, to_json, write_file
 from experiments.common.problem_file import ProblemTables, problem_form
 from experiments.common.screen import table_console
-from experiments.common.template import template
 from experiments.common.toml_file import document_of
-from experiments.common.toml_form import Form
+from experiments.common.toml_form import Form, template
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_template, scenario_warnings
 
 LOADERS = {

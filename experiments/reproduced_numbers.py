@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
+from importlib import import_module
 from itertools import groupby
 
 import typer
 from rich.text import Text
 
 from experiments.common.output import library_version, output_of, to_json
-from experiments.common.published_number import Origin, PublishedNumber, Reproduction, Verdict
+from experiments.common.published_number import Origin, Progress, PublishedNumber, Reproduction, Verdict
 from experiments.common.screen import Part, print_parts, progress_bar, table_console
-from experiments.papers import PAPERS, reproduce_paper
 from experiments.reproduce import Reproduce
+
+PAPERS = ("interception", "pareto", "multipoint", "reachability", "pursuit")
+
+
+def reproduce_paper(name: str, progress: Progress) -> Reproduction:
+    """Compute the numbers of a paper of `PAPERS`; `progress` receives the fraction done."""
+    reproduction = import_module(f"experiments.{name}.published").reproduce(progress)
+    assert isinstance(reproduction, Reproduction)
+    return reproduction
+
 
 DISAGREED = 1
 """Exit code if a number that should agree does not."""

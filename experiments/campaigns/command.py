@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from experiments.common.options import Json, Out, Overwrite, Quiet, Seed, Settings
-from experiments.interception.options import MOST_RUNS, RangeMeter, ScenarioName, StrategyName, StudyModel, TieName
+from experiments.interception.command import MOST_RUNS, RangeMeter, ScenarioName, StrategyName, StudyModel, TieName
 
 MOST_WORKERS = 1024
 MOST_AT_ONCE = 1_000_000

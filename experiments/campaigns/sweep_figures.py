@@ -20,7 +20,7 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from experiments.campaigns.axis_names import key_label, unit_of
+from experiments.campaigns.sweep_axes import key_label, unit_of
 from experiments.campaigns.sweep_table import (
     Limit,
     SweepTable,

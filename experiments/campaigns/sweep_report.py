@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.campaigns.axis_names import unit_of
 from experiments.campaigns.samples import game_notes, heading, sample_json
+from experiments.campaigns.sweep_axes import unit_of
 from experiments.campaigns.sweep_figures import QUANTITY_NAMES, draw_sweep
 from experiments.campaigns.sweep_table import (
     SHOWN,

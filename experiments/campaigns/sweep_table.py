@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.campaigns.axis_names import tied_keys, unit_of
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples, shown_value
-from experiments.campaigns.sweep_axes import sweep_cells
+from experiments.campaigns.sweep_axes import sweep_cells, tied_keys, unit_of
 from experiments.interception.study import SetCounts
 from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement, Scenario
 from sim.closed_form import possible_miss_of

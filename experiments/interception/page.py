@@ -13,14 +13,16 @@ from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
 from experiments.interception.course import (
     Clock,
+    angle_name,
     duration_text,
     kept_steps,
     least_to_go_s,
     marks,
+    outcome_title,
     possible_misses,
+    record_titles,
     true_predicted_misses,
 )
-from experiments.interception.record_titles import angle_name, outcome_title, record_titles
 from infoset import Convention, InformationSet, Section
 from infoset.arrays import Floats, Integers
 from infoset.sensors import SENSORS

@@ -14,9 +14,8 @@ from pydantic import BaseModel
 
 from experiments.common.errors import InputError, shown
 from experiments.common.file_kinds import SCENARIO, built_in, built_in_names
-from experiments.common.template import template
 from experiments.common.toml_file import load_tables, read_tables
-from experiments.common.toml_form import Form, keys_of
+from experiments.common.toml_form import Form, keys_of, template
 from experiments.common.toml_values import si_name, si_values, value_text
 from experiments.interception.scenario_checks import cross_problems
 from experiments.interception.scenario_tables import LATER_KEYS, OPTIONAL_SENSORS, SCHEMA, SPACE_KEYS, ScenarioTables

@@ -13,8 +13,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from experiments.interception.course import kept_steps
-from experiments.interception.record_titles import outcome_title, record_titles
+from experiments.interception.course import kept_steps, outcome_title, record_titles
 from infoset.arrays import Floats
 from sim import Record, StepRecord
 

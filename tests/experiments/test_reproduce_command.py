@@ -22,9 +22,9 @@ from experiments.common.published_number import (
     last_digit,
 )
 from experiments.interception.scenario_file import load_scenario, scenario_hash
-from experiments.papers import PAPERS, reproduce_paper
 from experiments.pareto import published as pareto
 from experiments.pareto.file import load_pareto
+from experiments.reproduced_numbers import PAPERS, reproduce_paper
 
 Infoset = Callable[..., tuple[int, str, str]]
 REFERENCE = Reference("pareto")

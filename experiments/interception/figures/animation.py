@@ -15,11 +15,10 @@ from PIL import Image, ImageSequence
 
 from experiments.common.errors import InputError
 from experiments.common.figure_style import INK, new_figure, place_axes, plain, style
-from experiments.interception.course import Clock, evenly
+from experiments.interception.course import Clock, angle_name, evenly, record_titles
 from experiments.interception.figures.approach import count_down
 from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
 from experiments.interception.figures.sets import Plane, angle_unit, draw_plane, level_planes, planes_at
-from experiments.interception.record_titles import angle_name, record_titles
 from infoset.arrays import Floats
 from sim import Record
 

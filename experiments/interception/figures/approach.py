@@ -32,12 +32,13 @@ from experiments.interception.course import (
     duration_text,
     least_to_go_s,
     marks,
+    outcome_title,
     possible_misses,
+    record_titles,
     true_predicted_misses,
 )
 from experiments.interception.figures.b_plane import GUARANTEE_LOOK, RADIUS_SHOWN, draw_discs
 from experiments.interception.figures.distributions import RADIUS_LOOK
-from experiments.interception.record_titles import outcome_title, record_titles
 from sim import Record, Scenario
 
 MOST_VECTORS = 2000

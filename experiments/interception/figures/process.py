@@ -30,9 +30,16 @@ from experiments.common.figure_style import (
     style,
     width_mm,
 )
-from experiments.interception.course import Clock, duration_text, marks, true_predicted_misses
+from experiments.interception.course import (
+    Clock,
+    angle_name,
+    duration_text,
+    marks,
+    outcome_title,
+    record_titles,
+    true_predicted_misses,
+)
 from experiments.interception.figures.approach import MARK_LOOK, MOST_VECTORS, count_down
-from experiments.interception.record_titles import angle_name, outcome_title, record_titles
 from infoset.arrays import Floats, Integers
 from sim import Record
 

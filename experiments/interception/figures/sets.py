@@ -17,8 +17,7 @@ from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from experiments.common.figure_style import INK, MEASURED, WIDTH_MM, new_figure, place_axes, plain, style, width_mm
-from experiments.interception.course import Clock
-from experiments.interception.record_titles import angle_name, record_titles
+from experiments.interception.course import Clock, angle_name, record_titles
 from infoset import Section
 from infoset.arrays import Floats
 from sim import AxisStep, Record, StepRecord

@@ -17,8 +17,7 @@ from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import steps_csv
 from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, need_times, read_times
-from experiments.interception.runs.shared import summary_head
-from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses
+from experiments.interception.runs.shared import WorstMisses, find_worst_misses, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from sim import Scenario
 from sim.adversary import WorstEngagement

@@ -25,8 +25,7 @@ from experiments.common.screen import (
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Bound
 from experiments.interception.figures.bound import draw_bound
-from experiments.interception.runs.shared import need_finite, summary_head
-from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses
+from experiments.interception.runs.shared import WorstMisses, find_worst_misses, need_finite, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from guidance import Strategy
 from sim import Outcome, Record, Results, Scenario

@@ -7,6 +7,7 @@ from functools import partial
 from time import perf_counter
 
 from matplotlib.figure import Figure
+from rich.table import Table
 
 from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import (
@@ -20,7 +21,6 @@ from experiments.common.screen import (
     say_warnings,
     show,
 )
-from experiments.interception.burns import burn_table, burns_key
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
@@ -40,7 +40,7 @@ from experiments.interception.scenario_file import scenario_to_toml, scenario_wa
 from experiments.interception.study import QUANTILES, SetCounts, game_note, hit_text, set_counts, set_warnings
 from guidance import NoiseKind
 from infoset import Recovery
-from sim import Outcome, Scenario
+from sim import Outcome, Results, Scenario
 from sim.statistics import shown_quantiles
 
 FIGURE = "figure-4-distributions"
@@ -165,3 +165,44 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
     burns = [burn_table(scenario, curves)] if scenario.thruster.impulses_s else []
     title = f"{scenario.name}: quantiles of {runs} runs per curve; game noise with the tie rule {scenario.tie.value}"
     return [title, table, *burns, *notes]
+
+
+LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
+"""Levels of the quantiles of a burn, by key in JSON."""
+
+
+def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, float | None]]]:
+    """Return the key `burns` of a curve in JSON: for each burn its time, quantiles of its size, and its share.
+
+    The share is that of all impulses of all runs; None without any impulse. No key without a schedule.
+    """
+    if results.burns_m_s is None:
+        return {}
+    whole = float(results.burns_m_s.sum())
+    arrival_s, step_s = scenario.nominal_arrival_s, scenario.set_model.step_s
+    steps = scenario.thruster.impulse_steps(arrival_s, step_s) or []
+    return {
+        "burns": [
+            {
+                "before_arrival_s": arrival_s - step * step_s,
+                **dict(zip(LEVELS, shown_quantiles(sizes, [*LEVELS.values()]), strict=True)),
+                "share": float(sizes.sum()) / whole if whole > 0.0 else None,
+            }
+            for step, sizes in zip(steps, results.burns_m_s.T, strict=True)
+        ]
+    }
+
+
+def burn_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
+    """Return the table of the burns of all curves."""
+    table = number_table("curve", "burn, s before arrival", "p50, m/s", "p99, m/s", "share of impulse, %", left=1)
+    for curve in curves:
+        for burn in burns_key(scenario, curve.results).get("burns", []):
+            share = burn["share"]
+            table.add_row(
+                f"{curve.number} {curve.noise.value}{' + range meter' if curve.range_meter else ''}",
+                f"{burn['before_arrival_s']:g}",
+                *(number(burn[key]) for key in LEVELS),
+                number(None if share is None else 100.0 * share),
+            )
+    return table

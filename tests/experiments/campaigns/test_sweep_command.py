@@ -16,9 +16,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.campaigns.axis_names import key_label, unit_of
 from experiments.campaigns.samples import Sample
-from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
+from experiments.campaigns.sweep_axes import key_label, sweep_axes, sweep_cells, unit_of
 from experiments.campaigns.sweep_figures import draw_sweep, requirement_words
 from experiments.campaigns.sweep_table import (
     SHOWN,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments import load_scenario
-from experiments.interception.burns import burns_key
+from experiments.interception.runs.experiment import burns_key
 from sim import simulate
 from sim.results import join
 from tests.experiments.command_line import Command
