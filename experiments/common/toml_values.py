@@ -5,6 +5,7 @@ Numbers stay decimal, as written; the change to SI units rounds them once.
 
 from __future__ import annotations
 
+import types
 import typing
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -339,7 +340,8 @@ class Table(BaseModel):
     def _checked(cls, value: object, info: ValidationInfo) -> object:
         name = str(info.field_name)
         field = cls.model_fields[name]
-        kinds = typing.get_args(field.annotation) or (field.annotation,)
+        hint = field.annotation
+        kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
         if cls._owner is not None and Decimal in kinds and not field.metadata:
             return Number.of(limits_of(cls._owner, si_name(name)), power_of_ten(name))(value)
         kind: Any = next((kind for kind in kinds if isinstance(kind, EnumMeta)), None)
