@@ -94,10 +94,7 @@ def _columns(problem: PursuitProblem) -> str:
 
 
 def read_axis(option: str, text: str) -> Axis:
-    """Read KEY=FROM:TO:N.
-
-    Raise `InputError` if the text has another form, the parameter is unknown, or a value is out of range.
-    """
+    """Read KEY=FROM:TO:N; raise `InputError` if it has another form, an unknown parameter, or a value out of range."""
     example = f"for example {option} {COLUMNS if option == '--x' else ROWS}"
     key, _, span = text.partition("=")
     choice(option, key, parameter_names())

@@ -191,10 +191,7 @@ def _carried(motion: LinearMotion, grid: Floats, start: Floats, costate_end: Flo
 
 
 def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
-    """Check that the times of the start, of arrivals and of departures increase.
-
-    Raise `ValueError` if one is not finite, or not after the previous one.
-    """
+    """Raise `ValueError` unless the times of the start, of arrivals and of departures are finite and increase."""
     if not (np.isfinite(start_s) and np.isfinite(arrive_s).all() and np.isfinite(leave_s).all()):
         raise ValueError("a time is not finite")
     before = np.concatenate([[start_s], leave_s[:-1]])

@@ -239,10 +239,7 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
-    """Return the time available for travel, s; infinite without a latest time.
-
-    Raise `NoRoomError` if the visits, with stays `dwell_s`, do not fit into the `limits`.
-    """
+    """Return the time for travel, s, infinite without a latest time; raise `NoRoomError` if the visits do not fit."""
     if limits.latest_s is None:
         return float(np.inf)
     stays = float(dwell_s[:-1].sum())

@@ -29,10 +29,7 @@ class Meet(Enum):
 
 @dataclass(frozen=True)
 class Target:
-    """A target; `dwell_s` is the duration of the stay with it, coasting, for a rendezvous only.
-
-    The constructor raises `ValueError` if the dwell is negative or not finite, or that of a flyby is not zero.
-    """
+    """A target, with the duration of the stay with it, 0 for a flyby; `ValueError` if it is not finite, or negative."""
 
     name: str
     meet: Meet = Meet.FLYBY

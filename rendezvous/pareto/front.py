@@ -65,10 +65,7 @@ def simplex_weights(craft: int, count: int) -> Floats:
 
 
 def distances(solution: EncounterSolution) -> Floats:
-    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, shape (n, n).
-
-    Raise `ValueError` if the craft have different M.
-    """
+    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution`, m/s^1.5, shape (n, n); `ValueError` if M differ."""
     if not solution.same_matrix:
         raise ValueError("the craft have different cost matrices: there is no one distance between their ideals")
     scaled = solution.ideals @ solution.costs[0].root.T

@@ -84,10 +84,7 @@ class LinearMotion(ABC):
 
 
 def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-    """Return end - start, s, none negative.
-
-    Raise `ValueError` if a time is not finite, or an end is before its start.
-    """
+    """Return end - start, s; raise `ValueError` if it is negative or not finite."""
     durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
     if not np.isfinite(durations).all():
         raise ValueError("a time is not finite")
