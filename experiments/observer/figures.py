@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -10,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from experiments.common.figure_style import IMPULSE, INK, MEASURED, SET_EDGE, SET_FILL, TRUTH, figure_grid, plain, style
 from experiments.observer.report import Report
+from infoset import Estimate
 from infoset.arrays import Floats
 
 _MOST_OUTLINES = 60
@@ -20,57 +24,48 @@ def draw_bounds(report: Report) -> Figure:
     """Draw the bounds of each state and their distance against time, with the true state of a simulation."""
     names = report.problem.names
     figure, grid = figure_grid(24.0 + 34.0 * len(names), len(names), 2, (18.0, 4.0, 11.0, 9.0), (17.0, 5.0))
-    panels, widths = grid[::2], grid[1::2]
     time, title = times(report)
-    lower, upper = (np.array([getattr(each, end) for each in report.estimates]) for end in ("lower", "upper"))
-    for index, (panel, name) in enumerate(zip(panels, names, strict=True)):
+    (lower, upper), smoothed = _ends(report.estimates), report.smoothed and _ends(report.smoothed)
+    dashed: dict[str, Any] = {"color": MEASURED, "linewidth": 0.9, "linestyle": (0, (4, 1.5))}
+    missing = np.isnan(report.data.measured).all(axis=1)
+    for index, (name, panel, width) in enumerate(zip(names, grid[::2], grid[1::2], strict=True)):
         panel.fill_between(time, lower[:, index], upper[:, index], color=SET_FILL, label="possible states")
         for ends in (lower, upper):
             panel.plot(time, ends[:, index], color=SET_EDGE, linewidth=0.8)
-        if report.smoothed is not None:
-            for end in ("lower", "upper"):
-                values = [getattr(each, end)[index] for each in report.smoothed]
-                label = "with later measurements" if end == "lower" else None
-                panel.plot(time, values, color=MEASURED, linewidth=0.9, linestyle=(0, (4, 1.5)), label=label)
+        width.plot(time, upper[:, index] - lower[:, index], color=SET_EDGE)
+        if smoothed:
+            first, last = smoothed[0][:, index], smoothed[1][:, index]
+            panel.plot(time, first, label="with later measurements", **dashed)
+            panel.plot(time, last, **dashed)
+            width.plot(time, last - first, **dashed)
         if report.data.states is not None:
             panel.plot(time, report.data.states[:, index], color=TRUTH, linewidth=1.1, label="true state")
-        missing = np.isnan(report.data.measured).all(axis=1)
         if missing.any():
-            panel.plot(
-                time[missing],
-                np.full(missing.sum(), 0.02),
-                transform=panel.get_xaxis_transform(),
-                color=INK,
-                linestyle="none",
-                marker="|",
-                label="no measurement",
-            )
+            mark: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": "|", "label": "no measurement"}
+            low = np.full(missing.sum(), 0.02)
+            panel.plot(time[missing], low, transform=panel.get_xaxis_transform(), **mark)
         if report.contradicted:
             _mark_contradiction(panel, report, f"no state from step {int(report.inconsistency.step)} on")
+            _mark_contradiction(width, report)
         panel.set_ylabel(plain(name))
         panel.margins(x=0.01)
-        if index < len(names) - 1:
-            panel.tick_params(labelbottom=False)
-    for index, (panel, name) in enumerate(zip(widths, names, strict=True)):
-        panel.plot(time, upper[:, index] - lower[:, index], color=SET_EDGE)
-        if report.smoothed is not None:
-            smoothed = [float(each.upper[index] - each.lower[index]) for each in report.smoothed]
-            panel.plot(time, smoothed, color=MEASURED, linewidth=0.9, linestyle=(0, (4, 1.5)))
-        if report.contradicted:
-            _mark_contradiction(panel, report)
-        panel.set_ylabel(f"width of {plain(name)}")
-        panel.margins(x=0.01, y=0.05)
-        panel.set_ylim(bottom=0.0)
-        if index < len(names) - 1:
-            panel.tick_params(labelbottom=False)
-    for panel in (panels[-1], widths[-1]):
-        panel.set_xlabel(title)
-    if report.problem.step_s is None:
-        for panel in grid:
-            panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    handles, labels = panels[0].get_legend_handles_labels()
+        width.set_ylabel(f"width of {plain(name)}")
+        width.margins(x=0.01, y=0.05)
+        width.set_ylim(bottom=0.0)
+        for axes in (panel, width):
+            axes.tick_params(labelbottom=index == len(names) - 1)
+            if report.problem.step_s is None:
+                axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    for axes in grid[-2:]:
+        axes.set_xlabel(title)
+    handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper center", ncols=5, columnspacing=1.2)
     return figure
+
+
+def _ends(estimates: Sequence[Estimate]) -> list[Floats]:
+    """Return the lower and the upper bounds of the states, each of shape (N, n)."""
+    return [np.array([getattr(estimate, end) for estimate in estimates]) for end in ("lower", "upper")]
 
 
 def _mark_contradiction(panel: Axes, report: Report, label: str | None = None) -> None:
