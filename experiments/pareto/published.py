@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from experiments.common.published_number import (
 )
 from experiments.pareto.file import load_pareto
 from infoset.arrays import Floats
-from rendezvous.pareto import Encounter, EncounterSolution, solve_encounter
+from rendezvous.pareto import Encounter, EncounterSolution, Plan, solve_encounter
 from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire
 
 PAPER = "pareto"
@@ -180,7 +180,9 @@ def _starts(velocities: Floats) -> list[PublishedNumber]:
 
 
 def _results(solution: EncounterSolution) -> tuple[PublishedNumber, ...]:
-    return (*_costs(solution), *_controls(solution), *_laws(solution), *_positions(solution))
+    controls = _fitted(solution, "u in section 3", ("u_1", "u_2", "u_3"), _CONTROLS, Plan.control)
+    laws = _fitted(solution, "x(t) in section 3", _STATE_NAMES, _LAWS, Plan.state)
+    return (*_costs(solution), *controls, *laws, *_positions(solution))
 
 
 def _costs(solution: EncounterSolution) -> list[PublishedNumber]:
@@ -235,36 +237,25 @@ def _coefficients(terms: Mapping[str, str], times: Floats, values: Floats) -> Fl
     return np.asarray(np.linalg.lstsq(basis / size, values, rcond=None)[0] / size)
 
 
-def _over_orbits() -> Floats:
-    """Return times over two orbits: in the 30 s of the flight the terms are nearly dependent."""
-    return np.linspace(0.0, 4.0 * np.pi / RATE_RAD_S, 200)
-
-
-def _controls(solution: EncounterSolution) -> list[PublishedNumber]:
-    times, numbers = _over_orbits(), []
-    for craft, (name, components) in enumerate(zip(_CRAFT, _CONTROLS, strict=True)):
-        values = solution.plan(craft).control(times)
-        for axis, terms in enumerate(components):
-            printed = {f"{name}, u_{axis + 1}, {term} (SI)": text for term, text in terms.items()}
-            numbers += _REFERENCE.numbers("u in section 3", printed, _coefficients(terms, times, values[:, axis]))
-    return numbers
-
-
-def _laws(solution: EncounterSolution) -> list[PublishedNumber]:
-    times, numbers = _over_orbits(), []
-    for craft, (name, components) in enumerate(zip(_CRAFT, _LAWS, strict=True)):
-        values = solution.plan(craft).state(times)
-        for axis, terms in enumerate(components):
-            coefficients = _coefficients(terms, times, values[:, axis])
-            numbers += [
-                _number("x(t) in section 3", f"{name}, {_STATE_NAMES[axis]}, {term} (SI)", text, float(ours))
-                for (term, text), ours in zip(terms.items(), coefficients, strict=True)
-            ]
-    return numbers
+def _fitted(
+    solution: EncounterSolution,
+    source: str,
+    quantities: Sequence[str],
+    printed: Sequence[Sequence[Mapping[str, str]]],
+    sampled: Callable[[Plan, Floats], Floats],
+) -> list[PublishedNumber]:
+    """Return coefficients fitted over two orbits: in the 30 s of the flight the terms are nearly dependent."""
+    times = np.linspace(0.0, 4.0 * np.pi / RATE_RAD_S, 200)
+    return [
+        _number(source, f"{craft}, {quantity}, {term} (SI)", text, float(ours))
+        for index, (craft, components) in enumerate(zip(_CRAFT, printed, strict=True))
+        for quantity, terms, values in zip(quantities, components, sampled(solution.plan(index), times).T, strict=False)
+        for (term, text), ours in zip(terms.items(), _coefficients(terms, times, values), strict=True)
+    ]
 
 
 def _number(source: str, name: str, printed: str, ours: float) -> PublishedNumber:
-    """Return a number of (3.1) or of a law of motion, a few of which are known to differ."""
+    """Return a number of (3.1), of a control or of a law of motion, a few of which are known to differ."""
     mended = {"8.7329105e7": "8.73291025e7"}.get(printed)
     if mended is not None:
         return _REFERENCE.number(source, name, printed, ours, corrected=mended, note=_LOST_DIGITS)
