@@ -63,7 +63,7 @@ nitpick_ignore = [
         "experiments.reachability.file": ("Rendezvous",),
         "guidance.predictive": ("ManoeuvreState",),
         "guidance.proportional_navigation": ("PulseState",),
-        "infoset.observer_sets": ("Sets",),
+        "infoset.observer_sets": ("Polygons", "Polytopes"),
         "infoset.sensors": ("RangeOrRanges", "Measurements", "Geometry", "Cuttable"),
         "infoset.set_queries": ("SetQueries",),
         "infoset.set_state": ("SetState",),
