@@ -117,10 +117,10 @@ class _Rule:
 
 def limits_of(owner: type, field: str) -> Limits:
     """Return the limits that a dataclass declares for the numbers of a field; raise TypeError if it declares none."""
-    found = next(rule.limits for rule in _rules(owner) if rule.field == field)
-    if found is None:
+    limits = next(rule.limits for rule in _rules(owner) if rule.field == field)
+    if limits is None:
         raise TypeError(f"{owner.__name__}.{field} declares no limits")
-    return found
+    return limits
 
 
 def check_fields(owner: object) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from infoset import observer_steps, polygon_batches
 from infoset.arrays import Flags, Floats, Integers
@@ -87,54 +90,23 @@ class Polygons:
             generators, other, centre = motion.disturbance.generators, none, motion.disturbance.centre
         else:
             generators, other, centre = none, polygon_of(motion.disturbance).polygon(), np.zeros(2)
-        result = self._room(2 * len(generators) + len(other) + 4)
-        observer_steps.predict_all(
-            self.vertices,
-            self.counts,
-            np.ascontiguousarray(motion.matrix),
-            motion.shifts + centre,
-            motion.terms + np.abs(centre),
-            np.ascontiguousarray(generators),
-            np.ascontiguousarray(other),
-            SUM_SLACK,
-            result.vertices,
-            result.counts,
-        )
-        return result
+        more = 2 * len(generators) + len(other) + 4
+        shifts, terms = motion.shifts + centre, motion.terms + np.abs(centre)
+        arrays = motion.matrix, shifts, terms, generators, other
+        return self._apply(observer_steps.predict_all, more, *arrays, slack=SUM_SLACK)
 
     def cut(self, strips: Strips, excess: Floats) -> Polygons:
         """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
-        result = self._room(2 * len(strips.normals))
-        observer_steps.update_all(
-            self.vertices,
-            self.counts,
-            np.ascontiguousarray(strips.normals),
-            np.ascontiguousarray(strips.lower),
-            np.ascontiguousarray(strips.upper),
-            np.ascontiguousarray(strips.terms),
-            CUT_SLACK,
-            result.vertices,
-            result.counts,
-            excess,
-        )
-        return result
+        arrays = strips.normals, strips.lower, strips.upper, strips.terms, excess
+        return self._apply(observer_steps.update_all, 2 * len(strips.normals), *arrays, slack=CUT_SLACK)
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Polygons:
         """Return the states that lead to a state of the later set for some disturbance."""
         assert isinstance(later, Polygons)
         backward = later.predicted(motion.reversed_sum)
-        result = self._room(int(backward.counts.max(initial=0)) + 4)
-        observer_steps.cut_to_preimage(
-            self.vertices,
-            self.counts,
-            backward.vertices,
-            backward.counts,
-            np.ascontiguousarray(motion.matrix),
-            CUT_SLACK,
-            result.vertices,
-            result.counts,
-        )
-        return result
+        more = int(backward.counts.max(initial=0)) + 4
+        arrays = backward.vertices, backward.counts, motion.matrix
+        return self._apply(observer_steps.cut_to_preimage, more, *arrays, slack=CUT_SLACK)
 
     def support(self, direction: Floats) -> Floats:
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
@@ -147,10 +119,11 @@ class Polygons:
         centres, _ = ConvexPolygons.unchecked(self.vertices, self.counts).chebyshev_centre()
         return np.ma.filled(centres, np.nan)
 
-    def _room(self, more: int) -> Polygons:
-        """Return polygons to write, with room for `more` vertices more."""
-        room = int(self.counts.max(initial=0)) + more
-        return Polygons(np.empty((len(self.counts), room, 2)), np.empty_like(self.counts))
+    def _apply(self, kernel: Callable[..., None], more: int, *arrays: NDArray[Any], slack: float) -> Polygons:
+        """Return the polygons that a kernel writes, with at most `more` vertices more."""
+        result = np.empty((len(self.counts), int(self.counts.max(initial=0)) + more, 2)), np.empty_like(self.counts)
+        kernel(self.vertices, self.counts, *map(np.ascontiguousarray, arrays), slack, *result)
+        return Polygons(*result)
 
 
 @dataclass(frozen=True, eq=False)

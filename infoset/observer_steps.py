@@ -211,10 +211,10 @@ def update_all(
     lower: Floats,
     upper: Floats,
     terms: Floats,
+    excess: Floats,
     slack: float,
     out: Floats,
     made: Integers,
-    excess: Floats,
 ) -> None:
     """Write the part of each polygon that is within the strips of a measurement: at most 2 r vertices more.
 

@@ -186,22 +186,22 @@ def intersect(points: Points, count: int, other: Points, other_count: int, out: 
         return 0
     a, n = tidy(points, count)
     b, m = tidy(other, other_count)
-    found = np.empty((3 * (n + m), 2))
-    of_b, made = sides_of(a, n, b, m, found, 0)
-    of_a, made = sides_of(b, m, a, n, found, made)
+    corners = np.empty((3 * (n + m), 2))
+    of_b, made = sides_of(a, n, b, m, corners, 0)
+    of_a, made = sides_of(b, m, a, n, corners, made)
     for i in range(n if n > 2 else n - 1):
         j = i + 1 if i + 1 < n else 0
         for k in range(m if m > 2 else m - 1):
             p = k + 1 if k + 1 < m else 0
             if apart(of_b[i, k], of_b[i, p]) and apart(of_a[k, i], of_a[k, j]):
                 x, y = meeting(a, i, j, b, k, p)
-                put(found, made, x, y)
+                put(corners, made, x, y)
                 made += 1
-    return hull(found, made, out)
+    return hull(corners, made, out)
 
 
 @compiled
-def sides_of(a: Points, n: int, b: Points, m: int, found: Points, made: int) -> tuple[Points, int]:
+def sides_of(a: Points, n: int, b: Points, m: int, corners: Points, made: int) -> tuple[Points, int]:
     """Return the side of each edge of a on which each vertex of b is, shape (n, m); append vertices of b in a."""
     sides = np.empty((n, m))
     for k in range(m):
@@ -211,7 +211,7 @@ def sides_of(a: Points, n: int, b: Points, m: int, found: Points, made: int) -> 
             sides[i, k] = side(a[i, 0], a[i, 1], a[j, 0], a[j, 1], b[k, 0], b[k, 1])
             inside &= sides[i, k] >= 0.0
         if inside and (n > 2 or holds(a, n, b[k, 0], b[k, 1])):
-            put(found, made, b[k, 0], b[k, 1])
+            put(corners, made, b[k, 0], b[k, 1])
             made += 1
     return sides, made
 

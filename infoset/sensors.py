@@ -279,7 +279,7 @@ class AngleSensor(Sensor):
 
     @property
     def has_plane_angles_in_box(self) -> bool:
-        """Whether each plane angle is measured with a bound of its own, as in a plane."""
+        """Whether each plane angle is measured with a separate bound, as in a plane."""
         return self.convention is Convention.PLANE and not self.is_disc
 
     @property
