@@ -22,8 +22,6 @@ class KalmanBank:
 
     Parameters
     ----------
-    batch : int
-        Number of engagements.
     is_augmented : bool
         Estimate the lateral acceleration of the target.
     members : int

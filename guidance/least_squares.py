@@ -52,8 +52,6 @@ class LeastSquaresFit:
 
     Parameters
     ----------
-    batch : int
-        Number of engagements.
     is_augmented : bool
         Estimate the lateral acceleration of the target, which is constant in the fit.
     iterations : int

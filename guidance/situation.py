@@ -23,8 +23,6 @@ class Situation:
 
     Parameters
     ----------
-    step : int
-        Number of this step; the first is 0.
     predicted_miss : PredictedMiss
         Interval of the miss without further impulses, with the points of the set that reach its ends.
     budget_left_m_s : ndarray, shape (B,)
@@ -50,8 +48,6 @@ class Situation:
         Whether an impulse can be decided in this step; what a strategy returns is ignored if not.
     lead_s : float
         Time from a decision to its impulse, s.
-    arrival_s : float
-        Time from now to the nominal arrival, s.
     later_times_s : ndarray, shape (n,), or None
         Times since the start at which impulses of later decisions can be given, s; None is every later step.
     pending : tuple of (float, ndarray)

@@ -48,10 +48,6 @@ class InformationSet(InformationSetView):
 
     Parameters
     ----------
-    model : SetModel
-        Known constants and assumptions.
-    batch : int
-        Number of engagements B; one by default.
     guarantee : bool
         Whether to compute the guaranteed miss Phi, which doubles the run time. Only the guaranteed model with a box as
         initial set has one.

@@ -140,8 +140,6 @@ class SetModel:
         The step Delta of observation and control, s.
     bounds : StateBox
         Possible states at t = 0.
-    angle_sensor : AngleSensor
-        Error law of the line-of-sight angle.
     disturbance_m_s2 : float
         Bound of the acceleration along z, m/s^2: nu of the fictitious one in the paper's model, that of the target's
         manoeuvres in the guaranteed model.
@@ -151,12 +149,6 @@ class SetModel:
         Number of x-sections at the start, on a uniform grid over the possible ranges, ends included.
     fewest_sections : int
         If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1.
-    initial_set : InitialSet
-        Shape of a section at the start.
-    kind : Model
-        What the set allows for.
-    recovery : Recovery
-        What happens to an empty set.
     gravity_m_s2 : float
         Bound of the difference of gravity along z; used by the guaranteed model only.
     gravity_speed_change : float

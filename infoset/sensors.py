@@ -179,8 +179,6 @@ class AngleSensor(Sensor):
         Range at which the first of the two holds, m.
     error_at_nominal_range_y_rad, error_at_zero_range_y_rad : float or None
         The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For space only.
-    convention : Convention
-        Which two angles are measured in space.
     error_shape : ErrorShape or None
         Shape of the set of errors in space; None is DISC for the convention CONE and BOX for the others. The
         information set takes a disc as the box around it.
@@ -188,8 +186,6 @@ class AngleSensor(Sensor):
         A number makes the sensor a camera. Its bound at the distance d is pixel + centroid_error_m / d, the same for
         both axes; `error_at_nominal_range_rad` and `error_at_zero_range_rad` are both the pixel error. The centroid
         error is the greatest distance between the measured point of the body and its centre, m.
-    bias : Bias
-        How the random error of a camera is drawn.
     first_image_s, last_image_s : float
         Times before the nominal arrival of the first and the last image, s. Images begin at the start for None, and
         continue until the true arrival for 0.

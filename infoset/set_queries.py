@@ -95,11 +95,6 @@ class SetQueries:
         The state to read. It may be shared with the set that changes it.
     axis : str or None
         Lateral axis, "y" or "z", whose plane is read as that of a planar set; None is the whole set.
-
-    Attributes
-    ----------
-    model : SetModel
-        Known constants and assumptions.
     """
 
     def __init__(self, state: SetState, axis: str | None = None) -> None:

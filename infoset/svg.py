@@ -23,12 +23,8 @@ class Plane:
 
     Parameters
     ----------
-    x, y : tuple of float
-        Limits of the axes.
     x_title, y_title, title : str
         Names of the axes, with units, and the text above the plane.
-    height : int
-        Height of the picture in pixels.
     levels : sequence of (float, str), or None
         Ticks of the y axis and their labels; None chooses round values.
     """

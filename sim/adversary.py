@@ -63,8 +63,6 @@ class WorstEngagement:
     ----------
     scenario : Scenario
         Scenario of the search, with the start of this engagement as its dispersion.
-    miss_m : float
-        True miss, m.
     truth_kept : bool
         Whether the true state was inside its section after every measurement.
     position_m, velocity_m_s : ndarray, shape (2,) or (3,)

@@ -107,8 +107,6 @@ class Campaign:
     ----------
     runs : int
         Number of runs, from run 0; with `until` the greatest number.
-    folder : str or Path
-        Folder for the results.
     seed : int
         Run K is the same engagement in every campaign and experiment with this seed.
     noise : CampaignNoise or None

@@ -46,10 +46,6 @@ class Chunk:
         Number of the chunk in the campaign, and of the scenario in a sweep; a campaign has the cell 0.
     scenario : Scenario
         Scenario; its noise is not used.
-    guarantee : bool
-        Whether the guaranteed model computes the guaranteed miss.
-    strategy : Strategy or None
-        Guidance strategy; None is the scenario's.
     versions : tuple of pairs of str
         Versions of the packages that must compute it.
     """

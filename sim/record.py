@@ -49,8 +49,6 @@ class StepRecord:
 
     Parameters
     ----------
-    axes : mapping of str to AxisStep
-        The step along each lateral axis: "z" in a plane, "y" and "z" in space.
     truth_margin_m : float or None
         Signed margin of the true state in its section at the last measurement; None before the first.
     sections : tuple of Section
@@ -111,8 +109,6 @@ class Record:
         Simulated scenario, with the noise, tie rule and range meter of this engagement.
     seed, run : int
         Root seed and run number; the same values give the same engagement.
-    result : Results
-        Results, as a batch of one.
     noise : str or None
         Name of the noise that replaced that of the scenario; None if none did.
     inconsistency : Inconsistency or None

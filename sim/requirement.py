@@ -181,8 +181,6 @@ class Verdict:
     ----------
     decision : Decision
         Met if the interval is on the right side of the bound, not met if it is on the wrong side.
-    runs : int
-        Size of the sample.
     value : float or None
         The required quantile of the sample, in its unit, or the share of hits; None if the sample does not show it
         (`sim.statistics.shows`), or if too many runs have no value.

@@ -91,16 +91,10 @@ class Scenario:
     ----------
     sun : Sun or None
         None is free space.
-    nominal_range_m : float
-        Nominal range at t = 0, m.
     dispersion : StateBox
         True starts (B0 x D0), uniform, unknown on board. A fixed value has equal ends.
     set_model : SetModel
         Knowledge and assumptions on board, with the closing speed, the step and the angle sensor.
-    noise : NoiseKind
-        How measurement errors are chosen.
-    tie : TieRule
-        How game noise breaks ties.
     target : Target or None
         A target that manoeuvres; None does not.
     body : Body or None

@@ -83,8 +83,6 @@ class Manifest:
         cells, then the second ones, so that cells can be extended.
     cells_hash : str
         Fingerprint of the scenarios of a sweep's cells; empty for a campaign.
-    versions : mapping of str to str
-        Versions of the packages on which results depend.
     made_by : mapping of str to str
         Version of Python and kind of machine of the first session; they may differ when a campaign is resumed.
     """
