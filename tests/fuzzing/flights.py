@@ -6,17 +6,15 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance import Strategy, Thruster, TieRule
 from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
+from infoset.arrays import Floats
 from infoset.model import Interval
 from infoset.sensors import Convention
 from sim import Body, Results, Scenario, Target
 from sim.draws import Draws, corners, greatest_number_of_steps
 from sim.engagement import Engagements, Step
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from experiments import load_scenario
 from experiments.common.errors import InputError
@@ -52,8 +51,6 @@ from sim.draws import Draws, draw
 from sim.kepler import LONGEST_SUBSTEP_S
 
 from .flights import Flight, engagement, fly, mirrored, numbers, scaled
-
-Floats = NDArray[np.float64]
 
 ANGLES_RAD = (1e-12, 1e-9, 1e-6, 1e-3, 1e-2, 0.1, 0.5, 1.0)
 RANGES_M = (1.0, 1e3, 1e6, 1e9, 1e12)

@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from infoset.polytope import (
     Polytope,
     product,
@@ -29,7 +29,6 @@ from infoset.polytope import (
 )
 from rendezvous.reachability import EmptyTubeError, ReachabilityProblem, Route, SetKind, Solution, solve
 
-Floats = NDArray[np.float64]
 some = settings(max_examples=4, deadline=None)
 few = settings(max_examples=2, deadline=None)
 

@@ -24,12 +24,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Model, SetModel, StateBox, to_shapely
+from infoset.arrays import Floats
 from infoset.shapes import from_shapely
 
-Floats = NDArray[np.float64]
 some = settings(max_examples=10, deadline=None)
 few = settings(max_examples=3, deadline=None)
 

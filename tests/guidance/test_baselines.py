@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import guidance.least_squares
 from experiments import load_scenario
@@ -28,11 +27,10 @@ from guidance import (
 from guidance.estimate import independent_error_rad
 from guidance.scripted_noise import ScriptedNoise
 from infoset import AngleSensor, Bias, InformationSet, RangeSensor, SetModel, StateBox
+from infoset.arrays import Flags, Floats
 from infoset.sensors import Sensor
 from sim.draws import draw
 from sim.engagement import Engagements
-
-Floats = NDArray[np.float64]
 
 E = 6e3
 """Closing speed, m/s."""
@@ -281,7 +279,7 @@ def measured(
     model: SetModel,
     truth: Truth,
     steps: int,
-    seen: NDArray[np.bool_] | None = None,
+    seen: Flags | None = None,
     errors_rad: Floats | None = None,
     **others: Any,
 ) -> tuple[Any, Situation]:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from guidance import GameNoise, LineOfSight, RandomNoise, ScriptedNoise, TieRule
 from guidance.game_noise import SwitchingNoise
@@ -29,9 +28,8 @@ from infoset import (
     SetModel,
     StateBox,
 )
+from infoset.arrays import Floats
 from infoset.sensors import Sensor
-
-Floats = NDArray[np.float64]
 
 BATCH = 4
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)

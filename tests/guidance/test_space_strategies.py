@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from experiments import load_scenario
 from guidance import (
@@ -41,11 +40,10 @@ from infoset import (
     SetModel,
     StateBox,
 )
+from infoset.arrays import Floats
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
-
-Floats = NDArray[np.float64]
 
 BATCH = 3
 ALL = np.ones(BATCH, dtype=bool)

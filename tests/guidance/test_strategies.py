@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from experiments import load_scenario
 from guidance import (
@@ -30,8 +29,6 @@ from infoset import AngleSensor, ExtremePoints, InformationSet, PredictedMiss, R
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
-
-Floats = NDArray[np.float64]
 
 E = 58e3
 THRUSTER = Thruster(budget_m_s=1000.0, least_impulse_m_s=0.25, greatest_impulse_m_s=7.5)

@@ -26,9 +26,9 @@ import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from numba import types
-from numpy.typing import NDArray
 
 from infoset import chain_steps, chains, replays, whole_chains
+from infoset.arrays import Floats
 from infoset.chains import (
     BEGIN,
     CAPACITY,
@@ -45,7 +45,6 @@ from infoset.chains import (
     V_ORIGIN,
 )
 
-Floats = NDArray[np.float64]
 Exact = tuple[Fraction, Fraction]
 Level = tuple[float, float, float]
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from infoset import (
@@ -25,13 +24,12 @@ from infoset import (
     StateBox,
     Zonotope,
 )
+from infoset.arrays import Floats
 from infoset.observer_sets import Polytopes
 from infoset.observer_steps import enlarge
 from infoset.polytope import HIGHS, Polytope
 from infoset.section_life import SUM_SLACK
 from tests.infoset.test_polygon_oracle import Exact, hull
-
-Floats = NDArray[np.float64]
 
 PUBLISHED: dict[str, Any] = json.loads(
     (Path(__file__).parents[1] / "data" / "observer" / "alamo-2005.json").read_text(encoding="utf-8")

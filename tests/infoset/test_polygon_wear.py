@@ -15,11 +15,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from infoset import polygon, polygon_hull, polygon_sum
+from infoset.arrays import Floats
 
-Floats = NDArray[np.float64]
 Exact = tuple[Fraction, Fraction]
 
 EPS = Fraction(1, 2**52)

@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from infoset import AngleSensor, Convention, ErrorShape, InitialSet, Model, SetModel, StateBox
+from infoset.arrays import Floats
 from infoset.section_law import section_laws
 from infoset.section_life import slope_band
-
-Floats = NDArray[np.float64]
 
 EPS = float(np.finfo(np.float64).eps)
 WIDE, SLOW = (-1e7, 1e7), (-100.0, 100.0)

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from infoset import AngleSensor, Convention, ErrorShape, ExtremePoints, PredictedMiss, RangeSensor, RateSensor
-
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 EPS = float(np.finfo(np.float64).eps)
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)

@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from guidance import NoiseKind, Patient, Situation, Strategy, SymmetricMiss, Thruster, TieRule
 from infoset import AngleSensor, ExtremePoints, InformationSet, InitialSet, Model, PredictedMiss, SetModel, StateBox
+from infoset.arrays import Floats
 from sim import Results, Scenario, fly_one, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from tests.space import in_space
-
-Floats = NDArray[np.float64]
 
 E, RANGE = 58e3, 5800e3
 

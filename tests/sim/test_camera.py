@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from guidance import NoiseKind, Situation, Thruster, TieRule
@@ -26,6 +25,7 @@ from infoset import (
     SetModel,
     StateBox,
 )
+from infoset.arrays import Floats
 from infoset.section_law import section_laws
 from infoset.section_life import slope_band
 from sim import Record, Results, Scenario, fly_one, simulate
@@ -35,8 +35,6 @@ from sim.closed_form import images_s, possible_miss_m, possible_miss_of
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.pair import fly_pair
-
-Floats = NDArray[np.float64]
 
 SPEED_M_S, PIXEL_RAD, CENTROID_M = 6140.0, 5e-6, 12.0
 FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0

@@ -6,16 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from guidance import NoiseKind, Situation, TieRule
 from infoset import InitialSet, Model, StateBox
+from infoset.arrays import Floats
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
 from sim.kepler import Passage, Sight
-
-Floats = NDArray[np.float64]
 
 
 def fly(scenario: Scenario, draws: Draws, truth: object = None) -> Results:

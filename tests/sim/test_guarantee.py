@@ -11,10 +11,10 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from guidance import LineOfSight, NoiseKind, RandomNoise
 from infoset import InformationSetView, InitialSet, Model, RateSensor, StateBox
+from infoset.arrays import Floats
 from infoset.section_law import section_laws
 from sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
 from sim.draws import draw
@@ -22,8 +22,6 @@ from sim.engagement import Engagements
 from sim.gravity import MARGIN, on_board_model, with_gravity
 from sim.kepler import KeplerMotion
 from sim.target import acceleration_m_s2
-
-Floats = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")

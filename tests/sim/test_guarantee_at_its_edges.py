@@ -11,18 +11,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, RandomNoise, Thruster, TieRule
 from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, RateSensor, SetModel, StateBox
+from infoset.arrays import Floats
 from infoset.section_law import BOUND_SLACK, SectionLaw, section_laws
 from infoset.section_life import LastSight, rate_band
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 
-Floats = NDArray[np.float64]
 CASES = Path(__file__).parent / "cases"
 HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
 

@@ -7,16 +7,14 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from infoset import AngleSensor, InformationSet, InitialSet, Model, StateBox, guaranteed_miss
+from infoset.arrays import Floats
 from infoset.section_life import IMPULSE
 from sim import Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
 from sim.kepler import LONGEST_SUBSTEP_S, KeplerMotion, longest_substep_s
-
-Floats = NDArray[np.float64]
 
 
 @pytest.mark.parametrize(("flight_s", "speed_m_s"), [(14_400.0, 6.14e3), (86_400.0, 10.3e3), (86_400.0, 1e3)])

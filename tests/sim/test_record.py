@@ -7,16 +7,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from guidance import LineOfSight, NoiseKind
 from infoset import Convention, InformationSetView, InitialSet, Model, RangeSensor, Recovery, Sensor
+from infoset.arrays import Flags, Floats
 from infoset.sensors import SENSORS, Cuttable, Geometry, Measurements
 from sim import Outcome, Scenario, fly_one, lower_bound, simulate
 from sim.draws import EXECUTION, START, TARGET, TIE
 from tests.space import in_space
-
-Floats = NDArray[np.float64]
 
 
 class RangeAlone:
@@ -79,7 +77,7 @@ class StreakSensor(Sensor):
     def bound(self, sight: Geometry) -> float:
         return 0.5
 
-    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+    def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         rate_of_a_pixel = self.pixel_rad / self.exposure_s
         sets.measure_rate(measured[self.name] * rate_of_a_pixel, 0.5 * rate_of_a_pixel, where)
 

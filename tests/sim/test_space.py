@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from guidance import LineOfSight, NoiseKind, TieRule
 from guidance.scripted_noise import ScriptedNoise
@@ -17,8 +16,6 @@ from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements, Step
 from tests.space import in_space
-
-Floats = NDArray[np.float64]
 
 NOISES = [(NoiseKind.RANDOM, TieRule.UPPER), *((NoiseKind.GAME, tie) for tie in TieRule)]
 

@@ -6,18 +6,16 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from infoset import Convention, ErrorShape, Model, SetModel
+from infoset.arrays import Floats
 from sim import Manoeuvre, Scenario, Sun, Target, simulate
 from sim.draws import Draws, Y, corners, draw, generator, in_disc
 from sim.gravity import greatest_impulses_m_s, on_board_model, with_gravity
 from sim.kepler import SPACECRAFT, KeplerMotion, accelerate_all, leap_all, sun_and_orbit
 from sim.target import acceleration_m_s2
 from tests.space import in_space
-
-Floats = NDArray[np.float64]
 
 SUN = Sun(1.324948e20, 150e9, np.pi / 2)
 BATCH = 20

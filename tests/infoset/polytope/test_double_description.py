@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from infoset.polytope import Polytope
 from infoset.polytope.double_description import FacetsAndVertices
-
-Floats = NDArray[np.float64]
 
 small = st.integers(-3, 3).map(float)
 SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])

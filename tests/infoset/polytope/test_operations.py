@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from infoset import ConvexPolygons
+from infoset.arrays import Floats
 from infoset.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError
 from infoset.polytope import cut as old_cut
 from infoset.polytope import intersection as old_intersection
@@ -25,7 +25,6 @@ from tests.rendezvous.reachability.rationals import RationalSet, polyhedron_of, 
 
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
 
-Floats = NDArray[np.float64]
 some = settings(max_examples=15, deadline=None)
 SEED, SPACE = st.integers(0, 10**6), st.integers(3, 4)
 KIND = st.sampled_from(["plain", "flat", "segment", "point", "mixed", "lattice"])

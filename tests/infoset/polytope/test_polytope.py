@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from infoset.polytope import (
     EmptyPolytopeError,
     Polytope,
@@ -22,8 +22,6 @@ from infoset.polytope import (
 from tests.rendezvous.reachability.rationals import rational_hull, rational_intersection
 
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
-
-Floats = NDArray[np.float64]
 
 
 def random_points(seed: int, count: int, size: int, rank: int) -> Floats:
