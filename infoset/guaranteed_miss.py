@@ -18,7 +18,7 @@ from infoset.concave_bounds import bound_between
 from infoset.history import History, Tapes
 from infoset.location import LABEL_RESOLUTION, locate_end, search_window
 from infoset.replays import LOWER, PROBE, ROWS, UPPER, ReplayRoom, Workspace, keep_section, probe, run, workspace
-from infoset.section_law import SectionLaw, law_of
+from infoset.section_law import Laws, SectionLaw, law_of
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
 from infoset.section_passes import Sections, tape_of
 from infoset.section_stack import SectionStack, impulse_doubts
@@ -115,7 +115,7 @@ def bound_leaving(
     elapsed: int,
     tape: Tape,
     errors: Floats | None,
-    laws: Floats,
+    laws: Laws,
     room: Workspace,
     outlines: Outlines,
     pieces: Floats,
@@ -238,7 +238,7 @@ def bound_leaving_all(
     tapes: Tapes,
     errors: Floats | None,
     sections: Sections,
-    laws: Floats,
+    laws: Laws,
     room: Workspace,
     outlines: Outlines,
     pieces: Floats,
@@ -300,7 +300,7 @@ def bound_leaving_all(
 
 @allocation_free
 def spread_at(
-    label: float, elapsed: int, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom, outline: Floats
+    label: float, elapsed: int, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom, outline: Floats
 ) -> float:
     """Return half the width of the predicted misses at one label, m, in space half the diagonal; zero if it is dead."""
     if run(label, tape, errors, laws, room)[0] != ALIVE:

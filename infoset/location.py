@@ -31,7 +31,7 @@ from infoset.replays import (
     probe,
     run,
 )
-from infoset.section_law import law_of
+from infoset.section_law import Laws, law_of
 from infoset.section_life import ALIVE, Tape, summarise_section
 from infoset.section_passes import Sections, row_of, tape_of
 
@@ -59,7 +59,7 @@ def locate_end(
     resolution: float,
     tape: Tape,
     errors: Floats | None,
-    laws: Floats,
+    laws: Laws,
     room: Workspace,
     row: int,
 ) -> tuple[float, float]:
@@ -105,7 +105,7 @@ def locate_end(
 
 
 @allocation_free
-def search_living(resolution: float, tape: Tape, errors: Floats | None, laws: Floats, room: Workspace) -> bool:
+def search_living(resolution: float, tape: Tape, errors: Floats | None, laws: Laws, room: Workspace) -> bool:
     """Search for a living label between the first three known ones, which are dead; the middle one outlives the others.
 
     Return whether the middle label now lives; if not, there is no living label in the bracket. The pair (event,
@@ -140,7 +140,7 @@ def search_window(
     resolution: float,
     tape: Tape,
     errors: Floats | None,
-    laws: Floats,
+    laws: Laws,
     room: Workspace,
 ) -> bool:
     """Return whether a label of the tape's window lives with the bands that are convex on the window.
@@ -167,7 +167,7 @@ def search_everywhere(
     resolution: float,
     tape: Tape,
     errors: Floats | None,
-    laws: Floats,
+    laws: Laws,
     room: Workspace,
 ) -> tuple[bool, float]:
     """Find a living label within limits if the living labels need not form an interval, or prove that none lives.
@@ -212,7 +212,7 @@ def locate_living(
     sections: Sections,
     tape: Tape,
     errors: Floats | None,
-    laws: Floats,
+    laws: Laws,
     room: Workspace,
 ) -> Living:
     """Locate the living labels of an engagement within limits, from its stored labels.
@@ -285,7 +285,7 @@ def locate_living(
 
 
 @allocation_free
-def is_convex(laws: Floats) -> bool:
+def is_convex(laws: Laws) -> bool:
     """Whether sets without rates are convex along all axes, so that the living labels form one interval."""
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
@@ -304,7 +304,7 @@ def refine_all(
     tapes: Tapes,
     errors: Floats | None,
     sections: Sections,
-    laws: Floats,
+    laws: Laws,
     room: Workspace,
 ) -> int:
     """Replace the sections of the wanted engagements by a grid of `number` over the living labels, ends included.

@@ -11,7 +11,7 @@ from infoset import chains, polygon, whole_chains
 from infoset._compile import ZERO, allocation_free, by_reference, constants, entry, inlined
 from infoset.chains import copy_section, empty_sections, working_room
 from infoset.history import History, Tapes
-from infoset.section_law import law_of
+from infoset.section_law import Laws, law_of
 from infoset.section_life import (
     ALIVE,
     ANGLE,
@@ -155,7 +155,7 @@ AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
 
 
 @allocation_free
-def replay(label: float, tape: Tape, errors: Floats | None, laws: Floats, channel: int, room: ReplayRoom) -> int:
+def replay(label: float, tape: Tape, errors: Floats | None, laws: Laws, channel: int, room: ReplayRoom) -> int:
     """Compute the section at any label along one axis from a whole history, in row `PROBE` of the axis.
 
     Returns
@@ -169,7 +169,7 @@ def replay(label: float, tape: Tape, errors: Floats | None, laws: Floats, channe
 
 @allocation_free
 def continue_replay(
-    done: Replayed, label: float, tape: Tape, errors: Floats | None, laws: Floats, channel: int, room: ReplayRoom
+    done: Replayed, label: float, tape: Tape, errors: Floats | None, laws: Laws, channel: int, room: ReplayRoom
 ) -> tuple[int, Replayed]:
     """Apply the events of a tape that are not done yet; return what `replay` does, and the events done.
 
@@ -221,7 +221,7 @@ def continue_replay(
 
 
 @allocation_free
-def run(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom) -> tuple[int, float, int]:
+def run(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom) -> tuple[int, float, int]:
     """Replay a label along all axes.
 
     Returns
@@ -253,7 +253,7 @@ def run(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: Rep
 
 @allocation_free
 def probe(
-    known: Records, i: int, label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom
+    known: Records, i: int, label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom
 ) -> bool:
     """Replay a label and write it to record `i`; return whether it lives."""
     died, overlap, emptied = run(label, tape, errors, laws, room)
@@ -286,7 +286,7 @@ def outlives(one: Record, other: Record) -> bool:
     return bool(one.died > other.died or (one.died == other.died and one.overlap > other.overlap))
 
 
-def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, laws: Floats) -> Floats:
+def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, laws: Laws) -> Floats:
     """Return the signed distances, m, of states (V, z) to the boundaries of sections during an engagement, (C, L, B).
 
     Parameters
@@ -297,7 +297,7 @@ def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history
         Number of events before each state.
     v, z : ndarray, shape (C, L, B)
         The states along each axis, m/s and m.
-    laws : ndarray, shape (C, constants)
+    laws : recarray, shape (C,)
         Constants of the model.
 
     Returns
@@ -319,7 +319,7 @@ def margins_all(
     z: Floats,
     tapes: Tapes,
     errors: Floats | None,
-    laws: Floats,
+    laws: Laws,
     room: ReplayRoom,
     margins: Floats,
 ) -> None:
@@ -374,6 +374,6 @@ def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: floa
 
 
 @entry
-def replay_label(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom) -> int:
+def replay_label(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom) -> int:
     """Replay a label from Python; return the event at which it became empty, or ALIVE."""
     return run(label, tape, errors, laws, room)[0]

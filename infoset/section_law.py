@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import NamedTuple
+from typing import NamedTuple, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset._compile import inlined
 from infoset.model import InitialSet, Interval, SetModel
@@ -96,6 +95,14 @@ class SectionLaw(NamedTuple):
     least_range: float
 
 
+
+
+_RECORD = np.dtype(list(get_type_hints(SectionLaw).items()), align=True)
+
+Laws = np.recarray[tuple[int], np.dtype[np.record]]
+"""Constants of the axes, shape (C,), as records, of which kernels take the address."""
+
+
 def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
     """Return the constants of a model for the kernels, for each of its lateral axes."""
     laws = [_law(model.axis(name)) for name in model.axes]
@@ -121,45 +128,16 @@ def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
     )
 
 
-def law_table(laws: tuple[SectionLaw, ...]) -> NDArray[np.float64]:
-    """Return the constants of all axes as an array, shape (C, number of constants), for `law_of`."""
-    return np.array(laws, dtype=np.float64)
+def law_table(laws: tuple[SectionLaw, ...]) -> Laws:
+    """Return the constants of all axes as an array of records, shape (C,), for kernels."""
+    return np.array(list(laws), dtype=_RECORD).view(np.recarray)
 
 
 @inlined
-def law_of(table: NDArray[np.float64], channel: int) -> SectionLaw:
+def law_of(laws: Laws, channel: int) -> SectionLaw:
     """Return the constants of one axis from the array of all."""
-    row = np.uint64(channel)
-    return SectionLaw(
-        table[row, 0],  # closing_speed
-        table[row, 1],  # step
-        table[row, 2],  # disturbance
-        table[row, 3],  # half_v
-        table[row, 4],  # half_v_at_start
-        table[row, 5],  # disturbance_lead
-        table[row, 6],  # impulse_error
-        table[row, 7],  # error_at_zero_range
-        table[row, 8],  # error_slope
-        table[row, 9] != 0.0,  # exact_angles
-        table[row, 10],  # label_least
-        table[row, 11],  # label_greatest
-        table[row, 12],  # z_least
-        table[row, 13],  # z_greatest
-        table[row, 14],  # vz_least
-        table[row, 15],  # vz_greatest
-        table[row, 16],  # vx_least
-        table[row, 17],  # vx_greatest
-        table[row, 18] != 0.0,  # rectangle
-        int(table[row, 19]),  # angles
-        table[row, 20],  # other_error_at_zero_range
-        table[row, 21],  # other_error_slope
-        table[row, 22],  # pointing_along
-        table[row, 23],  # pointing_across
-        int(table[row, 24]),  # channel
-        int(table[row, 25]),  # other
-        table[row, 26],  # centroid_error
-        table[row, 27],  # least_range
-    )
+    law: SectionLaw = laws[np.uint64(channel)]
+    return law
 
 
 def _law(model: SetModel) -> SectionLaw:

@@ -9,7 +9,7 @@ import numpy as np
 from infoset import chain_steps, chains, whole_chains
 from infoset._compile import ZERO, allocation_free, by_reference, entry, inlined
 from infoset.history import Tapes
-from infoset.section_law import SectionLaw, law_of
+from infoset.section_law import Laws, SectionLaw, law_of
 from infoset.section_life import (
     ALIVE,
     CUT_SLACK,
@@ -107,7 +107,7 @@ def row_of(labels: Floats, channel: int, b: int, s: int) -> int:
 
 
 @entry
-def start_all(sections: Sections, laws: Floats) -> None:
+def start_all(sections: Sections, laws: Laws) -> None:
     """Write the initial sections of a batch, without their summaries."""
     labels, used, living = sections.labels, sections.used, sections.living
     origins, rings, marks = sections.origins, sections.rings, sections.marks
@@ -165,7 +165,7 @@ def step_all(
     elapsed: int,
     event: int,
     sections: Sections,
-    laws: Floats,
+    laws: Laws,
 ) -> int:
     """Predict, cut and summarise the living sections in one pass; return the number of labels that became empty.
 
@@ -185,7 +185,7 @@ def step_all(
         Present step, and number of the measurement; -1 without one.
     sections : Sections
         The sections, changed in place.
-    laws : ndarray, shape (C, constants)
+    laws : recarray, shape (C,)
         Constants of the model.
     """
     deaths = 0
@@ -266,7 +266,7 @@ def measure_rate_all(
     done: int,
     sights: Floats,
     sections: Sections,
-    laws: Floats,
+    laws: Laws,
     points: Floats,
 ) -> int:
     """Cut the living sections of the active engagements by rates and summarise them; return how many became empty.
@@ -306,7 +306,7 @@ def measure_rate_all(
 
 
 @entry
-def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Floats) -> None:
+def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Laws) -> None:
     """Shift the living sections of the active engagements and their summaries by impulses of shape (C, B)."""
     labels, used, living = sections.labels, sections.used, sections.living
     origins, summaries = sections.origins, sections.summaries
@@ -330,7 +330,7 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
 
 @entry
 def make_room_all(
-    active: Flags, added: int, elapsed: int, sections: Sections, laws: Floats, points: Floats, widen: bool
+    active: Flags, added: int, elapsed: int, sections: Sections, laws: Laws, points: Floats, widen: bool
 ) -> tuple[int, int]:
     """Compute the room that the living sections of the active engagements need; with `widen`, enlarge their rings.
 
@@ -377,7 +377,7 @@ def make_room_all(
 
 
 @entry
-def widest_all(elapsed: int, sections: Sections, laws: Floats, exists: Flags, ends: Floats) -> None:
+def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends: Floats) -> None:
     """Write the predicted-miss interval of each engagement along each axis.
 
     Parameters
@@ -431,7 +431,7 @@ def write_outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: 
 
 
 @entry
-def steepest_all(alpha: Floats, farthest: float, laws: Floats, steepest: Floats) -> None:
+def steepest_all(alpha: Floats, farthest: float, laws: Laws, steepest: Floats) -> None:
     """Write the greatest sizes of angles of shape (C, B) up to a range: those of `steepest_angles`, shape (2, B)."""
     law = law_of(laws, ZERO)
     for b in range(alpha.shape[1]):
