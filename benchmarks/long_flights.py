@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments import load_scenario
-from infoset import RateSensor, chains
+from infoset import RateSensor
 from sim import Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements
@@ -79,8 +79,8 @@ def of_steps(scenario: Scenario, steps: int) -> Scenario:
 def vertices(flight: Engagements) -> NDArray[np.int64]:
     """Return the numbers of vertices of all living sections."""
     stack = flight._information._state.stack
-    marks, living = stack.sections.marks, np.tile(stack.living.ravel(), len(stack.laws))
-    counts = marks[: living.size, :, chains.END] - marks[: living.size, :, chains.BEGIN]
+    records, living = stack.sections.records.reshape(-1, 2), np.tile(stack.living.ravel(), len(stack.laws))
+    counts = (records["end"] - records["begin"])[: living.size]
     return np.asarray(counts.sum(axis=1)[living])
 
 

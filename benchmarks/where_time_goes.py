@@ -93,9 +93,9 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
     while flight.flying:
         flight.advance()
         sections = flight._information._state.stack.sections
-        marks = sections.marks[sections.living.ravel()]
-        if len(marks):
-            count = marks[:, 0, 1] - marks[:, 0, 0] + marks[:, 1, 1] - marks[:, 1, 0]
+        records = sections.records.reshape(-1, 2)[sections.living.ravel()]
+        if len(records):
+            count = (records["end"] - records["begin"]).sum(axis=1)
             means.append(float(count.mean()))
             greatest = max(greatest, int(count.max()))
     return min(means), max(means), greatest

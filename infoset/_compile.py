@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
 from llvmlite import ir
@@ -83,6 +83,12 @@ def by_reference(record: T) -> T:
         return _Reference(types.NamedTuple([typeof_impl(part, context) for part in value], record))
 
     return record
+
+
+def record_of(fields: type) -> np.dtype[Any]:
+    """Return the type of array elements with the fields of a class; kernels take the address of such a record."""
+    kinds = {float: np.float64, int: np.int64, bool: np.bool_}
+    return np.dtype((np.record, [(name, kinds[kind]) for name, kind in get_type_hints(fields).items()]), align=True)
 
 
 def constants(number: int) -> tuple[int, ...]:

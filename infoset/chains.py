@@ -19,27 +19,24 @@ The left chain has the structure of the right one rotated by 180 degrees: the si
 increases along each chain. Each chain is a ring buffer. Edges along the level join its ends to those of the other
 chain; their length is zero where the chains meet.
 
-A batch of sections is stored in three arrays, `origins`, `rings` and `marks`; a kernel takes these and a row `n`,
-because views of rows or tuples of arrays would cost more, by reference counting, than the operations themselves. Each
-ring has the size that its own section needs, so that a step accesses compact memory.
+A batch of sections is stored in two arrays, `records` and `rings`; kernels take the address of the records of both
+chains, and the rings. Each ring has the size that its own section needs, so that a step accesses compact memory.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset._compile import allocation_free, constants, inlined, prefetch
+from infoset._compile import ZERO, allocation_free, inlined, prefetch, record_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 EPSILON = float(np.finfo(np.float64).eps)
-
-RIGHT, LEFT = constants(2)
 
 CAPACITY = 256
 """Greatest number of vertices of a section, a power of two."""
@@ -52,18 +49,6 @@ ROOM_AHEAD = 8 * MOST_ADDED
 REDUCED = 160
 """Number of vertices to which a section of CAPACITY vertices is reduced."""
 
-# Marks of a chain: the number of its first vertex, one past that of the last, and that of the peak; then the offset of
-# its ring, and the ring's size minus one. The size is a power of two, and a vertex is stored at its number modulo the
-# size.
-BEGIN, END, PEAK, RING, MASK = range(5)
-MARKS = 5
-
-# An origin is a sum of two floats, since it moves at every step and rounding errors must not accumulate. The origin of
-# the right chain also contains a bound of |V| over the section's history, to which rounding errors are relative. The
-# unused floats fill a cache line.
-V_ORIGIN, V_REST, M_ORIGIN, M_REST, REACH = constants(5)
-ORIGIN = 8
-
 TAKEN = 0
 """Index in the rings of the number of floats in use; rings that were replaced remain in use."""
 FIRST_RING = 8
@@ -71,22 +56,51 @@ LINE = 8
 """Floats in a cache line."""
 
 
+class Chain(Protocol):
+    """Record of a chain.
+
+    Parameters
+    ----------
+    v, v_rest, m, m_rest : float
+        Origin, m/s and m. Each coordinate is a sum of two floats, since it changes at every step and rounding errors
+        must not accumulate.
+    reach : float
+        Bound of |V| over the section's history, m/s, to which rounding errors are relative; in the right chain only.
+    begin, end, peak : int
+        Number of the first vertex, one past that of the last, and that of the peak.
+    ring, mask : int
+        Offset of the ring in `rings`, and the ring's size minus one. The size is a power of two, and a vertex is stored
+        at its number modulo the size.
+    """
+
+    v: float
+    v_rest: float
+    m: float
+    m_rest: float
+    reach: float
+    begin: int
+    end: int
+    peak: int
+    ring: int
+    mask: int
+
+
+Records = NDArray[np.record]
+
+
 class Chains(NamedTuple):
     """Chains of N sections.
 
     Parameters
     ----------
-    origins : ndarray, shape (N, 2, ORIGIN)
-        Origins of the chains, m/s and m.
+    records : ndarray of `Chain`, shape (2 N,)
+        The right and the left chain of each section.
     rings : ndarray, 1-D
         Vertices of all chains, each (V, m) relative to the origin of its chain.
-    marks : ndarray of int, shape (N, 2, MARKS)
-        Numbers of the first, last and peak vertex, and location of the ring.
     """
 
-    origins: Floats
+    records: Records
     rings: Floats
-    marks: Integers
 
 
 def empty_sections(number: int, room: int = CAPACITY) -> Chains:
@@ -94,12 +108,12 @@ def empty_sections(number: int, room: int = CAPACITY) -> Chains:
 
     The rings are allocated at their greatest size; the operating system provides memory when it is written.
     """
-    marks = np.zeros((number, 2, MARKS), dtype=np.int64)
-    marks[:, :, RING] = FIRST_RING + (2 * room + LINE) * np.arange(2 * number).reshape(number, 2)
-    marks[:, :, MASK] = room - 1
+    records = np.zeros(2 * number, dtype=record_of(Chain))
+    records["ring"] = FIRST_RING + (2 * room + LINE) * np.arange(2 * number)
+    records["mask"] = room - 1
     rings = np.empty(FIRST_RING + 8 * CAPACITY * number)
     rings[TAKEN] = FIRST_RING + 2 * (2 * room + LINE) * number
-    return Chains(np.zeros((number, 2, ORIGIN)), rings, marks)
+    return Chains(records, rings)
 
 
 def with_room(rings: Floats, floats: int) -> Floats:
@@ -124,78 +138,77 @@ def working_room() -> Floats:
 
 
 @inlined
-def offset_in(ring: tuple[int, int], i: int) -> int:
-    """Offset of a vertex in a ring, given as its offset and mask."""
-    return ring[0] + 2 * (i & ring[1])
+def chains_of(records: Records, n: int) -> tuple[Chain, Chain]:
+    """Return the right and the left chain of a section."""
+    return records[np.uint64(2 * n)], records[np.uint64(2 * n + 1)]
 
 
 @inlined
-def offset_of(marks: Integers, n: int, side: int, i: int) -> int:
-    """Offset of a vertex of a chain in the rings."""
-    return int(marks[n, side, RING] + 2 * (i & marks[n, side, MASK]))
+def offset_of(chain: Chain, i: int) -> int:
+    """Offset of a vertex in the rings."""
+    return chain.ring + 2 * (i & chain.mask)
 
 
 @inlined
-def read(rings: Floats, at: int) -> tuple[float, float]:
-    """Return V and m at an offset in the rings, relative to the origin of the chain.
+def read(chain: Chain, rings: Floats, i: int) -> tuple[float, float]:
+    """Return V and m of a vertex relative to the origin of its chain.
 
     Offsets are unsigned: the test for negative indices would take longer than the access.
     """
+    at = offset_of(chain, i)
     return rings[np.uint64(at)], rings[np.uint64(at + 1)]
 
 
 @inlined
-def write(rings: Floats, at: int, v: float, m: float) -> None:
-    """Write V and m at an offset in the rings."""
+def write(chain: Chain, rings: Floats, i: int, v: float, m: float) -> None:
+    """Write a vertex relative to the origin of its chain."""
+    at = offset_of(chain, i)
     rings[np.uint64(at)] = v
     rings[np.uint64(at + 1)] = m
 
 
 @inlined
-def begin_of(marks: Integers, n: int, side: int) -> int:
-    """Number of the first vertex of a chain."""
-    return int(marks[n, side, BEGIN])
+def has_vertices(chain: Chain, count: int) -> None:
+    """Note that a chain consists of `count` vertices, numbered from zero, and that its peak is not known."""
+    chain.begin = 0
+    chain.end = count
+    chain.peak = 0
 
 
 @inlined
-def end_of(marks: Integers, n: int, side: int) -> int:
-    """One past the number of the last vertex of a chain."""
-    return int(marks[n, side, END])
-
-
-@inlined
-def count_of(marks: Integers, n: int) -> int:
+def count_of(right: Chain, left: Chain) -> int:
     """Number of vertices of both chains."""
-    right, left = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN], marks[n, LEFT, END] - marks[n, LEFT, BEGIN]
-    return int(right + left)
+    return (right.end - right.begin) + (left.end - left.begin)
 
 
 @inlined
-def expect(rings: Floats, marks: Integers, n: int) -> None:
+def expect(right: Chain, left: Chain, rings: Floats) -> None:
     """Prefetch the vertices of a section that the next step reads."""
-    for side in (RIGHT, LEFT):
-        prefetch(rings, offset_of(marks, n, side, begin_of(marks, n, side)))
-        prefetch(rings, offset_of(marks, n, side, end_of(marks, n, side) - 1))
-        prefetch(rings, offset_of(marks, n, side, marks[n, side, PEAK]))
+    for chain in (right, left):
+        prefetch(rings, offset_of(chain, chain.begin))
+        prefetch(rings, offset_of(chain, chain.end - 1))
+        prefetch(rings, offset_of(chain, chain.peak))
 
 
 @inlined
-def room_of(marks: Integers, n: int) -> int:
+def room_of(right: Chain) -> int:
     """Room of each chain of a section, in vertices."""
-    return int(marks[n, RIGHT, MASK] + 1)
+    return right.mask + 1
 
 
 @allocation_free
-def widen_rings(rings: Floats, marks: Integers, n: int, room: int) -> None:
+def widen_rings(right: Chain, left: Chain, rings: Floats, room: int) -> None:
     """Move both chains of a section to new rings of `room` vertices, a power of two, at the end of those in use."""
-    for side in (RIGHT, LEFT):
+    for chain in (right, left):
         first = int(rings[TAKEN])
         rings[TAKEN] = first + floats_of(room)
-        for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-            v, m = read(rings, offset_of(marks, n, side, i))
-            write(rings, offset_in((first, room - 1), i), v, m)
-        marks[n, side, RING] = first
-        marks[n, side, MASK] = room - 1
+        for i in range(chain.begin, chain.end):
+            v, m = read(chain, rings, i)
+            at = first + 2 * (i & (room - 1))
+            rings[np.uint64(at)] = v
+            rings[np.uint64(at + 1)] = m
+        chain.ring = first
+        chain.mask = room - 1
 
 
 @inlined
@@ -213,62 +226,50 @@ def room_for(vertices: int, room: int) -> int:
 
 
 @inlined
-def sign_of(side: int) -> float:
-    """Sign of the height's change along a chain: 1 for the right one, -1 for the left one."""
-    return 1.0 - 2.0 * side
+def height_in(chain: Chain, rings: Floats, i: int, tau: float) -> float:
+    """Height of a vertex relative to the origin of its chain."""
+    v, m = read(chain, rings, i)
+    return m - tau * v
 
 
 @inlined
-def rise(rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float) -> float:
-    """Height of a vertex relative to the origin of its chain, times the sign of the side: increases along the chain."""
-    v, m = read(rings, offset_of(marks, n, side, i))
-    return float(sign_of(side) * (m - tau * v))
-
-
-@inlined
-def origin_height(origins: Floats, n: int, side: int, tau: float) -> float:
+def origin_height(chain: Chain, tau: float) -> float:
     """Height of the origin of a chain."""
-    whole = origins[n, side, M_ORIGIN] - tau * origins[n, side, V_ORIGIN]
-    return float(whole + (origins[n, side, M_REST] - tau * origins[n, side, V_REST]))
+    return (chain.m - tau * chain.v) + (chain.m_rest - tau * chain.v_rest)
 
 
 @inlined
-def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int) -> tuple[float, float]:
+def vertex(chain: Chain, rings: Floats, i: int) -> tuple[float, float]:
     """Return V and m of a vertex."""
-    v, m = read(rings, offset_of(marks, n, side, i))
-    v = (v + origins[n, side, V_REST]) + origins[n, side, V_ORIGIN]
-    m = (m + origins[n, side, M_REST]) + origins[n, side, M_ORIGIN]
-    return v, m
+    v, m = read(chain, rings, i)
+    return (v + chain.v_rest) + chain.v, (m + chain.m_rest) + chain.m
 
 
 @inlined
-def put(rings: Floats, marks: Integers, n: int, side: int, i: int, v: float, m: float) -> None:
-    """Write a vertex relative to the origin of its chain."""
-    write(rings, offset_of(marks, n, side, i), v, m)
+def copy_chain(chain: Chain, rings: Floats, to: Chain, to_rings: Floats) -> None:
+    """Copy a chain to another one, whose ring must have enough room."""
+    to.v = chain.v
+    to.v_rest = chain.v_rest
+    to.m = chain.m
+    to.m_rest = chain.m_rest
+    to.reach = chain.reach
+    to.begin = chain.begin
+    to.end = chain.end
+    to.peak = chain.peak
+    for i in range(chain.begin, chain.end):
+        v, m = read(chain, rings, i)
+        write(to, to_rings, i, v, m)
 
 
 @allocation_free
-def copy_section(
-    origins: Floats,
-    rings: Floats,
-    marks: Integers,
-    n: int,
-    to_origins: Floats,
-    to_rings: Floats,
-    to_marks: Integers,
-    to: int,
-) -> None:
-    """Copy a section to row `to` of other chains, whose rings must have enough unused room."""
-    for side in (RIGHT, LEFT):
-        to_marks[to, side, BEGIN] = to_marks[to, side, END] = 0
-    wanted = room_for(min(count_of(marks, n) + ROOM_AHEAD, CAPACITY), room_of(to_marks, to))
-    if wanted > room_of(to_marks, to):
-        widen_rings(to_rings, to_marks, to, wanted)
-    for side in (RIGHT, LEFT):
-        for part in range(ORIGIN):
-            to_origins[to, side, part] = origins[n, side, part]
-        for part in (BEGIN, END, PEAK):
-            to_marks[to, side, part] = marks[n, side, part]
-        for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-            v, m = read(rings, offset_of(marks, n, side, i))
-            put(to_rings, to_marks, to, side, i, v, m)
+def copy_section(records: Records, rings: Floats, n: int, to_records: Records, to_rings: Floats, to: int) -> None:
+    """Copy a section to section `to` of other chains, whose rings must have enough unused room."""
+    right, left = chains_of(records, n)
+    to_right, to_left = chains_of(to_records, to)
+    has_vertices(to_right, ZERO)
+    has_vertices(to_left, ZERO)
+    wanted = room_for(min(count_of(right, left) + ROOM_AHEAD, CAPACITY), room_of(to_right))
+    if wanted > room_of(to_right):
+        widen_rings(to_right, to_left, to_rings, wanted)
+    copy_chain(right, rings, to_right, to_rings)
+    copy_chain(left, rings, to_left, to_rings)

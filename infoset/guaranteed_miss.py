@@ -16,7 +16,7 @@ from infoset import chains, whole_chains
 from infoset._compile import ZERO, allocation_free, by_reference, entry
 from infoset.concave_bounds import bound_between
 from infoset.history import History, Tapes
-from infoset.location import LABEL_RESOLUTION, locate_end, search_window
+from infoset.location import FIRST, LABEL_RESOLUTION, LAST, locate_end, search_window
 from infoset.replays import LOWER, PROBE, ROWS, UPPER, ReplayRoom, Workspace, keep_section, probe, run, workspace
 from infoset.section_law import Laws, SectionLaw, law_of
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
@@ -142,10 +142,10 @@ def bound_leaving(
         if not search_window(lower, upper, first_label, LABEL_RESOLUTION * upper, tape, errors, laws, room):
             return 0
         living = limits[1].label
-    lower_lives = probe(limits, 0, lower, tape, errors, laws, replays)
+    lower_lives = probe(limits, FIRST, lower, tape, errors, laws, replays)
     if lower_lives:
         keep_section(replays, LOWER)
-    upper_lives = probe(limits, 2, upper, tape, errors, laws, replays)
+    upper_lives = probe(limits, LAST, upper, tape, errors, laws, replays)
     if upper_lives:
         keep_section(replays, UPPER)
     if lower_lives:
@@ -190,13 +190,9 @@ def bound_leaving(
         outlines.labels[number] = label
         tau = (label - travelled) / law.closing_speed
         for channel in range(laws.shape[0]):
+            right, left = chains.chains_of(replays.records, ROWS * channel + row)
             outlines.counts[channel, number] = whole_chains.outline(
-                replays.origins,
-                replays.rings,
-                replays.marks,
-                ROWS * channel + row,
-                tau,
-                outlines.points[channel, number],
+                right, left, replays.rings, tau, outlines.points[channel, number]
             )
         number += 1
     if spacing == 0.0 or number < 3:
@@ -307,9 +303,10 @@ def spread_at(
         return 0.0
     spread = 0.0
     for channel in range(laws.shape[0]):
-        law, row = law_of(laws, channel), ROWS * channel + PROBE
+        law = law_of(laws, channel)
+        right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
         tau = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
-        count = whole_chains.outline(room.origins, room.rings, room.marks, row, tau, outline)
+        count = whole_chains.outline(right, left, room.rings, tau, outline)
         least, greatest = extremes_along(outline, count, tau)
         spread = math.hypot(spread, 0.5 * (greatest - least) + 0.5 * law.disturbance * tau * tau)
     return spread

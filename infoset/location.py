@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import allocation_free, entry
+from infoset._compile import allocation_free, constants, entry
 from infoset.arrays import Flags, Floats
-from infoset.chains import CAPACITY, copy_section, count_of, room_of
+from infoset.chains import CAPACITY, chains_of, copy_section, count_of, room_of
 from infoset.concave_bounds import is_dead_between
 from infoset.history import Tapes
 from infoset.replays import (
@@ -35,6 +35,8 @@ from infoset.section_law import Laws, law_of
 from infoset.section_life import ALIVE, Tape, summarise_section
 from infoset.section_passes import Sections, row_of, tape_of
 
+FIRST, _, LAST = constants(3)
+"""Indices of the ends of a bracket of three labels."""
 LABEL_RESOLUTION = 1e-13
 MOST_PROBES = 200
 
@@ -196,7 +198,7 @@ def search_everywhere(
             new = windows[count]
             new.near, new.far, new.died, new.overlap = p, q, -1, -np.inf
             for label in (room.known[1].label, p, q):
-                if probe(probed, 0, label, tape, errors, laws, room.replays):
+                if probe(probed, FIRST, label, tape, errors, laws, room.replays):
                     return True, label
                 if outlives(probed[0], new):
                     new.died, new.overlap = probed[0].died, probed[0].overlap
@@ -239,7 +241,7 @@ def locate_living(
     known[0].label, known[end].label = limit_below, limit_above
     some_live = last > 0
     # A limit must be replayed only if no dead label separates it from the living ones.
-    if (not some_live or first == 1) and probe(known, 0, limit_below, tape, errors, laws, room.replays):
+    if (not some_live or first == 1) and probe(known, FIRST, limit_below, tape, errors, laws, room.replays):
         keep_section(room.replays, LOWER)
         first, some_live = 0, True
     if (not some_live or last == end - 1) and probe(known, end, limit_above, tape, errors, laws, room.replays):
@@ -269,10 +271,10 @@ def locate_living(
                 elif label < labels[b, s] < above:
                     above = labels[b, s]
             known[1].label = label
-            if probe(known, 0, below, tape, errors, laws, room.replays):
+            if probe(known, FIRST, below, tape, errors, laws, room.replays):
                 keep_section(room.replays, LOWER)
                 first = 0
-            if probe(known, 2, above, tape, errors, laws, room.replays):
+            if probe(known, LAST, above, tape, errors, laws, room.replays):
                 keep_section(room.replays, UPPER)
                 last = 2
     below = lower = known[first].label
@@ -317,7 +319,7 @@ def refine_all(
     spare = CAPACITY
     labels, used, alive, died = sections.labels, sections.used, sections.living, sections.died
     overlaps, summaries = sections.overlaps, sections.summaries
-    origins, rings, marks, new = sections.origins, sections.rings, sections.marks, room.replays
+    records, rings, new = sections.records, sections.rings, room.replays
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
@@ -346,8 +348,8 @@ def refine_all(
             if alive[b, s]:
                 for channel in range(laws.shape[0]):
                     n, at = row_of(labels, channel, b, s), ROWS * channel + row
-                    copy_section(new.origins, new.rings, new.marks, at, origins, rings, marks, n)
-                    its = law_of(laws, channel)
-                    summarise_section(origins, rings, marks, n, label, elapsed, its, summaries, b, s)
-                    spare = min(spare, room_of(marks, n) - count_of(marks, n))
+                    copy_section(new.records, new.rings, at, records, rings, n)
+                    right, left = chains_of(records, n)
+                    summarise_section(right, left, rings, label, elapsed, law_of(laws, channel), summaries, b, s)
+                    spare = min(spare, room_of(right) - count_of(right, left))
     return spare

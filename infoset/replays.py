@@ -67,7 +67,7 @@ class ReplayRoom(NamedTuple):
     ----------
     values, applies : ndarray, shape (C, E) and (E,)
         History of one engagement in contiguous arrays: angles, rates and impulses, SI, and the events that apply.
-    origins, rings, marks : ndarray
+    records, rings : ndarray
         Sections, stored as in `chains`; the last replay is `PROBE`.
     overlaps : ndarray, shape (C, E)
         Overlap of section and band at each measurement, m, in the last replay.
@@ -77,9 +77,8 @@ class ReplayRoom(NamedTuple):
 
     values: Floats
     applies: Flags
-    origins: Floats
+    records: chains.Records
     rings: Floats
-    marks: Integers
     overlaps: Floats
     points: Floats
 
@@ -163,7 +162,8 @@ def replay(label: float, tape: Tape, errors: Floats | None, laws: Laws, channel:
     int
         Number of the event that made the section empty, or ALIVE.
     """
-    start_section(room.origins, room.rings, room.marks, ROWS * channel + PROBE, label, law_of(laws, channel))
+    right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
+    start_section(right, left, room.rings, label, law_of(laws, channel))
     return continue_replay(AT_START, label, tape, errors, laws, channel, room)[0]
 
 
@@ -186,32 +186,32 @@ def continue_replay(
     About 30 ns per event.
     """
     kinds, values, applies, events, nearest, farthest = tape
-    origins, rings, marks, points = room.origins, room.rings, room.marks, room.points
-    window, law, n = (nearest, farthest), law_of(laws, channel), ROWS * channel + PROBE
+    right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
+    rings, points, window, law = room.rings, room.points, (nearest, farthest), law_of(laws, channel)
     first, elapsed, sight = done
     own, overlaps = values[law.channel], room.overlaps[law.channel]
     for event in range(first, events):
         if kinds[event] == PREDICTION:
-            if whole_chains.is_crowded(marks, n):
-                whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
+            if whole_chains.is_crowded(right, left):
+                whole_chains.reduce_outward(right, left, rings, time_to_go(label, elapsed, law), points)
             elapsed += 1
-            predict_section(origins, rings, marks, n, label, elapsed, law)
+            predict_section(right, left, rings, label, elapsed, law)
         elif not applies[event]:
             continue
         elif kinds[event] == ANGLE:
             living, overlaps[event] = measure_section(
-                origins, rings, marks, n, label, elapsed, own[event], across_of(tape, event, law), law
+                right, left, rings, label, elapsed, own[event], across_of(tape, event, law), law
             )
             if not living:
                 return event, done
         elif kinds[event] == IMPULSE:
-            shift_section(origins, n, label, elapsed, own[event], across_of(tape, event, law), law)
+            shift_section(right, left, label, elapsed, own[event], across_of(tape, event, law), law)
         elif kinds[event] == WIDENING:
-            widen_section(origins, n, label, elapsed, law)
+            widen_section(right, left, label, elapsed, law)
         elif errors is not None:
             # Not compiled for histories without rates: this branch is most of the code.
             living, overlaps[event] = measure_rate_section(
-                origins, rings, marks, n, label, elapsed, own[event], errors[event], sight, window, law, points
+                right, left, rings, label, elapsed, own[event], errors[event], sight, window, law, points
             )
             if not living:
                 return event, done
@@ -265,9 +265,7 @@ def probe(
 def keep_section(room: ReplayRoom, row: int) -> None:
     """Copy the sections of the last replay to a row of the workspace."""
     for first in range(0, ROWS * room.overlaps.shape[0], ROWS):
-        copy_section(
-            room.origins, room.rings, room.marks, first + PROBE, room.origins, room.rings, room.marks, first + row
-        )
+        copy_section(room.records, room.rings, first + PROBE, room.records, room.rings, first + row)
 
 
 @allocation_free
@@ -297,7 +295,7 @@ def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history
         Number of events before each state.
     v, z : ndarray, shape (C, L, B)
         The states along each axis, m/s and m.
-    laws : recarray, shape (C,)
+    laws : ndarray of records, shape (C,)
         Constants of the model.
 
     Returns
@@ -324,12 +322,12 @@ def margins_all(
     margins: Floats,
 ) -> None:
     """Write the results of `margins_along`."""
-    origins, rings, marks = room.origins, room.rings, room.marks
     for b in range(labels.shape[0]):
         label, tape = labels[b], tape_of(tapes, b, room.values, room.applies)
         for channel in range(laws.shape[0]):
-            law, row = law_of(laws, channel), ROWS * channel + PROBE
-            start_section(origins, rings, marks, row, label, law)
+            law = law_of(laws, channel)
+            right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
+            start_section(right, left, room.rings, label, law)
             died, done = ALIVE, AT_START
             for look in range(looks.shape[0]):
                 if died == ALIVE:
@@ -338,36 +336,33 @@ def margins_all(
                 if died == ALIVE:
                     tau = time_to_go(label, done.elapsed, law)
                     state = v[channel, look, b], z[channel, look, b]
-                    margins[channel, look, b] = margin_in(origins, rings, marks, row, tau, *state)
+                    margins[channel, look, b] = margin_in(right, left, room.rings, tau, *state)
                 else:
                     margins[channel, look, b] = room.overlaps[channel, died]
 
 
 @inlined
-def vertex_from(
-    origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float, v: float, z: float
-) -> tuple[float, float]:
+def vertex_from(chain: chains.Chain, rings: Floats, i: int, tau: float, v: float, z: float) -> tuple[float, float]:
     """Vertex of a chain relative to a state, in the plane of V x/e and z, m."""
-    offset_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
-    offset_z = chains.origin_height(origins, n, side, tau) - z
-    chain_v, chain_m = chains.read(rings, chains.offset_of(marks, n, side, i))
+    offset_v, offset_z = tau * (chain.v - v + chain.v_rest), chains.origin_height(chain, tau) - z
+    chain_v, chain_m = chains.read(chain, rings, i)
     return tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z
 
 
 @allocation_free
-def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float) -> float:
+def margin_in(right: chains.Chain, left: chains.Chain, rings: Floats, tau: float, v: float, z: float) -> float:
     """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
-    last_v, last_m = chains.vertex(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1)
+    last_v, last_m = chains.vertex(left, rings, left.end - 1)
     rounded = (tau * (last_v - v), (last_m - tau * last_v) - z)
-    end = vertex_from(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1, tau, v, z)
-    last = vertex_from(origins, rings, marks, n, chains.RIGHT, chains.begin_of(marks, n, chains.RIGHT), tau, v, z)
+    end = vertex_from(left, rings, left.end - 1, tau, v, z)
+    last = vertex_from(right, rings, right.begin, tau, v, z)
     # The edge between the chains: a start rounded to absolute coordinates may be beyond the state in a section that is
     # thinner than this rounding. It is used for the distance only, which keeps the last digit of published margins.
     nearest, _ = polygon.pass_edge(np.inf, False, rounded, last, 0.0, 0.0)
     _, inside = polygon.pass_edge(np.inf, False, end, last, 0.0, 0.0)
-    for side in (chains.RIGHT, chains.LEFT):
-        for i in range(chains.begin_of(marks, n, side), chains.end_of(marks, n, side)):
-            vertex = vertex_from(origins, rings, marks, n, side, i, tau, v, z)
+    for chain in (right, left):
+        for i in range(chain.begin, chain.end):
+            vertex = vertex_from(chain, rings, i, tau, v, z)
             nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
             last = vertex
     return math.sqrt(nearest) if inside else -math.sqrt(nearest)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import NamedTuple, get_type_hints
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from infoset._compile import inlined
+from infoset._compile import inlined, record_of
 from infoset.model import InitialSet, Interval, SetModel
 from infoset.sensors import Convention
 
@@ -95,11 +96,7 @@ class SectionLaw(NamedTuple):
     least_range: float
 
 
-
-
-_RECORD = np.dtype(list(get_type_hints(SectionLaw).items()), align=True)
-
-Laws = np.recarray[tuple[int], np.dtype[np.record]]
+Laws = NDArray[np.record]
 """Constants of the axes, shape (C,), as records, of which kernels take the address."""
 
 
@@ -130,7 +127,7 @@ def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
 
 def law_table(laws: tuple[SectionLaw, ...]) -> Laws:
     """Return the constants of all axes as an array of records, shape (C,), for kernels."""
-    return np.array(list(laws), dtype=_RECORD).view(np.recarray)
+    return np.array(list(laws), dtype=record_of(SectionLaw))
 
 
 @inlined

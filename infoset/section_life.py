@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from infoset import chain_steps, chains, whole_chains
 from infoset._compile import ZERO, allocation_free, inlined
-from infoset.chains import REACH, RIGHT
+from infoset.chains import Chain
 from infoset.section_law import CONE, ELEVATION, PLANE, SectionLaw
 
 Floats = NDArray[np.float64]
@@ -108,7 +108,7 @@ def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
 
 
 @allocation_free
-def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label: float, law: SectionLaw) -> None:
+def start_section(right: Chain, left: Chain, rings: Floats, label: float, law: SectionLaw) -> None:
     """Write the section at t = 0.
 
     Notes
@@ -128,16 +128,15 @@ def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label
         z_least, z_greatest = math.atan(z_least / x) * x, math.atan(z_greatest / x) * x
     tau = time_to_go(label, ZERO, law)
     chain_steps.start(
-        origins,
+        right,
+        left,
         rings,
-        marks,
-        n,
         tau,
         (lowest + shift_at_least, highest + shift_at_least, z_least),
         (lowest + shift_at_greatest, highest + shift_at_greatest, z_greatest),
     )
     if law.half_v_at_start > 0.0:
-        chain_steps.spread(origins, n, tau, law.half_v_at_start)
+        chain_steps.spread(right, left, tau, law.half_v_at_start)
 
 
 @inlined
@@ -276,10 +275,9 @@ def wide_slope_band(alpha: float, across: float, travelled: float, x: float, law
 
 @inlined
 def measure_section(
-    origins: Floats,
+    right: Chain,
+    left: Chain,
     rings: Floats,
-    marks: Integers,
-    n: int,
     label: float,
     elapsed: int,
     alpha: float,
@@ -303,8 +301,8 @@ def measure_section(
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = slope_band(alpha, across, law.closing_speed * (law.step * elapsed), x, law)
-    slack = CUT_SLACK * (label * (abs(alpha) + bound) + origins[n, RIGHT, REACH] * (label / law.closing_speed))
-    return chain_steps.cut(origins, rings, marks, n, x / law.closing_speed, x * lower - slack, x * upper + slack)
+    slack = CUT_SLACK * (label * (abs(alpha) + bound) + right.reach * (label / law.closing_speed))
+    return chain_steps.cut(right, left, rings, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
 
 NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
@@ -426,10 +424,9 @@ def scaled_square(x: float, middle: float, then: float) -> float:
 
 @allocation_free
 def measure_rate_section(
-    origins: Floats,
+    right: Chain,
+    left: Chain,
     rings: Floats,
-    marks: Integers,
-    n: int,
     label: float,
     elapsed: int,
     omega: float,
@@ -448,58 +445,55 @@ def measure_rate_section(
     overlap : float
         As in `measure_section`, in metres of predicted miss.
     """
-    if whole_chains.is_crowded(marks, n):
-        whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
+    if whole_chains.is_crowded(right, left):
+        whole_chains.reduce_outward(right, left, rings, time_to_go(label, elapsed, law), points)
     near, far = min(label, window[0]), max(label, window[1])
     lower, upper = rate_band(label, near, far, elapsed, omega, error, sight, law)
     # The band bounds z + V x_c/e = m + V tilt.
     tau, tilt = time_to_go(label, elapsed, law), (0.5 * (near + far) - label) / law.closing_speed
-    slack = CUT_SLACK * (label * (abs(omega) + error) + origins[n, RIGHT, REACH]) * (label / law.closing_speed)
+    slack = CUT_SLACK * (label * (abs(omega) + error) + right.reach) * (label / law.closing_speed)
     # The section already contains the first half of the next step's disturbance, which does not commute with the cut.
     slack += (tau + tilt) * law.half_v_at_start
-    return whole_chains.cut_misses(origins, rings, marks, n, tau, tilt, lower - slack, upper + slack, points)
+    return whole_chains.cut_misses(right, left, rings, tau, tilt, lower - slack, upper + slack, points)
 
 
 @inlined
-def widen_section(origins: Floats, n: int, label: float, elapsed: int, law: SectionLaw) -> None:
+def widen_section(right: Chain, left: Chain, label: float, elapsed: int, law: SectionLaw) -> None:
     """Enlarge a section by the error bound b of one angle measurement: by e b in V, or x b in the predicted miss."""
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x + law.centroid_error / x
-    chain_steps.spread(origins, n, x / law.closing_speed, law.closing_speed * bound)
+    chain_steps.spread(right, left, x / law.closing_speed, law.closing_speed * bound)
 
 
 @inlined
 def shift_section(
-    origins: Floats, n: int, label: float, elapsed: int, impulse: float, across: float, law: SectionLaw
+    right: Chain, left: Chain, label: float, elapsed: int, impulse: float, across: float, law: SectionLaw
 ) -> None:
     """Shift a section by an impulse: V becomes V - k, for all k within the error bound of the commanded impulse.
 
     `across` is the impulse along the other axis.
     """
     tau = time_to_go(label, elapsed, law)
-    chain_steps.shift(origins, n, tau, -impulse)
+    chain_steps.shift(right, left, tau, -impulse)
     if law.impulse_error > 0.0:
-        chain_steps.spread(origins, n, tau, impulse_doubt(impulse, across, law))
+        chain_steps.spread(right, left, tau, impulse_doubt(impulse, across, law))
 
 
 @inlined
-def predict_section(
-    origins: Floats, rings: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw
-) -> None:
+def predict_section(right: Chain, left: Chain, rings: Floats, label: float, elapsed: int, law: SectionLaw) -> None:
     """Move a section to step `elapsed`: the level turns, and the segment of the disturbance, 8 ulp longer, is added."""
     tau = time_to_go(label, elapsed, law)
-    chain_steps.turn(origins, rings, marks, n, tau + law.disturbance_lead)
-    chain_steps.spread(origins, n, tau + law.disturbance_lead, law.half_v + SUM_SLACK * origins[n, RIGHT, REACH])
+    chain_steps.turn(right, left, rings, tau + law.disturbance_lead)
+    chain_steps.spread(right, left, tau + law.disturbance_lead, law.half_v + SUM_SLACK * right.reach)
     if law.disturbance_lead > 0.0:
-        chain_steps.turn(origins, rings, marks, n, tau)
+        chain_steps.turn(right, left, rings, tau)
 
 
 @inlined
 def summarise_section(
-    origins: Floats,
+    right: Chain,
+    left: Chain,
     rings: Floats,
-    marks: Integers,
-    n: int,
     label: float,
     elapsed: int,
     law: SectionLaw,
@@ -509,7 +503,7 @@ def summarise_section(
 ) -> None:
     """Write the extremes (13), (14) of the predicted miss of a section, those of z + V x/e -+ nu/2 (x/e)^2."""
     tau = time_to_go(label, elapsed, law)
-    upper, lower = chain_steps.greatest_and_least_miss(origins, rings, marks, n, tau)
+    upper, lower = chain_steps.greatest_and_least_miss(right, left, rings, tau)
     drift = 0.5 * law.disturbance * tau * tau
     summaries[law.channel, b, s, UPPER_MISS] = upper + drift
     summaries[law.channel, b, s, LOWER_MISS] = lower - drift

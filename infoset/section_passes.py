@@ -60,8 +60,8 @@ class Sections(NamedTuple):
         empty at that event.
     emptied : ndarray of int, shape (B, S)
         Axis of the section with that overlap.
-    origins, rings, marks : ndarray
-        The polygons, stored as in `chains`: slot s of engagement b is row (c B + b) S + s for axis c.
+    records, rings : ndarray
+        The polygons, stored as in `chains`: slot s of engagement b is section (c B + b) S + s for axis c.
     summaries : ndarray, shape (C, B, S, columns)
         Extremes of the predicted miss and of z, m.
     rows : ndarray of int, shape (B S, 3)
@@ -74,9 +74,8 @@ class Sections(NamedTuple):
     died: Integers
     overlaps: Floats
     emptied: Integers
-    origins: Floats
+    records: chains.Records
     rings: Floats
-    marks: Integers
     summaries: Floats
     rows: Integers
 
@@ -84,7 +83,7 @@ class Sections(NamedTuple):
 def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections:
     """Allocate the arrays of a batch of sections for a number of axes."""
     shape = labels.shape
-    origins, rings, marks = chains.empty_sections(channels * labels.size, chains.ROOM_AT_START)
+    records, rings = chains.empty_sections(channels * labels.size, chains.ROOM_AT_START)
     return Sections(
         labels=labels,
         used=used,
@@ -92,9 +91,8 @@ def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections
         died=np.full(shape, ALIVE, dtype=np.int64),
         overlaps=np.zeros(shape),
         emptied=np.zeros(shape, dtype=np.int64),
-        origins=origins,
+        records=records,
         rings=rings,
-        marks=marks,
         summaries=np.zeros((channels, *shape, SUMMARY_COLUMNS)),
         rows=np.empty((labels.size, 3), dtype=np.int64),
     )
@@ -110,12 +108,13 @@ def row_of(labels: Floats, channel: int, b: int, s: int) -> int:
 def start_all(sections: Sections, laws: Laws) -> None:
     """Write the initial sections of a batch, without their summaries."""
     labels, used, living = sections.labels, sections.used, sections.living
-    origins, rings, marks = sections.origins, sections.rings, sections.marks
+    records, rings = sections.records, sections.rings
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         for b in range(labels.shape[0]):
             for s in range(used[b]):
-                start_section(origins, rings, marks, row_of(labels, channel, b, s), labels[b, s], law)
+                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
+                start_section(right, left, rings, labels[b, s], law)
                 living[b, s] = True
 
 
@@ -185,36 +184,38 @@ def step_all(
         Present step, and number of the measurement; -1 without one.
     sections : Sections
         The sections, changed in place.
-    laws : recarray, shape (C,)
+    laws : ndarray of records, shape (C,)
         Constants of the model.
     """
     deaths = 0
     labels, living = sections.labels, sections.living
     summaries, rows = sections.summaries, sections.rows
-    origins, rings, marks = sections.origins, sections.rings, sections.marks
+    records, rings = sections.records, sections.rings
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         count = list_rows(channel, event, behind, measured, stale, heights_wanted, sections)
         for k in range(count):
-            n, b, s = rows[k, 0], rows[k, 1], rows[k, 2]
+            b, s = rows[k, 1], rows[k, 2]
+            right, left = chains.chains_of(records, rows[k, 0])
             if k + 1 < count:
-                chains.expect(rings, marks, rows[k + 1, 0])
+                next_right, next_left = chains.chains_of(records, rows[k + 1, 0])
+                chains.expect(next_right, next_left, rings)
             if behind[b]:
-                predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
+                predict_section(right, left, rings, labels[b, s], elapsed, law)
             if measured[b]:
                 across = alpha[law.other, b] if law.other >= 0 else 0.0
                 survives, overlap = measure_section(
-                    origins, rings, marks, n, labels[b, s], elapsed, alpha[channel, b], across, law
+                    right, left, rings, labels[b, s], elapsed, alpha[channel, b], across, law
                 )
                 if not survives:
                     deaths += bury(sections, channel, event, b, s, overlap)
                 if not living[b, s]:
                     continue
             if measured[b] or stale[b]:
-                summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+                summarise_section(right, left, rings, labels[b, s], elapsed, law, summaries, b, s)
             if heights_wanted:
                 tau = time_to_go(labels[b, s], elapsed, law)
-                least, greatest = chain_steps.heights(origins, rings, marks, n, tau)
+                least, greatest = chain_steps.heights(right, left, rings, tau)
                 summaries[channel, b, s, Z_LEAST] = least
                 summaries[channel, b, s, Z_GREATEST] = greatest
     return deaths
@@ -275,7 +276,7 @@ def measure_rate_all(
     """
     deaths = 0
     labels, used, living = sections.labels, sections.used, sections.living
-    origins, rings, marks = sections.origins, sections.rings, sections.marks
+    records, rings = sections.records, sections.rings
     for b in range(labels.shape[0]):
         for channel in range(laws.shape[0]):
             law = law_of(laws, channel)
@@ -283,12 +284,12 @@ def measure_rate_all(
             for s in range(used[b]):
                 if not (active[b] and is_cut(sections, channel, event, b, s)):
                     continue
-                n, label = row_of(labels, channel, b, s), labels[b, s]
+                label = labels[b, s]
+                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
                 survives, overlap = measure_rate_section(
-                    origins,
+                    right,
+                    left,
                     rings,
-                    marks,
-                    n,
                     label,
                     elapsed,
                     omega[channel, b],
@@ -301,7 +302,7 @@ def measure_rate_all(
                 if not survives:
                     deaths += bury(sections, channel, event, b, s, overlap)
                 if living[b, s]:
-                    summarise_section(origins, rings, marks, n, label, elapsed, law, sections.summaries, b, s)
+                    summarise_section(right, left, rings, label, elapsed, law, sections.summaries, b, s)
     return deaths
 
 
@@ -309,7 +310,7 @@ def measure_rate_all(
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Laws) -> None:
     """Shift the living sections of the active engagements and their summaries by impulses of shape (C, B)."""
     labels, used, living = sections.labels, sections.used, sections.living
-    origins, summaries = sections.origins, sections.summaries
+    records, summaries = sections.records, sections.summaries
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         for b in range(labels.shape[0]):
@@ -321,8 +322,8 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
             for s in range(used[b]):
                 if not living[b, s]:
                     continue
-                n = row_of(labels, channel, b, s)
-                shift_section(origins, n, labels[b, s], elapsed, along, across, law)
+                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
+                shift_section(right, left, labels[b, s], elapsed, along, across, law)
                 tau, error = time_to_go(labels[b, s], elapsed, law), impulse_doubt(along, across, law)
                 summaries[channel, b, s, UPPER_MISS] += (error - along) * tau
                 summaries[channel, b, s, LOWER_MISS] -= (error + along) * tau
@@ -351,7 +352,7 @@ def make_room_all(
         Number of vertices that every section may gain; negative if a section must be reduced first.
     """
     labels, used, living = sections.labels, sections.used, sections.living
-    origins, rings, marks = sections.origins, sections.rings, sections.marks
+    records, rings = sections.records, sections.rings
     floats = ZERO
     spare = chains.CAPACITY
     for channel in range(laws.shape[0]):
@@ -362,17 +363,17 @@ def make_room_all(
             for s in range(used[b]):
                 if not living[b, s]:
                     continue
-                n = row_of(labels, channel, b, s)
-                if widen and whole_chains.is_crowded(marks, n):
+                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
+                if widen and whole_chains.is_crowded(right, left):
                     tau = time_to_go(labels[b, s], elapsed, law)
-                    whole_chains.reduce_outward(origins, rings, marks, n, tau, points)
-                count, room = chains.count_of(marks, n), chains.room_of(marks, n)
+                    whole_chains.reduce_outward(right, left, rings, tau, points)
+                count, room = chains.count_of(right, left), chains.room_of(right)
                 wanted = chains.room_for(min(count + added, chains.CAPACITY), room)
                 if wanted > room and widen:
-                    chains.widen_rings(rings, marks, n, wanted)
+                    chains.widen_rings(right, left, rings, wanted)
                 elif wanted > room:
                     floats += 2 * chains.floats_of(wanted)
-                spare = min(spare, chains.room_of(marks, n) - count)
+                spare = min(spare, chains.room_of(right) - count)
     return floats, spare
 
 
@@ -396,7 +397,7 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
     lower end, so that a mirrored engagement gives exactly mirrored results.
     """
     labels, used, living = sections.labels, sections.used, sections.living
-    origins, rings, marks = sections.origins, sections.rings, sections.marks
+    records, rings = sections.records, sections.rings
     for channel in range(laws.shape[0]):
         law, summaries = law_of(laws, channel), sections.summaries
         for b in range(labels.shape[0]):
@@ -414,8 +415,8 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
             exists[b] = True
             for end, s in ((0, lowest), (1, highest)):
                 tau, x = time_to_go(labels[b, s], elapsed, law), range_of(labels[b, s], elapsed, law)
-                n = row_of(labels, channel, b, s)
-                points = chain_steps.extreme_points(origins, rings, marks, n, tau, TIE_TOLERANCE, CUT_SLACK)
+                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
+                points = chain_steps.extreme_points(right, left, rings, tau, TIE_TOLERANCE, CUT_SLACK)
                 v, m = points[1 - end]
                 alpha = (m - tau * v) / x
                 ends[channel, b, end, 0] = summaries[channel, b, s, LOWER_MISS + end]
@@ -425,9 +426,10 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
 
 
 @entry
-def write_outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
+def write_outline(records: chains.Records, rings: Floats, n: int, tau: float, out: Floats) -> int:
     """Call `whole_chains.outline` from Python."""
-    return whole_chains.outline(origins, rings, marks, n, tau, out)
+    right, left = chains.chains_of(records, n)
+    return whole_chains.outline(right, left, rings, tau, out)
 
 
 @entry

@@ -249,7 +249,7 @@ class SectionStack:
         """Return the vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
         self._catch_up()
         row = (channel * self.batch + engagement) * self.labels.shape[1] + slot
-        section = Chains(self.sections.origins, self.sections.rings, self.sections.marks)
+        section = Chains(self.sections.records, self.sections.rings)
         return outline(section, row, float(self.labels[engagement, slot]), elapsed, self.law)
 
     def copy(self) -> SectionStack:

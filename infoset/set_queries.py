@@ -262,7 +262,7 @@ class SetQueries:
         history, stack, label = self._state.history, self._state.stack, float(label_m)
         room = replay_room(len(stack.laws), history.events)
         died = replay_label(label, history.tape(engagement), history.errors_if_any, stack.table, room)
-        chains = Chains(room.origins, room.rings, room.marks)
+        chains = Chains(room.records, room.rings)
         outlines = [np.empty((0, 2)) for _ in self._channels]
         if died == section_life.ALIVE:
             rows = [ROWS * channel + PROBE for channel in self._channels]

@@ -4,38 +4,30 @@ from __future__ import annotations
 
 from infoset import polygon, polygon_hull
 from infoset._compile import ZERO, allocation_free, inlined
+from infoset.chain_steps import move_to_zero
 from infoset.chains import (
-    BEGIN,
     CAPACITY,
-    END,
     EPSILON,
-    LEFT,
     MOST_ADDED,
-    PEAK,
-    REACH,
     REDUCED,
-    RIGHT,
+    Chain,
     Floats,
-    Integers,
-    begin_of,
     count_of,
-    end_of,
-    offset_of,
-    put,
+    has_vertices,
     read,
-    sign_of,
     vertex,
+    write,
 )
 
 
 @inlined
-def is_crowded(marks: Integers, n: int) -> bool:
+def is_crowded(right: Chain, left: Chain) -> bool:
     """Whether the next step may increase the number of vertices beyond CAPACITY."""
-    return bool(count_of(marks, n) > CAPACITY - MOST_ADDED)
+    return count_of(right, left) > CAPACITY - MOST_ADDED
 
 
 @allocation_free
-def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, points: Floats) -> None:
+def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points: Floats) -> None:
     """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
 
     Parameters
@@ -51,24 +43,22 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
     first, at O(CAPACITY) per edge. Vertices that are not convex because of rounding are removed before. If no edge can
     be removed, three sides of a box around the chain replace it.
     """
-    right = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN]
-    other = min(right, count_of(marks, n) - right)
-    side = RIGHT if right > other else LEFT
+    in_right, in_left = right.end - right.begin, left.end - left.begin
+    longer, sign = (right, 1.0) if in_right > in_left else (left, -1.0)
     count = ZERO
-    for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-        v, m = read(rings, offset_of(marks, n, side, i))
+    for i in range(longer.begin, longer.end):
+        v, m = read(longer, rings, i)
         count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
-    count, done = polygon_hull.drop_inner_edges(points, count, REDUCED - other, points[CAPACITY + 2 :].reshape(-1))
+    most = REDUCED - min(in_right, in_left)
+    count, done = polygon_hull.drop_inner_edges(points, count, most, points[CAPACITY + 2 :].reshape(-1))
     if not done:
-        count = box_around(points, count, sign_of(side), tau)
+        count = box_around(points, count, sign, tau)
     for i in range(count):
-        put(rings, marks, n, side, i, points[i, 0], points[i, 1])
+        write(longer, rings, i, points[i, 0], points[i, 1])
         # |V| of a new vertex may exceed the previous bound.
-        v, _ = vertex(origins, rings, marks, n, side, i)
-        origins[n, RIGHT, REACH] = max(origins[n, RIGHT, REACH], abs(v))
-    marks[n, side, BEGIN] = 0
-    marks[n, side, END] = count
-    marks[n, side, PEAK] = 0
+        v, _ = vertex(longer, rings, i)
+        right.reach = max(right.reach, abs(v))
+    has_vertices(longer, count)
 
 
 @allocation_free
@@ -90,7 +80,7 @@ def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
 
 
 @allocation_free
-def outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
+def outline(right: Chain, left: Chain, rings: Floats, tau: float, out: Floats) -> int:
     """Write the vertices (V, z), counter-clockwise; return their number, at most CAPACITY.
 
     Notes
@@ -98,14 +88,13 @@ def outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float,
     A point in which the chains meet is stored in both, equal to within rounding. It is written once.
     """
     made = ZERO
-    for side in (RIGHT, LEFT):
-        first = begin_of(marks, n, side)
-        for i in range(first, end_of(marks, n, side)):
-            v, m = vertex(origins, rings, marks, n, side, i)
+    for chain in (right, left):
+        for i in range(chain.begin, chain.end):
+            v, m = vertex(chain, rings, i)
             z = m - tau * v
-            if i > first or made == 0 or not meets(out, made - 1, v, z, origins[n, RIGHT, REACH], tau):
+            if i > chain.begin or made == 0 or not meets(out, made - 1, v, z, right.reach, tau):
                 made = polygon.append(out, made, v, z)
-    while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], origins[n, RIGHT, REACH], tau):
+    while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], right.reach, tau):
         made -= 1
     return made
 
@@ -119,10 +108,9 @@ def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) 
 
 @allocation_free
 def cut_misses(
-    origins: Floats,
+    right: Chain,
+    left: Chain,
     rings: Floats,
-    marks: Integers,
-    n: int,
     tau: float,
     tilt: float,
     lower: float,
@@ -137,28 +125,29 @@ def cut_misses(
     `points` is a working array of CAPACITY + 2 vertices.
     """
     count = ZERO
-    for side in (RIGHT, LEFT):
-        for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-            v, m = vertex(origins, rings, marks, n, side, i)
+    for chain in (right, left):
+        for i in range(chain.begin, chain.end):
+            v, m = vertex(chain, rings, i)
             count = polygon.append(points, count, v, m)
     count, overlap = polygon.clip_to_band(points, count, tilt, 1.0, lower, upper)
     if count == 0:
         return False, overlap
-    for side in (RIGHT, LEFT):
-        for part in range(REACH):
-            origins[n, side, part] = 0.0
     bottom, top = polygon.extremes(points, count, -tau, 1.0)
     thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
-    if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * origins[n, RIGHT, REACH]):
+    if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * right.reach):
         # All heights are equal to within rounding: the vertices of extreme V are the ends of both chains.
         bottom, top = polygon.extremes(points, count, -1.0, 0.0)
-    for side in (RIGHT, LEFT):
-        first, last = (bottom, top) if side == RIGHT else (top, bottom)
-        length = (last - first) % count + 1
-        for i in range(length):
-            at = (first + i) % count
-            put(rings, marks, n, side, i, points[at, 0], points[at, 1])
-        marks[n, side, BEGIN] = 0
-        marks[n, side, END] = length
-        marks[n, side, PEAK] = 0
+    write_chain(right, rings, points, count, bottom, top)
+    write_chain(left, rings, points, count, top, bottom)
     return True, overlap
+
+
+@allocation_free
+def write_chain(chain: Chain, rings: Floats, points: Floats, count: int, first: int, last: int) -> None:
+    """Write the vertices of a polygon from one to another, counter-clockwise, as a chain."""
+    length = (last - first) % count + 1
+    for i in range(length):
+        at = (first + i) % count
+        write(chain, rings, i, points[at, 0], points[at, 1])
+    move_to_zero(chain)
+    has_vertices(chain, length)

@@ -27,27 +27,14 @@ from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from numba import types
 
-from infoset import chain_steps, chains, replays, whole_chains
+from infoset import chain_steps, chains, location, replays, whole_chains
 from infoset.arrays import Floats
-from infoset.chains import (
-    BEGIN,
-    CAPACITY,
-    END,
-    FIRST_RING,
-    LEFT,
-    M_ORIGIN,
-    MASK,
-    PEAK,
-    REACH,
-    RIGHT,
-    RING,
-    TAKEN,
-    V_ORIGIN,
-)
+from infoset.chains import CAPACITY, FIRST_RING, TAKEN
 
 Exact = tuple[Fraction, Fraction]
 Level = tuple[float, float, float]
 
+RIGHT, LEFT = range(2)
 U = Fraction(1, 2**53)
 ROW = 1  # of three: what is done to one section must leave its neighbours alone
 checked = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -150,42 +137,50 @@ class Section:
         self.chains = chains.empty_sections(3, room)
         self.chains.rings[FIRST_RING:] = 0.0
         self.tau = tau
-        chain_steps.start(*self.chains, ROW, tau, bottom, top)
+        chain_steps.start(*self.parts, tau, bottom, top)
+
+    @property
+    def sides(self) -> tuple[Any, Any]:
+        """The right and the left chain."""
+        return self.chains.records[2 * ROW], self.chains.records[2 * ROW + 1]
+
+    @property
+    def parts(self) -> tuple[Any, Any, Floats]:
+        return *self.sides, self.chains.rings
 
     def turn(self, tau: float) -> None:
         self.tau = tau
-        chain_steps.turn(*self.chains, ROW, tau)
+        chain_steps.turn(*self.parts, tau)
 
     def spread(self, half_v: float) -> None:
-        chain_steps.spread(self.chains.origins, ROW, self.tau, half_v)
+        chain_steps.spread(*self.sides, self.tau, half_v)
 
     def shift(self, v: float) -> None:
-        chain_steps.shift(self.chains.origins, ROW, self.tau, v)
+        chain_steps.shift(*self.sides, self.tau, v)
 
     def cut(self, lower: float, upper: float) -> tuple[bool, float]:
-        return chain_steps.cut(*self.chains, ROW, self.tau, lower, upper)
+        return chain_steps.cut(*self.parts, self.tau, lower, upper)
 
     def cut_misses(self, lower: float, upper: float) -> tuple[bool, float]:
-        room = chains.working_room()
-        return whole_chains.cut_misses(*self.chains, ROW, self.tau, 0.0, lower, upper, room)
+        return whole_chains.cut_misses(*self.parts, self.tau, 0.0, lower, upper, chains.working_room())
 
     def reduce(self) -> None:
-        whole_chains.reduce_outward(*self.chains, ROW, self.tau, chains.working_room())
+        whole_chains.reduce_outward(*self.parts, self.tau, chains.working_room())
 
     @property
     def reach(self) -> float:
-        return float(self.chains.origins[ROW, RIGHT, REACH])
+        return float(self.sides[RIGHT].reach)
 
     @property
     def count(self) -> int:
-        return chains.count_of(self.chains.marks, ROW)
+        return chains.count_of(*self.sides)
 
     def heights(self) -> tuple[float, float]:
-        return chain_steps.heights(*self.chains, ROW, self.tau)
+        return chain_steps.heights(*self.parts, self.tau)
 
     def outline(self) -> Floats:
         out = chains.working_room()
-        return out[: whole_chains.outline(*self.chains, ROW, self.tau, out)].copy()
+        return out[: whole_chains.outline(*self.parts, self.tau, out)].copy()
 
     def corners(self) -> list[Exact]:
         """The outline, as (V, m)."""
@@ -194,34 +189,38 @@ class Section:
         return hull([(v, z + tau * v) for v, z in outline])
 
     def numbers(self, side: int) -> range:
-        return range(int(self.chains.marks[ROW, side, BEGIN]), int(self.chains.marks[ROW, side, END]))
+        return range(int(self.sides[side].begin), int(self.sides[side].end))
 
     def local(self, side: int) -> list[tuple[float, float]]:
         """Vertices from the origin of their chain."""
-        places = [chains.offset_of(self.chains.marks, ROW, side, i) for i in self.numbers(side)]
+        places = [chains.offset_of(self.sides[side], i) for i in self.numbers(side)]
         return [(float(self.chains.rings[at]), float(self.chains.rings[at + 1])) for at in places]
+
+    def replace(self, side: int, vertices: Sequence[tuple[float, float]]) -> None:
+        """Write other vertices, from the origin of their chain."""
+        for i, (v, m) in enumerate(vertices):
+            chains.write(self.sides[side], self.chains.rings, i, v, m)
+        self.sides[side].end = len(vertices)
+
+    def origin(self, side: int) -> list[float]:
+        """V and m of a chain's origin, each as two floats."""
+        return [float(self.sides[side][part]) for part in ("v", "v_rest", "m", "m_rest")]
 
     def chain(self, side: int) -> list[Exact]:
         """Vertices as the rings have them, without any rounding."""
-        parts = [Fraction(float(part)) for part in self.chains.origins[ROW, side, :REACH]]
-        v, m = parts[V_ORIGIN] + parts[V_ORIGIN + 1], parts[M_ORIGIN] + parts[M_ORIGIN + 1]
-        return [(Fraction(x) + v, Fraction(y) + m) for x, y in self.local(side)]
+        v, v_rest, m, m_rest = map(Fraction, self.origin(side))
+        return [(Fraction(x) + v + v_rest, Fraction(y) + m + m_rest) for x, y in self.local(side)]
 
     def peak(self, side: int) -> int:
-        numbers, (origins, rings, marks) = self.numbers(side), self.chains
-        ring, known = (int(marks[ROW, side, RING]), int(marks[ROW, side, MASK])), int(marks[ROW, side, PEAK])
-        sign, m_origin = (1.0, -1.0)[side], float(origins[ROW, side, M_ORIGIN])
-        marks[ROW, side, PEAK] = chain_steps.find_peak(rings, ring, numbers[0], numbers[-1], known, sign, abs(m_origin))
-        return int(marks[ROW, side, PEAK])
+        chain = self.sides[side]
+        return chain_steps.find_peak(chain, self.chains.rings, (1.0, -1.0)[side], abs(float(chain.m)))
 
     def is_alone(self) -> bool:
         """Whether the rows before and after are as they were made."""
-        others = [row for row in range(3) if row != ROW]
-        room = chains.room_of(self.chains.marks, 0)
-        rings = [self.chains.rings[at : at + 2 * room] for at in self.chains.marks[others, :, RING].ravel()]
-        return not any(
-            part.any() for part in (self.chains.origins[others], self.chains.marks[others, :, :RING], *rings)
-        )
+        others = np.delete(self.chains.records, [2 * ROW, 2 * ROW + 1])
+        rings = [self.chains.rings[ring : ring + 2 * (mask + 1)] for ring, mask in others[["ring", "mask"]].tolist()]
+        fields = [others[name] for name in others.dtype.names or () if name not in ("ring", "mask")]
+        return not any(part.any() for part in (*fields, *rings))
 
 
 class Life:
@@ -563,8 +562,7 @@ def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: flo
         misses = [sign * m for _, m in section.local(side)]
         first, peak = section.numbers(side)[0], section.peak(side)
         tolerance = part * (max(misses) - min(misses))
-        ring = int(section.chains.marks[ROW, side, RING]), int(section.chains.marks[ROW, side, MASK])
-        near = chain_steps.first_near_peak(section.chains.rings, ring, first, peak, sign, tolerance)
+        near = chain_steps.first_near_peak(section.sides[side], section.chains.rings, sign, tolerance)
         level = misses[peak - first] - tolerance
         assert all(miss >= level for miss in misses[near - first : peak - first + 1])
         assert near == first or misses[near - first - 1] < level
@@ -592,9 +590,7 @@ def test_vertices_that_repeat_one_another_do_not_stop_the_search_for_a_peak() ->
     """Both have the same miss, so that to look for a greater one next to the first is to look no further."""
     section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
     (v, m), (v_top, m_top) = section.local(RIGHT)
-    for i, vertex in enumerate([(v, m), (math.nextafter(v, 2.0), m), (v, m), (v_top, m_top)]):
-        chains.put(section.chains.rings, section.chains.marks, ROW, RIGHT, i, *vertex)
-    section.chains.marks[ROW, RIGHT, END] = 4
+    section.replace(RIGHT, [(v, m), (math.nextafter(v, 2.0), m), (v, m), (v_top, m_top)])
     assert section.peak(RIGHT) == 3
 
 
@@ -622,7 +618,7 @@ def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
     """A section that has grown until it may have no room for another step; its exact polygon is taken from there."""
     life = Life(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
     section = life.section
-    while not whole_chains.is_crowded(section.chains.marks, ROW):
+    while not whole_chains.is_crowded(*section.sides):
         before = section.count
         section.turn(section.tau * fall)
         section.spread(0.01 * size_v)
@@ -666,10 +662,7 @@ def test_reduction_of_a_round_chain_keeps_the_bound_on_v() -> None:
     """Dropping edges all around, it goes farther out than any vertex was."""
     section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
     turns = np.linspace(-0.8, 0.8, 248)
-    for i, turn in enumerate(turns):
-        v, z = math.cos(turn), math.sin(turn)
-        chains.put(section.chains.rings, section.chains.marks, ROW, RIGHT, i, v, z + 3.0 * v)
-    section.chains.marks[ROW, RIGHT, END] = len(turns)
+    section.replace(RIGHT, [(math.cos(turn), math.sin(turn) + 3.0 * math.cos(turn)) for turn in turns])
     before = hull(section.chain(RIGHT) + section.chain(LEFT))
     section.reduce()
     assert section.count == chains.REDUCED
@@ -684,11 +677,9 @@ def test_reduction_of_a_chain_as_thin_as_rounding_contains_it() -> None:
     for thickness in (0.0, 1e-17, 1e-16, 1e-15, 1e-12):
         section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
         rises = np.sort(rng.uniform(0.0, 1.0, 250))
-        for i, rise in enumerate(rises):
-            v = 1.0 + 0.3 * rise + thickness * rng.uniform(-1.0, 1.0) * 10.0
-            chains.put(section.chains.rings, section.chains.marks, ROW, RIGHT, i, float(v), float(rise + 3.0 * v))
-        section.chains.marks[ROW, RIGHT, END] = len(rises)
-        section.chains.origins[ROW, RIGHT, REACH] = 2.0
+        v = 1.0 + 0.3 * rises + thickness * rng.uniform(-1.0, 1.0, 250) * 10.0
+        section.replace(RIGHT, list(zip(v.tolist(), (rises + 3.0 * v).tolist(), strict=True)))
+        section.sides[RIGHT].reach = 2.0
         before = section.chain(RIGHT) + section.chain(LEFT)
         section.reduce()
         assert section.count <= chains.REDUCED
@@ -706,13 +697,12 @@ def test_moving_to_wider_rings_keeps_everything(start: Start, before: list[Step]
         assert tell(life, step) == tell(twin, step)
     rings = chains.with_room(life.section.chains.rings, 4 * CAPACITY)
     life.section.chains = life.section.chains._replace(rings=rings)
-    chains.widen_rings(*life.section.chains[1:], ROW, CAPACITY)
+    chains.widen_rings(*life.section.parts, CAPACITY)
     assert rings[TAKEN] <= rings.size
     for i in range(len(after) + 1):
         for side in (RIGHT, LEFT):
             assert life.section.local(side) == twin.section.local(side)
-        np.testing.assert_array_equal(life.section.chains.origins, twin.section.chains.origins)
-        np.testing.assert_array_equal(life.section.chains.marks[:, :, :RING], twin.section.chains.marks[:, :, :RING])
+            assert life.section.sides[side].tolist()[:-2] == twin.section.sides[side].tolist()[:-2]
         if i < len(after) and not (tell(life, after[i]) & tell(twin, after[i])):
             break
 
@@ -724,9 +714,7 @@ def assert_mirrored(section: Section, mirror: Section) -> None:
     """Turned by 180 degrees the right chain is the left one, to the last bit."""
     for side in (RIGHT, LEFT):
         assert mirror.local(1 - side) == [(-v, -m) for v, m in section.local(side)]
-        np.testing.assert_array_equal(
-            mirror.chains.origins[ROW, 1 - side, :REACH], -section.chains.origins[ROW, side, :REACH]
-        )
+        assert mirror.origin(1 - side) == [-part for part in section.origin(side)]
         assert mirror.numbers(1 - side) == section.numbers(side)
     assert mirror.heights() == tuple(-height for height in section.heights()[::-1])
 
@@ -787,7 +775,7 @@ def test_no_kernel_is_compiled_anew_for_each_constant_it_is_handed() -> None:
     """Numba makes a type of its own of a constant that is Python's: it doubles the time to compile."""
     literal: Any = types.maybe_literal
     assert literal(1) is not None
-    for number in (RIGHT, LEFT, V_ORIGIN, M_ORIGIN, replays.PROBE, replays.LOWER, replays.UPPER):
+    for number in (chain_steps.ONE, location.FIRST, location.LAST, replays.PROBE, replays.LOWER, replays.UPPER):
         assert literal(number) is None
 
 
