@@ -7,7 +7,8 @@ the height and of the predicted miss.
 from __future__ import annotations
 
 from infoset._compile import allocation_free, constants, inlined
-from infoset.chains import EPSILON, Chain, Floats, has_vertices, height_in, origin_height, read, vertex, write
+from infoset.arrays import Floats
+from infoset.chains import EPSILON, Chain, has_vertices, height_in, origin_height, read, vertex, write
 
 ZERO, ONE, TWO = constants(3)
 FORWARD, BACKWARD = ONE, -ONE

@@ -31,10 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset._compile import ZERO, allocation_free, inlined, prefetch, record_of
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from infoset.arrays import Floats
 
 EPSILON = float(np.finfo(np.float64).eps)
 

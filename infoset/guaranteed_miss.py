@@ -14,12 +14,13 @@ import numpy as np
 
 from infoset import chains, whole_chains
 from infoset._compile import ZERO, allocation_free, by_reference, entry
+from infoset.arrays import Flags, Floats, Integers
 from infoset.concave_bounds import bound_between
 from infoset.history import History, Tapes
 from infoset.location import FIRST, LABEL_RESOLUTION, LAST, locate_end, search_window
 from infoset.replays import LOWER, PROBE, ROWS, UPPER, ReplayRoom, Workspace, keep_section, probe, run, workspace
 from infoset.section_law import Laws, SectionLaw, law_of
-from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
+from infoset.section_life import ALIVE, Tape
 from infoset.section_passes import Sections, tape_of
 from infoset.section_stack import SectionStack, impulse_doubts
 

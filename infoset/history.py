@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset._compile import by_reference
-from infoset.section_life import IMPULSE, NO_SIGHT, NO_WINDOW, PREDICTION, RATE, Flags, Floats, Integers, Tape
+from infoset.arrays import Flags, Floats, Integers
+from infoset.section_life import IMPULSE, NO_SIGHT, NO_WINDOW, PREDICTION, RATE, Tape
 
 ROOM_AT_START = 64
 

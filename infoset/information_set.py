@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset import section_life, section_passes
+from infoset.arrays import Flags, Floats
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
 from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, real_values, shown
@@ -13,7 +14,7 @@ from infoset.model import InitialSet, Recovery, SetModel
 from infoset.section_law import BOUND_SLACK, section_laws
 from infoset.section_stack import SectionStack
 from infoset.set_queries import SetQueries
-from infoset.set_state import Flags, Floats, SetState, SetStatus
+from infoset.set_state import SetState, SetStatus
 
 
 class InformationSetView(SetQueries):

@@ -9,6 +9,7 @@ import numpy as np
 
 from infoset import chains, polygon, whole_chains
 from infoset._compile import ZERO, allocation_free, by_reference, constants, entry, inlined
+from infoset.arrays import Flags, Floats, Integers
 from infoset.chains import copy_section, empty_sections, working_room
 from infoset.history import History, Tapes
 from infoset.section_law import Laws, law_of
@@ -19,9 +20,6 @@ from infoset.section_life import (
     NO_SIGHT,
     PREDICTION,
     WIDENING,
-    Flags,
-    Floats,
-    Integers,
     LastSight,
     Tape,
     across_of,

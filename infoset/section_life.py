@@ -13,16 +13,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset import chain_steps, chains, whole_chains
 from infoset._compile import ZERO, allocation_free, inlined
+from infoset.arrays import Flags, Floats, Integers
 from infoset.chains import Chain
 from infoset.section_law import CONE, ELEVATION, PLANE, SectionLaw
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 CUT_SLACK = 16.0 * chains.EPSILON
 SUM_SLACK = 8.0 * chains.EPSILON

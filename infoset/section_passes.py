@@ -8,6 +8,7 @@ import numpy as np
 
 from infoset import chain_steps, chains, whole_chains
 from infoset._compile import ZERO, allocation_free, by_reference, entry, inlined
+from infoset.arrays import Flags, Floats, Integers
 from infoset.history import Tapes
 from infoset.section_law import Laws, SectionLaw, law_of
 from infoset.section_life import (
@@ -18,9 +19,6 @@ from infoset.section_life import (
     UPPER_MISS,
     Z_GREATEST,
     Z_LEAST,
-    Flags,
-    Floats,
-    Integers,
     LastSight,
     Tape,
     impulse_doubt,

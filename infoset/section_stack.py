@@ -10,14 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chains, section_life, section_passes
+from infoset.arrays import Flags, Floats
 from infoset.chains import Chains
 from infoset.history import History
 from infoset.section_law import SectionLaw, law_table
 from infoset.section_passes import Sections
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
 
 NO_EVENT = -1
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset import section_life
+from infoset.arrays import Flags, Floats
 from infoset.chains import Chains
 from infoset.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, POSITIVE, WHOLE, real_array
@@ -17,7 +18,7 @@ from infoset.pictures import sections_svg
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.replays import PROBE, ROWS, replay_label, replay_room
 from infoset.section_stack import outline
-from infoset.set_state import Flags, Floats, SetState, SetStatus
+from infoset.set_state import SetState, SetStatus
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

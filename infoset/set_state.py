@@ -5,19 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-from numpy.typing import NDArray
-
+from infoset.arrays import Flags, Floats, Integers
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
 from infoset.location import refine_all
 from infoset.model import SetModel
 from infoset.replays import workspace
 from infoset.section_stack import SectionStack
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 class SetStatus(Enum):

@@ -4,20 +4,9 @@ from __future__ import annotations
 
 from infoset import polygon, polygon_hull
 from infoset._compile import ZERO, allocation_free, inlined
+from infoset.arrays import Floats
 from infoset.chain_steps import move_to_zero
-from infoset.chains import (
-    CAPACITY,
-    EPSILON,
-    MOST_ADDED,
-    REDUCED,
-    Chain,
-    Floats,
-    count_of,
-    has_vertices,
-    read,
-    vertex,
-    write,
-)
+from infoset.chains import CAPACITY, EPSILON, MOST_ADDED, REDUCED, Chain, count_of, has_vertices, read, vertex, write
 
 
 @inlined
