@@ -93,8 +93,6 @@ class LinearCapture:
     `time_s` is that of the first zero of the gap, and `direction`, shape (3,), is nu, in the axes of the positions.
     `is_grazing` says that the gap comes within the tolerance of zero, but not clearly below it.
 
-    Notes
-    -----
     The gap is the greatest distance that the evader can keep at a time. The search begins at t = 0. Value, slope and a
     bound of the curvature give a lower bound of the gap; a step ends before that bound is zero, so that no contact is
     missed, however short. The tolerance is `CONTACT` times the lengths in the gap: distance and travels. A gap above

@@ -103,8 +103,6 @@ def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> f
     times the error is the effect of the rounding of times. Raise `ValueError` if a value is not finite, or no break is
     later than another.
 
-    Notes
-    -----
     On panels u is a polynomial of degree 11 to 1e-11 (`resolve`), |u|^2 one of degree 22. A polynomial p
     of degree d is bounded by its values at the zeros of the Chebyshev polynomial of degree M > d (Ehlich and Zeller,
     1964): max |p| <= max_j |p(x_j)| / cos(pi d / (2 M)). Applied to |u|^2 minus the middle of its samples, this bounds

@@ -145,8 +145,6 @@ def _solved(encounter: Encounter, velocities: Floats) -> EncounterSolution:
 def _identified(encounter: Encounter, progress: Progress) -> Floats:
     """Return the start velocities that the printed numbers follow from, by the Gauss-Newton method.
 
-    Notes
-    -----
     Each number has the weight of its last digit. Laws and positions are linear in the velocities and (3.1) is nearly
     linear, so two steps suffice.
     """

@@ -94,12 +94,6 @@ class Reference(Panels):
         breaks = np.unique(np.concatenate([_breaks(states, start, end, mu) for start, end in pieces]))
         return cls(breaks, states(_points(breaks)).reshape(len(breaks) - 1, NODES, 6), mu)
 
-    @classmethod
-    def of_path(cls, path: Path, before: Reference, *, keep: bool = False) -> Reference:
-        """Represent the trajectory of a path whose motion is linear about `before`, as `panels_of` does."""
-        panels = panels_of(path, before, keep=keep)
-        return cls(panels.breaks_s, panels.values[..., :6], before.gravitational_parameter_m3_s2)
-
 
 @dataclass(frozen=True, eq=False)
 class TracedPath(Path):
@@ -252,8 +246,6 @@ class KeplerTour(Visits):
     refer to the same time. The constructor raises `ValueError` if the gravitational parameter is not positive, or the
     start is not finite or not on an ellipse.
 
-    Notes
-    -----
     The combined method of Mironov and Mironov (2007): x' = A(t) x + w(t) + B u with A and w from the last trajectory is
     a linear problem; its solution is the next trajectory. Where they agree, the solution satisfies the maximum
     principle of the nonlinear problem. Far from the coasting orbit the rounds do not converge: there the first
@@ -329,7 +321,8 @@ class KeplerTour(Visits):
                 path = solve_segments(self._motion_about(reference), self.start_s, self.start_state, nodes)
             except ValueError as error:
                 raise NotSettledError(f"re-linearising leads to no trajectory: {error}; {REMEDY}") from None
-            flown = Reference.of_path(path, reference, keep=index > 1)
+            panels = panels_of(path, reference, keep=index > 1)
+            flown = Reference(panels.breaks_s, panels.values[..., :6], reference.gravitational_parameter_m3_s2)
             before, change = change, flown.change_from(reference)
             hopeless = rounds == FEW_ROUNDS and change > 0.5 * before
             if hopeless or not change <= GREATEST_CHANGE or flown.least_radius < nearest:

@@ -173,8 +173,6 @@ def optimise_times(
     Raise `NoRoomError` if the visits do not fit before the latest time, `ValueError` if there is no latest time and no
     guess, and, with the final effort, `NotSettledError` if the conditions of a minimum are not satisfied.
 
-    Notes
-    -----
     The problem is not convex. Many starts are evaluated, and the search begins with those that cost no more than their
     neighbours; a lower minimum elsewhere is not excluded. The descent is sequential quadratic programming in the gaps,
     on the logarithm of the objective, with the exact gradient dI/dt; then Newton's method, with differences of the
@@ -274,8 +272,6 @@ def _spread(count: int, scale: float, least: float, bounded: bool, most: int) ->
 def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
     """Return one start of each valley, the cheapest first: those that cost no more than the ones nearest to them.
 
-    References
-    ----------
     Toern and Viitanen, "Topographical global optimization using pre-sampled points", J. Global Optim. 5 (1994) 267-276.
     """
     ranked = sorted(starts, key=lambda trial: trial.objective)

@@ -86,8 +86,6 @@ def least_peak(plan: Plan, common: int = 6) -> float:
     A control exists whose peak is at most 1e-6 above it, relative. The common components are 6, or 3 for an intercept.
     Raise `NotCertifiedError` if this precision is not reached.
 
-    Notes
-    -----
     Krasovskii's problem of moments, by duality: the greatest l'e / int |B' Phi(T, t)' l| dt over directions l, where e
     is the required effect of the control. The effect of the control is whitened by the Gramian, int E E' dt = 1, and e
     is of unit length; Newton's method minimises I(l) = int |E' l| dt on l'e = 1. At its end two bounds are evaluated:

@@ -253,6 +253,11 @@ def flow_kernel(y: Floats, z: Floats, craft: Floats, begin: float, end: float, t
     return False
 
 
+def end_of(state: Floats, nu: Floats) -> Floats:
+    """Return state and costate at the end of an extremal, shape (12,)."""
+    return np.concatenate([state, nu, np.zeros(3)])
+
+
 def shoot_back(
     end_state: Floats, nu: Floats, plane: Floats, craft: Floats, duration: float, tolerance: float
 ) -> tuple[Floats, Floats] | None:
@@ -261,35 +266,23 @@ def shoot_back(
     The derivatives are by end state, by nu along the two directions of `plane`, shape (2, 3), and by the mass at the
     end. `craft` is that of `flow_back`. None stands for a failed propagation.
     """
-    y, z = np.zeros(STATES), np.zeros((STATES, COLUMNS))
-    y[:6], y[6:9] = end_state, nu
+    y, z = end_of(end_state, nu), np.zeros((STATES, COLUMNS))
     z[:6, :6] = np.eye(6)
     z[6:9, 6:8] = plane.T
     return (y, z) if flow_back(y, z, craft, 0.0, duration, tolerance) else None
 
 
-def shoot_state_back(end_state: Floats, nu: Floats, craft: Floats, duration: float, tolerance: float) -> Floats | None:
-    """Return state and costate at the start of the game alone, shape (12,), or None; see `shoot_back`."""
-    y = np.zeros(STATES)
-    y[:6], y[6:9] = end_state, nu
-    return y if flow_back(y, None, craft, 0.0, duration, tolerance) else None
-
-
+@compiled
 def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
     """Return the time derivative of position and velocity, shape (6,), at a state and costate, shape (12,).
 
     `push` is the acceleration of the thrust.
     """
     out = np.empty(6)
-    _rate(y, mu, oblateness, push, out)
-    return out
-
-
-@allocation_free
-def _rate(y: Floats, mu: float, oblateness: float, push: float, out: Floats) -> None:
     acceleration(y[:3], mu, oblateness, out[3:])
     size = np.sqrt(y[9] * y[9] + y[10] * y[10] + y[11] * y[11])
     for i in range(3):
         out[i] = y[3 + i]
         if size > 0.0:
             out[3 + i] += push * y[9 + i] / size
+    return out

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._extremal import acceleration, eliminate, rate, shoot_back, shoot_state_back
+from rendezvous.pursuit_evasion._extremal import acceleration, eliminate, end_of, flow_back, rate, shoot_back
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""
@@ -96,8 +96,9 @@ class Craft:
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
     ) -> Floats | None:
         """Newton's correction of another guess, shape (6,), with the derivatives of an earlier one near by."""
-        start = shoot_state_back(end_state, nu, self.kernel_craft(duration), duration, tolerance)
-        return None if start is None else response.inverse @ (self.start - start[:6])
+        y = end_of(end_state, nu)
+        is_propagated = flow_back(y, None, self.kernel_craft(duration), 0.0, duration, tolerance)
+        return response.inverse @ (self.start - y[:6]) if is_propagated else None
 
     def ballistic(self, duration: float, nu: Floats) -> Floats:
         """Return a guess of the end state after a short time, shape (6,): gravity and thrust are those at the start."""

@@ -100,8 +100,6 @@ def fly(
     capture and therefore no first plan, or `replan_s` is not positive, and `PathError` if the evader's path cannot be
     followed.
 
-    Notes
-    -----
     Each plan starts Newton's method at the previous one: 2 ms and, for a steered evader, 2 ms of its flight. The last
     leg is simulated without observation. If Newton's method fails from the previous plan, the game is solved from
     scratch; the previous plan is kept if that would take much longer.

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._extremal import STATES, flow_back, rate
+from rendezvous.pursuit_evasion._extremal import STATES, end_of, flow_back, rate
 from rendezvous.pursuit_evasion._pair import FINE, Craft, Node
 from rendezvous.pursuit_evasion.game import Units, scaled_game
 from rendezvous.pursuit_evasion.solution import Solution
@@ -39,17 +39,14 @@ class ExtremalPath:
 
     def at(self, time: float) -> Floats:
         """Return state and costate at a time, shape (12,); the time may be a little beyond the end."""
-        y = np.zeros(STATES)
-        y[:6], y[6:9] = self.end_state, self.nu
+        y = end_of(self.end_state, self.nu)
         self._carry(y, 0.0, self.duration - time)
         return y
 
     def sampled(self, times: Floats) -> Floats:
         """Return states and costates at rising times, shape (n, 12)."""
         out = np.empty((len(times), STATES))
-        y = np.zeros(STATES)
-        y[:6], y[6:9] = self.end_state, self.nu
-        to_go = 0.0
+        y, to_go = end_of(self.end_state, self.nu), 0.0
         for i in range(len(times) - 1, -1, -1):
             self._carry(y, to_go, self.duration - times[i])
             to_go = self.duration - times[i]

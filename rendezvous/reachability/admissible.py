@@ -73,18 +73,16 @@ class Lifted:
 
     def within(self, point: Floats, basis: Floats) -> Lifted:
         """Return the set in coordinates z of an affine subspace v = point + basis z in which the equations hold."""
-        return Lifted(
-            self.free + self.response @ point,
-            self.response @ basis,
-            self.control_free + self.control_response @ point,
-            self.control_response @ basis,
-            self.rows @ basis,
-            self.limits - self.rows @ point,
-            self.moments,
-            self.labels,
-            np.zeros((0, basis.shape[1])),
-            np.zeros(0),
-            self.ball,
+        return replace(
+            self,
+            free=self.free + self.response @ point,
+            response=self.response @ basis,
+            control_free=self.controls(point),
+            control_response=self.control_response @ basis,
+            rows=self.rows @ basis,
+            limits=self.limits - self.rows @ point,
+            equal=np.zeros((0, basis.shape[1])),
+            levels=np.zeros(0),
         )
 
 

@@ -164,8 +164,6 @@ def least_norm(lifted: Lifted, weights: Floats) -> LeastNorm:
     Raise `NoSolutionError` if the norm found is not within 1e-8 of its lower bound, or its controls violate a
     constraint.
 
-    Notes
-    -----
     The cone program minimises t with |weights x(T)| <= t, not the square of the norm, whose multipliers vanish with
     it. A solver finds t to its tolerance times the size of the states; the program is therefore solved again about its
     own solution, in units of the norm found, until both bounds meet (iterative refinement).

@@ -37,8 +37,6 @@ class TimeVaryingMotion(LinearMotion):
     Without `input_at` u is an acceleration, B = (0, 1)', and without `drift_at` w is zero. An actuator with the cost u'
     R u has B = (0, 1)' R^(-1/2), and controls R^(1/2) u.
 
-    Notes
-    -----
     The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
     = Psi(t)' at the nodes gives the Gramian, the held control and the drift as sums of positive weights. Panels are
     doubled until two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
