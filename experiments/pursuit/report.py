@@ -46,6 +46,11 @@ class Feedback:
     seed: int
     flights: tuple[Flight, ...]
 
+    @property
+    def captures_s(self) -> list[float]:
+        """Return the times of the captures."""
+        return [flight.time_s for flight in self.flights if flight.ended is Ended.CAPTURED]
+
 
 @dataclass(frozen=True)
 class Report:
@@ -135,7 +140,7 @@ def _certificate_json(certificate: Certificate) -> dict[str, object]:
 
 def _feedback_json(feedback: Feedback) -> dict[str, object]:
     quantiles: dict[str, float | None] = dict(zip(_LEVELS, capture_quantiles_s(feedback.flights), strict=False))
-    if sum(flight.ended is Ended.CAPTURED for flight in feedback.flights) < _FEWEST:
+    if len(feedback.captures_s) < _FEWEST:
         quantiles |= {name: None for name in quantiles if name in ("10%", "90%")}
     return {
         "policy": feedback.policy,
@@ -145,7 +150,7 @@ def _feedback_json(feedback: Feedback) -> dict[str, object]:
         "velocity_noise_m_s": feedback.observation.velocity_error_m_s,
         "seed": feedback.seed,
         "runs": len(feedback.flights),
-        "captured": _captured(feedback),
+        "captured": len(feedback.captures_s),
         "capture_time_quantiles_s": quantiles,
         "flights": [
             {
@@ -173,10 +178,6 @@ def trajectories(solution: Solution) -> str:
     ]
     directions = (f"thrust_direction_{axis}" for axis in "xyz")
     return trajectories_csv(["player"], ["time_s", *STATE_COLUMNS, "mass_kg", *directions], tracks)
-
-
-def _captured(feedback: Feedback) -> int:
-    return sum(flight.ended is Ended.CAPTURED for flight in feedback.flights)
 
 
 def report_parts(report: Report) -> Iterator[Part]:
@@ -279,9 +280,9 @@ def _feedback_lines(feedback: Feedback) -> Iterator[str]:
             f"last predicted capture {flight.predicted_s[-1]:.1f} s"
         )
         return
-    yield f"{heading}{_captured(feedback)} of {len(flights)} captured"
-    if times_s := [flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]:
-        yield f"  capture time, s: {_distribution(times_s)}"
+    yield f"{heading}{len(feedback.captures_s)} of {len(flights)} captured"
+    if feedback.captures_s:
+        yield f"  capture time, s: {_distribution(feedback.captures_s)}"
     yield f"  distance at the end, m: {_distribution([flight.distance_m for flight in flights])}"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import permutations
 from math import factorial
 
 import numpy as np
@@ -103,8 +104,9 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     check_times(tour.start_s, times, times)
     # Whether each target may be visited at each time: its stay must end before the next visit.
     fits = times[:, None] + tour.dwell_s < np.append(times[1:], np.inf)[:, None]
-    unfit = factorial(count) - _orders_that_fit(fits)
-    if unfit == factorial(count):
+    orders = np.array(list(permutations(range(count))))
+    unfit = int(np.count_nonzero(~fits[np.arange(count), orders].all(axis=1)))
+    if unfit == len(orders):
         raise ValueError(
             "no order fits the times: in each one a stay ends after the next visit; make times farther apart, or "
             "stays shorter"
@@ -238,18 +240,6 @@ def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) ->
         except NoRoomError:
             unfit += factorial(len(dwell_s) - 1)
     return unfit
-
-
-def _orders_that_fit(fits: Flags) -> int:
-    """Count the orders that use only pairs of slots and targets that fit, shape (slot, target)."""
-    ways = {frozenset[int](): 1}
-    for slot in fits:
-        longer: dict[frozenset[int], int] = {}
-        for visited, number in ways.items():
-            for target in _unvisited(slot, visited):
-                longer[visited | {target}] = longer.get(visited | {target}, 0) + number
-        ways = longer
-    return sum(ways.values())
 
 
 def _unvisited(slot: Flags, visited: frozenset[int]) -> list[int]:

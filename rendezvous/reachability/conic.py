@@ -52,10 +52,7 @@ class ConeProgram:
     def __init__(self, cost: Floats, matrix: Floats | None = None) -> None:
         self.cost = cost
         self._matrix = csc_matrix((len(cost), len(cost))) if matrix is None else csc_matrix(matrix)
-        self._blocks: list[Floats] = []
-        self._ends: list[Floats] = []
-        self._cones: list[object] = []
-        self._kinds: list[str] = []
+        self._added: list[tuple[str, Floats, Floats, object]] = []
         self._whole: tuple[Floats, Floats] | None = None
 
     def keep(self, rows: Floats, limits: Floats) -> ConeProgram:
@@ -73,10 +70,7 @@ class ConeProgram:
 
     def _add(self, kind: str, block: Floats, ends: Floats, cone: object) -> ConeProgram:
         if len(ends):
-            self._blocks.append(self._widened(block))
-            self._ends.append(ends)
-            self._cones.append(cone)
-            self._kinds.append(kind)
+            self._added.append((kind, self._widened(block), ends, cone))
             self._whole = None
         return self
 
@@ -156,7 +150,8 @@ class ConeProgram:
             setattr(settings, name, value)
         upper = csc_matrix(np.triu(self._matrix.toarray())) if self._matrix.nnz else self._matrix
         rows, ends = self._all()
-        return clarabel.DefaultSolver(upper, self.cost, csc_matrix(rows), ends, self._cones, settings)
+        cones = [cone for *_, cone in self._added]
+        return clarabel.DefaultSolver(upper, self.cost, csc_matrix(rows), ends, cones, settings)
 
     def of_rows(self, multipliers: Floats) -> Floats:
         """Return the multipliers of inequality rows alone."""
@@ -206,13 +201,13 @@ class ConeProgram:
         return self._whole
 
     def _stacked(self, wanted: str | None = None) -> tuple[Floats, Floats]:
-        chosen = [i for i, kind in enumerate(self._kinds) if wanted in (None, kind)]
-        blocks = [np.zeros((0, len(self.cost))), *(self._blocks[i] for i in chosen)]
+        chosen = [(block, ends) for kind, block, ends, _ in self._added if wanted in (None, kind)]
+        blocks = [np.zeros((0, len(self.cost))), *(block for block, _ in chosen)]
         rows = vstack(blocks, format="csr") if any(issparse(block) for block in blocks) else np.vstack(blocks)
-        return rows, np.concatenate([np.zeros(0), *(self._ends[i] for i in chosen)])
+        return rows, np.concatenate([np.zeros(0), *(ends for _, ends in chosen)])
 
     def _parts(self, values: Floats) -> Iterator[tuple[str, Floats]]:
         start = 0
-        for kind, ends in zip(self._kinds, self._ends, strict=True):
+        for kind, _, ends, _ in self._added:
             yield kind, values[start : start + len(ends)]
             start += len(ends)
