@@ -94,7 +94,8 @@ class Situation:
         return float(self.later_times_s[-1]) - self.time_s if self.later_times_s.size else self.lead_s
 
     def pending_m(self, time_to_go_s: Floats) -> Floats:
-        """Return the changes of a predicted miss by the pending impulses, m, which are to be subtracted from it.
+        """Return the changes of a predicted miss by the pending impulses, m; the miss after them is the predicted miss
+        less these.
 
         `time_to_go_s`, shape (B,) or (B, S), is the time to x = 0 of the predicted misses.
         """

@@ -19,7 +19,7 @@ def start(strategy: Strategy, batch: int, axes: Sequence[str]) -> list[Any]:
 
 
 def check_axes(strategy: Strategy, axes: Sequence[str]) -> None:
-    """Raise ValueError if a strategy with ``spatial = True`` has one axis: it would take engagements for axes."""
+    """Raise ValueError if a strategy for both lateral axes (``spatial = True``) is used in a plane."""
     if _is_spatial(strategy) and len(axes) == 1:
         raise ValueError(
             f"strategy {type(strategy).__name__} decides for both lateral axes (its class has `spatial = True`), and "
@@ -31,7 +31,7 @@ def decide(strategy: Strategy, situation: Situation, states: Sequence[Any], trac
     """Return the impulses of a step, m/s, shape (B,); in space (2, B), along y and z.
 
     In space, a strategy that decides for one axis gets the planar situation of each axis. `states` is the return value
-    of `start`. Only in engagements that are `tracking`, shape (B,), must the impulses be finite.
+    of `start`. The impulses of engagements that are not `tracking`, shape (B,), need not be finite.
     """
     if _is_spatial(strategy):
         return checked_impulses(strategy.decide(situation, states[0]), situation, tracking, strategy)

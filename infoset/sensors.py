@@ -141,9 +141,10 @@ class Sensor(ABC):
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats] | None:
         """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
 
-        It is whether the band is one of the predicted miss z + V x/e (otherwise of z), and its half-width, m, at ranges
-        x = `range_m`, with the closing speed e; None if a measurement leaves V and z as they are. `errors` is the
-        half-width of the interval of the measured quantity, in units of the bound.
+        The first value is whether it is a band of the predicted miss z + V x/e (otherwise it is one of z), the second
+        one its half-width, m, at ranges x = `range_m`, with the closing speed e. `errors` is the half-width of the
+        interval of the measured quantity, in units of the bound. None means that a measurement leaves V and z as they
+        are.
         """
         return None
 

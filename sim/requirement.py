@@ -299,8 +299,8 @@ def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Integers
     """Return the numbers of runs that satisfy a bound, with a required share, at which a requirement is decided.
 
     The requirement is met from the first number on (one more than the number of runs if no number decides), and not met
-    up to the second one (-1 if no number decides). Both are read-only arrays: `watched`, those of the confidence
-    sequence for 1, 2, ..., `size` runs; otherwise of shape (1,), for `size` runs.
+    up to the second one (-1 if no number decides). With `watched` both are arrays for 1, 2, ..., `size` runs, those of
+    the confidence sequence; otherwise they have the shape (1,), for `size` runs. They are read-only.
     """
     if not watched:
         return _critical_counts(size, size, share, watched)
