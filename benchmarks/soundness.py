@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 from benchmarks.random_scenarios import camera_scenario, random_scenario, scheduled
 from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
-from guidance.pair_noise import middle
 from infoset import AngleSensor, Convention, ErrorShape, InformationSetView, InitialSet, Model, RateSensor
 from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
+from sim.pair import middle
 
 Floats = NDArray[np.float64]
 BATCH, SPACE_BATCH = 80, 160

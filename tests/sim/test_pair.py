@@ -8,7 +8,6 @@ import pytest
 
 from experiments.interception.scenario_file import load_scenario
 from guidance import LineOfSight, Strategy, Thruster, make_strategy
-from guidance.pair_noise import PairNoise, middle
 from guidance.situation import Situation
 from infoset import (
     AngleSensor,
@@ -25,7 +24,7 @@ from infoset.model import InitialSet, Model
 from infoset.sensors import Sensor
 from sim import Scenario, Sun
 from sim.bound import TruthPair, lower_bound, pair_at
-from sim.pair import PairFlight, ScheduledMotion, fly_pair
+from sim.pair import PairFlight, PairNoise, ScheduledMotion, fly_pair, middle
 
 QUICK = 4
 """Random scenarios of the quick tests: of one label, so that there are few linear programs."""
