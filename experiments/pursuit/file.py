@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import PlainValidator
 
-from experiments.common.errors import InputError, input_errors
+from experiments.common.errors import InputError
 from experiments.common.problem_file import ProblemTables, ReadProblem, problem_form
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
+    KILO,
     NUMBER,
     ONE,
     ZERO,
@@ -31,10 +32,11 @@ from experiments.common.toml_values import (
     Vector,
     key,
     radians,
+    si,
     wrong,
 )
 from rendezvous.pursuit_evasion import Game, Gravity, Player
-from rendezvous.two_body import OrbitalElements
+from rendezvous.two_body import OrbitalElements, perigee_m, semi_major_axis_m
 
 KIND = "pursuit-evasion"
 SUSPICIOUSLY_SMALL_KM = Decimal(100)
@@ -150,6 +152,7 @@ def _checks(known: Known) -> Iterator[Problem]:
     path = ("equatorial_radius_km",)
     if known.number("j2") and known.value(*path) is None and path not in known.bad:
         yield Problem(path, "is missing", "j2 refers to it, for example equatorial_radius_km = 6378.1363")
+    yield from _check_orbits(known)
 
 
 def _check_start(known: Known, name: str) -> Iterator[Problem]:
@@ -171,15 +174,81 @@ def _check_start(known: Known, name: str) -> Iterator[Problem]:
         yield Problem((name, missing[0]), f"is missing{others}", remedy)
 
 
+def _check_orbits(known: Known) -> Iterator[Problem]:
+    """Check both orbits, and the distance between the players."""
+    mu, planet = known.number("gravitational_parameter_km3_s2"), known.number("planet_radius_km")
+    if mu is None or ("planet_radius_km",) in known.bad:
+        return
+    mu_si, planet_m = si(mu, 3 * KILO), si(EARTH_RADIUS_KM if planet is None else planet, KILO)
+    positions = {}
+    for name in PLAYERS:
+        start = _start(known, name, mu_si)
+        if start is None:
+            continue
+        position, velocity = (np.asarray(vector, dtype=float) for vector in start)
+        positions[name] = position
+        axis_km = known.number(name, "semi_major_axis_km")
+        problem = _orbit_problem(position, velocity, mu_si, planet_m)
+        if problem is not None:
+            remedy = "choose an orbit above the planet, or correct planet_radius_km"
+            if axis_km is not None and axis_km < SUSPICIOUSLY_SMALL_KM:
+                problem += f"; a semi-major axis of {axis_km} km is very small"
+                remedy = "write it in kilometres, not in planet radii or thousands of kilometres"
+            yield Problem((name, "position_km" if axis_km is None else "semi_major_axis_km"), problem, remedy)
+    if len(positions) < len(PLAYERS):
+        return
+    distance_m, radius = math.dist(*positions.values()), known.number("capture_radius_km")
+    if distance_m == 0.0:
+        by_state = known.value("evader", "true_anomaly_deg") is None
+        where = ("evader", "position_km" if by_state else "true_anomaly_deg")
+        yield Problem(where, "puts the evader where the pursuer is", "move one of the two")
+    elif radius is not None and distance_m <= si(radius, KILO):
+        yield Problem(
+            ("capture_radius_km",),
+            f"must be below the distance at the start, {distance_m / 1e3:.6g} km, found {radius}",
+            "make it smaller, or start farther apart",
+        )
+
+
+def _start(known: Known, name: str, mu_si: float) -> tuple[ArrayLike, ArrayLike] | None:
+    """Return position and velocity of a player in SI, or None if a value is not sound."""
+    table = known.document.get(name)
+    if not isinstance(table, dict):
+        return None
+    if all(vector in table for vector in STATE):
+        position, velocity = (known.value(name, vector) for vector in STATE)
+        if not isinstance(position, list) or not isinstance(velocity, list):
+            return None
+        return [si(Decimal(x), KILO) for x in position], [si(Decimal(v), KILO) for v in velocity]
+    numbers = {element: known.number(name, element) for element in ELEMENTS}
+    if any(value is None for value in numbers.values()):
+        return None
+    return _state({element: float(value or 0) for element, value in numbers.items()}, mu_si)
+
+
+def _orbit_problem(position_m: np.ndarray, velocity_m_s: np.ndarray, mu_si: float, planet_m: float) -> str | None:
+    if not position_m.any():
+        return "is the centre of the planet"
+    axis_m = semi_major_axis_m(position_m, velocity_m_s, mu_si)
+    if not 0.0 < axis_m < math.inf:
+        return "starts on a parabola or a hyperbola: the velocity is not below the escape velocity"
+    perigee = perigee_m(position_m, velocity_m_s, mu_si)
+    if perigee <= 1e-6 * axis_m:
+        return "starts a fall along a line through the planet's centre"
+    if perigee <= planet_m:
+        return (
+            f"gives an orbit that meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the "
+            f"planet's radius is {planet_m / 1e3:.6g} km"
+        )
+    return None
+
+
 FORM = problem_form(KIND, PursuitTables, _checks, [f"{player}.{element}" for player in PLAYERS for element in ELEMENTS])
 
 
 def load_pursuit(name_or_path: str, settings: Sequence[str] | None = None) -> PursuitProblem:
     """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
-    problem = PursuitProblem(load_tables(FORM, name_or_path, settings), name_or_path)
-    with input_errors(name_or_path):
-        problem.game()
-    return problem
+    return PursuitProblem(load_tables(FORM, name_or_path, settings), name_or_path)
 
 
 def parameter_names() -> list[str]:

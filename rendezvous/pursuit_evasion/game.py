@@ -116,21 +116,14 @@ class Game:
         _need(self.longest_s > 0.0, "the longest duration must be positive")
         for name, player in (("pursuer", self.pursuer), ("evader", self.evader)):
             state = np.array(player.position_m), np.array(player.velocity_m_s)
-            _need(bool(np.any(state[0] != 0.0)), f"the {name} starts at the centre of the planet")
+            _need(bool(np.any(state[0] != 0.0)), f"the {name} is at the centre of the planet")
             axis = semi_major_axis_m(*state, self.gravity.parameter_m3_s2)
-            _need(0.0 < axis < math.inf, f"the {name} starts on a parabola or a hyperbola; reduce its velocity")
-            perigee, radius = perigee_m(*state, self.gravity.parameter_m3_s2), self.gravity.planet_radius_m
-            _need(perigee > 1e-6 * axis, f"the {name} starts a fall along a line through the planet's centre")
-            _need(
-                perigee > radius,
-                f"the {name}'s orbit meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the "
-                f"planet's radius is {radius / 1e3:.6g} km; choose a higher orbit, or check the units of both",
-            )
-        _need(self.distance_m > 0.0, "the evader starts where the pursuer is; move one of the two")
-        _need(
-            self.distance_m > self.capture_radius_m,
-            f"the capture radius must be below the distance at the start, {self.distance_m / 1e3:.6g} km",
-        )
+            _need(0.0 < axis < math.inf, f"the {name}'s orbit is not an ellipse: its speed is too high")
+            perigee = perigee_m(*state, self.gravity.parameter_m3_s2)
+            _need(perigee > 1e-6 * axis, f"the {name} falls along a line through the planet's centre")
+            _need(perigee > self.gravity.planet_radius_m, f"the {name}'s orbit reaches into the planet")
+        _need(self.distance_m > 0.0, "pursuer and evader are at the same position")
+        _need(self.distance_m > self.capture_radius_m, "the evader is within the capture radius at the start")
 
     @property
     def distance_m(self) -> float:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.common.errors import InputError, input_errors
+from experiments.common.errors import InputError
 from experiments.common.toml_file import read_tables
 from experiments.pursuit.file import FORM, PursuitProblem, load_pursuit, parameter_names
 from rendezvous.pursuit_evasion import Game
@@ -11,10 +11,7 @@ BUILT_IN = ["geo-pursuit", "leo-pursuit"]
 
 
 def read_problem(text: str, source: str) -> PursuitProblem:
-    problem = PursuitProblem(read_tables(FORM, text, source), source)
-    with input_errors(source):
-        problem.game()
-    return problem
+    return PursuitProblem(read_tables(FORM, text, source), source)
 
 
 @pytest.fixture(scope="module")
@@ -68,18 +65,14 @@ def test_values_can_be_set_and_are_checked_as_in_a_file() -> None:
         ("semi_major_axis_km = 42166.0", "semi_major_axis_km = -42166.0", ["pursuer.semi_major_axis_km", "hyperbola"]),
         ("semi_major_axis_km = 42166.0", "semi_major_axis_km = nan", ["pursuer.semi_major_axis_km", "finite number"]),
         ("eccentricity = 0.00013", "eccentricity = 1.0", ["pursuer.eccentricity", "fall along a line"]),
-        ("eccentricity = 0.00013", "eccentricity = 0.9", ["meets the planet", "4216.6 km"]),
-        (
-            "semi_major_axis_km = 42166.0",
-            "semi_major_axis_km = 42.166",
-            ["pursuer", "42.1605 km", "units"],
-        ),
+        ("eccentricity = 0.00013", "eccentricity = 0.9", ["that meets the planet", "4216.6 km"]),
+        ("semi_major_axis_km = 42166.0", "semi_major_axis_km = 42.166", ["is very small", "kilometres"]),
         ("mass_kg = 2000.0", "mass_kg = 0", ["mass_kg", "greater than 0"]),
         ("dry_mass_kg = 1000.0", "dry_mass_kg = 2000.0", ["dry_mass_kg", "must be below"]),
         ("thrust_N = 20.0", "thrust_N = 0.0", ["pursuer.thrust_N", "needs thrust"]),
         ("thrust_N = 10.0", "thrust_N = -1.0", ["evader.thrust_N", "at least 0"]),
         ("specific_impulse_s = 350.0", "specific_impulse_s = 0", ["specific_impulse_s", "greater than 0"]),
-        ("capture_radius_km = 0.0", "capture_radius_km = 7000", ["capture radius", "distance at the start"]),
+        ("capture_radius_km = 0.0", "capture_radius_km = 7000", ["capture_radius_km", "distance at the start"]),
         ("capture_radius_km", "j2 = 0.001\ncapture_radius_km", ["equatorial_radius_km", "j2 refers to it"]),
         ("inclination_deg = 1.565\n", "", ["pursuer.inclination_deg", "is missing"]),
         ("[pursuer]\n", "[pursuer]\nposition_km = [1.0, 2.0, 3.0]\n", ["is given together with", "give either"]),
@@ -115,7 +108,7 @@ def test_a_player_may_be_given_by_a_state(text: str) -> None:
     [
         ("[42000.0, 0.0, 0.0]", "[0.0, 9.0, 0.0]", "hyperbola"),
         ("[42000.0, 0.0, 0.0]", "[1.0, 0.0, 0.0]", "fall along a line"),
-        ("[5000.0, 0.0, 0.0]", "[0.0, 8.0, 0.0]", "meets the planet"),
+        ("[5000.0, 0.0, 0.0]", "[0.0, 8.0, 0.0]", "that meets the planet"),
         ("[0.0, 0.0, 0.0]", "[0.0, 8.0, 0.0]", "centre of the planet"),
         ("[42000.0, 0.0]", "[0.0, 3.0, 0.0]", "array of 3 numbers"),
     ],
