@@ -320,7 +320,7 @@ class _Compilation(event.Listener):
         if folder is None:
             how = f"in every process, because no cache folder can be written: set {VARIABLE} to a folder that can"
         else:
-            how = f"once; the machine code is stored in {folder.parent}"
+            how = f"for this and later runs; the machine code is stored in {folder.parent}"
         LOGGER.warning("compiling the numerical kernels (about 5 to 15 s), %s", how)
 
 

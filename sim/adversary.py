@@ -16,6 +16,7 @@ from guidance.scripted_noise import ScriptedNoise
 from infoset import StateBox
 from infoset.arrays import Floats
 from infoset.limits import COUNT, WHOLE
+from sim.closed_form import worst_shift_m
 from sim.draws import Draws, corners, draw
 from sim.engagement import Engagements
 from sim.planned_flights import ANGLE, ROWS, Flown, PlannedNoise, Plans, by_axis
@@ -186,6 +187,7 @@ class _Search:
         self._seed, self._keep_set = seed, keep_set
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._strategy_name = scenario.strategy if strategy is None else type(strategy).__name__
+        self._shift_m = worst_shift_m(scenario)
         self._lower, self._upper = corners(scenario.set_model.bounds)
         self._random = np.random.default_rng(seed)
         # All other random numbers are those of run 0, so that the worst engagement can be repeated alone.
@@ -255,7 +257,7 @@ class _Search:
         )
         tie_draws = np.repeat(self._draws.tie, size, axis=-2)
         draws = Draws(position_m, velocity_m_s, {}, tie_draws, execution, target, pointing, images=images)
-        noise = PlannedNoise(plans, tie, self._names)
+        noise = PlannedNoise(plans, tie, self._names, self._shift_m)
         flight = Engagements(self.scenario, draws, self._strategy, noise=noise, guarantee=False)
         while flight.flying:
             flight.advance()

@@ -65,7 +65,9 @@ class PlannedNoise:
     names : sequence of str
         Sensors of the rows of a sequence.
     tie : TieRule or None
-        Tie rule where an extreme is kept; None selects the side at every step (`SwitchingNoise`).
+        Tie rule of game noise; None keeps the extreme that the plan prescribes for each step (`SwitchingNoise`).
+    shift_m : ndarray or None
+        Shift of game noise in each step, m.
 
     Attributes
     ----------
@@ -76,13 +78,16 @@ class PlannedNoise:
     plans: Plans
     tie: TieRule | None
     names: Sequence[str]
+    shift_m: Floats | None = None
     errors: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         sequence = self.plans.sequence
         self.errors = np.zeros_like(sequence)
-        tie = TieRule.RANDOM if self.tie is None else self.tie
-        self._keeping = (SwitchingNoise if self.tie is None else GameNoise)(tie, by_axis(sequence[:, ANGLE]))
+        draws = by_axis(sequence[:, ANGLE])
+        self._keeping = (
+            SwitchingNoise(TieRule.RANDOM, draws) if self.tie is None else GameNoise(self.tie, draws, self.shift_m)
+        )
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
         """Return the measurements of this step: with planned errors, or those that keep an extreme of the set."""

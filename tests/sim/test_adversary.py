@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import Situation
+from guidance import GameNoise, NoiseKind, Situation, TieRule
 from guidance.scripted_noise import ScriptedNoise
 from infoset import Convention, ErrorShape, InitialSet, Model, RateSensor, StateBox
-from sim import Outcome, Scenario
+from sim import Outcome, Scenario, simulate
 from sim.adversary import NothingCountsError, WorstEngagement, find_worst
 from sim.draws import corners, draw
 from sim.engagement import Engagements
@@ -232,3 +232,15 @@ def test_a_search_that_needs_too_much_memory_is_refused(asteroid: Scenario) -> N
     """A quarter of the budget is for first plans, each with the errors of three sensors at each step."""
     with pytest.raises(ValueError, match=r"budget must be at most \d+ for flights of 2\d\d steps"):
         find_worst(asteroid, budget=10_000_000)
+
+
+def test_with_a_cut_off_the_search_begins_with_game_noise_and_its_shift(coarse: Scenario) -> None:
+    late = replace(guaranteed(coarse), thruster=replace(coarse.thruster, last_impulse_s=30.0))
+    first = find_worst(late, budget=1, seed=2)
+    game = replace(first.scenario, noise=NoiseKind.GAME, tie=TieRule.UPPER)
+    assert first.construction == "game noise, tie upper"
+    assert first.miss_m == pytest.approx(simulate(game, 1).miss_m[0], rel=1e-9)
+    unshifted = Engagements(game, draw(game, [0], 0), noise=GameNoise(TieRule.UPPER, np.ones((1, 1))))
+    while unshifted.flying:
+        unshifted.advance()
+    assert first.miss_m > 1.05 * unshifted.results(np.arange(1)).miss_m[0]
