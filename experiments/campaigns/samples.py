@@ -50,15 +50,15 @@ class Sample:
     """
 
     noise: str
-    runs: int
-    quantiles: Mapping[str, Sequence[QuantileEstimate]]
-    worst: Mapping[str, float]
-    outcomes: Mapping[str, int]
-    sets: SetCounts
-    hits: HitEstimate | None
-    phi_held: int
-    phi_known: int
-    known: Mapping[str, int]
+    runs: int = 0
+    quantiles: Mapping[str, Sequence[QuantileEstimate]] = field(default_factory=dict)
+    worst: Mapping[str, float] = field(default_factory=dict)
+    outcomes: Mapping[str, int] = field(default_factory=dict)
+    sets: SetCounts = field(default_factory=SetCounts)
+    hits: HitEstimate | None = None
+    phi_held: int = 0
+    phi_known: int = 0
+    known: Mapping[str, int] = field(default_factory=dict)
 
 
 def noises_of(folder: CampaignFolder) -> list[str]:

@@ -66,13 +66,8 @@ _COLUMN_MM = 90.0
 _COLOURS: Colormap = LinearSegmentedColormap.from_list(
     "infoset", ["#f7fbff", "#c6d9ec", "#7fb0d6", "#3f7fb5", "#1b4f8a", "#08306b"]
 )
-_DASHES: tuple[tuple[float, Sequence[float]] | None, ...] = (
-    None,
-    (0.0, (5.0, 1.5)),
-    (0.0, (1.5, 1.2)),
-    (0.0, (6.0, 1.0, 1.0, 1.0)),
-)
-"""Line styles from the largest quantile down; None is a solid line."""
+_DASHES: tuple[Any, ...] = ("-", (0.0, (5.0, 1.5)), (0.0, (1.5, 1.2)), (0.0, (6.0, 1.0, 1.0, 1.0)))
+"""Line styles from the largest quantile down."""
 
 _NO_VALUE = "\N{EN DASH}"
 """Text in the cells whose runs do not show the quantile."""
@@ -84,6 +79,7 @@ _DIAMOND: dict[str, Any] = {"marker": "D", "markersize": 4.0, "color": IMPULSE, 
 _LINE: dict[str, Any] = {"color": INK, "linewidth": 1.3}
 _CLOSED_FORM: dict[str, Any] = {"color": "#2f6b3a", "linewidth": 1.3, "linestyle": (0, (5, 1.5))}
 """Lines on which the estimate and the closed form equal the bound."""
+_CELLS: dict[str, Any] = {"edgecolors": "white", "linewidth": 0.3, "zorder": 1.0}
 _MOST_LEGEND_COLUMNS = 5
 _LINE_MM, _LETTER_MM = 3.6, 1.5
 """Height of a line of an axis label, and width of a letter of a tick label."""
@@ -142,13 +138,14 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
     columns = min(2, len(quantities))
     figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 24.0 + 47.0, width_mm=_COLUMN_MM * columns)
     grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 36.0, 11.0), gaps_mm=(18.0, 24.0))
-    panels = [axes for row in grid for axes in row]
+    panels = list(itertools.chain(*grid))
     for axes, quantity, letter in zip(panels, quantities, _LETTERS, strict=False):
         quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
         _line_panel(axes, table, noise, quantity, quantiles, levels)
-        few = _too_few(table, noise, quantiles)
+        hidden = [level_name(quantile.level) for quantile in quantiles if not _is_shown(table, noise, quantile)]
+        few = f"; too few runs for {', '.join(hidden)}" if hidden else ""
         axes.set_title(
-            f"({letter}) {noise} noise{few and f'; {few}'}",
+            f"({letter}) {noise} noise{few}",
             pad=6.0 + (4.0 if quantity == table.required.quantity else 0.0),
         )
         axes.set_ylabel(QUANTITY_NAMES[quantity])
@@ -169,12 +166,6 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
     note = "bars: 95 % confidence intervals; arrow: too few runs for an upper end"
     figure.legend(handles=handles, loc="lower center", ncols=4, title=note, title_fontsize=7.0)
     return figure
-
-
-def _too_few(table: SweepTable, noise: str, quantiles: Sequence[QuantileName]) -> str:
-    """Return a note about the quantiles that the runs show at no value; empty without such quantiles."""
-    hidden = [level_name(quantile.level) for quantile in quantiles if not _is_shown(table, noise, quantile)]
-    return f"too few runs for {', '.join(hidden)}" if hidden else ""
 
 
 def _is_shown(table: SweepTable, noise: str, quantile: QuantileName) -> bool:
@@ -215,15 +206,7 @@ def _line_panel(
         lines = [(_points(table, noise, None), "-")]
     for points, look in lines:
         known = [(point.at, point.value) for point in points if point.value is not None]
-        axes.plot(
-            [at for at, _ in known],
-            [value for _, value in known],
-            color=colour,
-            linestyle=look,
-            marker="o",
-            markersize=3.0,
-            zorder=3.0,
-        )
+        axes.plot(*np.reshape(known, (-1, 2)).T, color=colour, linestyle=look, marker="o", markersize=3.0, zorder=3.0)
         for point in points:
             ends = [end for end in (point.lower, point.value, point.upper) if end is not None]
             if ends:
@@ -253,18 +236,9 @@ def _mark_decisions(axes: Axes, table: SweepTable, noise: str) -> None:
     for cell, (left, right) in enumerate(itertools.pairwise(edges.tolist())):
         verdict = table.verdict(cell, noise)
         if verdict is not None:
-            axes.add_patch(
-                Rectangle(
-                    (left, 1.0),
-                    right - left,
-                    _STRIP,
-                    transform=axes.get_xaxis_transform(),
-                    facecolor=DECISION_COLOURS[verdict.decision],
-                    edgecolor="white",
-                    linewidth=0.5,
-                    clip_on=False,
-                )
-            )
+            look: dict[str, Any] = {"edgecolor": "white", "linewidth": 0.5, "clip_on": False}
+            look |= {"facecolor": DECISION_COLOURS[verdict.decision], "transform": axes.get_xaxis_transform()}
+            axes.add_patch(Rectangle((left, 1.0), right - left, _STRIP, **look))
     axes.set_xlim(edges[0], edges[-1])
     (answer,) = answers(table, noise)
     for limit in answer.limits:
@@ -351,17 +325,8 @@ def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
     decisions = list(DECISION_COLOURS)
     codes = [0 if verdict is None else decisions.index(verdict.decision) for verdict in verdicts]
     shown = np.ma.MaskedArray(codes, mask=[verdict is None for verdict in verdicts]).reshape(shape)
-    axes.pcolormesh(
-        _edges(across),
-        _edges(up),
-        shown.T,
-        cmap=ListedColormap([*DECISION_COLOURS.values()]),
-        vmin=-0.5,
-        vmax=2.5,
-        edgecolors="white",
-        linewidth=0.3,
-        zorder=1.0,
-    )
+    colours = ListedColormap([*DECISION_COLOURS.values()])
+    axes.pcolormesh(_edges(across), _edges(up), shown.T, cmap=colours, vmin=-0.5, vmax=2.5, **_CELLS)
     _scale(axes, across, "x")
     _scale(axes, up, "y")
     axes.grid(visible=False)
@@ -375,7 +340,8 @@ def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
         [0.0 if verdict is None else verdict.value or 0.0 for verdict in verdicts],
         mask=[verdict is None or verdict.value is None for verdict in verdicts],
     ).reshape(shape)
-    grids = [(_closed_form(table), _CLOSED_FORM)]
+    closed = [math.nan if value is None else value for value in table.closed_form_m] or np.full(shape, math.nan)
+    grids = [(np.ma.masked_invalid(np.reshape(closed, shape)), _CLOSED_FORM)]
     if {Decision.MET, Decision.NOT_MET} <= {verdict.decision for verdict in verdicts if verdict is not None}:
         grids.append((values, _LINE))
     halo = [Stroke(linewidth=2.6, foreground="white"), Normal()]
@@ -409,13 +375,6 @@ def _clear_heights(axes: Axes, table: SweepTable) -> Floats:
     return np.asarray(heights[best, np.arange(len(up.values))[:, None]])
 
 
-def _closed_form(table: SweepTable) -> Grid:
-    """Return the closed form of the cells of a map; masked where it is not known."""
-    shape = [len(axis.values) for axis in table.axes]
-    values = [math.nan if value is None else value for value in table.closed_form_m] or np.full(shape, math.nan)
-    return np.ma.masked_invalid(np.reshape(values, shape))
-
-
 def bound_lines(across: Axis, up: Axis, values: Grid, required: AnyRequirement, log_values: bool) -> list[Floats]:
     """Return the lines on which interpolated values of a map, shape (columns, rows), equal the requirement's bound.
 
@@ -438,10 +397,9 @@ def _map_panel(figure: Figure, axes: Axes, table: SweepTable, noise: str, quanti
     across, up = table.axes
     values = table.grid(noise, quantile).T
     norm = _norm(values)
-    image = axes.pcolormesh(
-        _edges(across), _edges(up), values, cmap=_COLOURS, norm=norm, edgecolors="white", linewidth=0.3, zorder=1.0
-    )
-    bar = figure.colorbar(image, ax=axes, cax=_colour_axes(figure, axes))
+    image = axes.pcolormesh(_edges(across), _edges(up), values, cmap=_COLOURS, norm=norm, **_CELLS)
+    box, mm = axes.get_position(), 1.0 / (25.4 * figure.get_figwidth())
+    bar = figure.colorbar(image, ax=axes, cax=figure.add_axes((box.x1 + 2.0 * mm, box.y0, 3.0 * mm, box.height)))
     bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if isinstance(norm, LogNorm) else MaxNLocator(6))
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
     bar.ax.yaxis.set_minor_formatter(NullFormatter())
@@ -460,21 +418,15 @@ def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, is_dark: An
         return
     room_mm = width_mm(axes) / len(across.values)
     size = min(6.5, room_mm / _MM_PER_POINT / 2.6)
-    for row in range(len(up.values)):
-        for column, x in enumerate(across.values):
-            known = not np.ma.getmaskarray(values)[row, column]
-            value = float(values[row, column]) if known else 0.0
-            text = f"{value:.3g}" if value < 100.0 else f"{value:.0f}"
-            axes.text(
-                x,
-                heights[row, column],
-                text if known else _NO_VALUE,
-                ha="center",
-                va="center",
-                fontsize=size,
-                color="white" if known and is_dark(row, column) else INK,
-                zorder=6.0,
-            )
+    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": size, "zorder": 6.0}
+    for row, column in np.ndindex(values.shape):
+        known = not np.ma.getmaskarray(values)[row, column]
+        value = float(values[row, column]) if known else 0.0
+        text = f"{value:.3g}" if value < 100.0 else f"{value:.0f}"
+        colour = "white" if known and is_dark(row, column) else INK
+        axes.text(
+            across.values[column], float(heights[row, column]), text if known else _NO_VALUE, color=colour, **look
+        )
 
 
 def _heights(up: Axis, part: float) -> Floats:
@@ -491,14 +443,6 @@ def _norm(values: Grid) -> Normalize:
     if low > 0.0 and high > 10.0 * low:
         return LogNorm(low, high)
     return Normalize(low, high if high > low else low + 1.0)
-
-
-def _colour_axes(figure: Figure, axes: Axes) -> Axes:
-    """Return axes for the colour scale to the right of a heat map."""
-    box = axes.get_position()
-    width, _ = figure.get_size_inches()
-    gap, thick = 2.0 / (25.4 * width), 3.0 / (25.4 * width)
-    return figure.add_axes((box.x1 + gap, box.y0, thick, box.height))
 
 
 def _edges(axis: Axis) -> Floats:
@@ -564,7 +508,7 @@ def _power(axis: Axis) -> int:
 
 def _look(levels: Sequence[float], level: float) -> Any:
     """Return the line style of one of several quantiles."""
-    return _DASHES[min(levels.index(level), len(_DASHES) - 1)] or "-"
+    return _DASHES[min(levels.index(level), len(_DASHES) - 1)]
 
 
 def requirement_words(required: AnyRequirement) -> str:

@@ -79,9 +79,7 @@ class SweepReport:
                     "noise": noise,
                     "at": answer.at,
                     "met": answer.met,
-                    "limits": [
-                        {"value": limit.value, "lower": limit.lower, "upper": limit.upper} for limit in answer.limits
-                    ],
+                    "limits": [vars(limit) for limit in answer.limits],
                 }
                 for noise in table.noises
                 for answer in answers(table, noise)
@@ -122,7 +120,8 @@ class SweepReport:
         for noise in table.noises:
             verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
             counts = Counter(verdict.decision for verdict in verdicts if verdict is not None)
-            against = _against(noise, table.required)
+            is_bounded = table.required.quantity in ("miss_m", "hit")  # game noise is one adversary
+            against = " against this adversary" if noise == NoiseKind.GAME.value and is_bounded else ""
             words = {Decision.MET: f"met{against}"}
             decisions = ", ".join(f"{words.get(decision, decision)} in {counts[decision]}" for decision in Decision)
             yield f"{noise} noise: {table.required} is {decisions} of {len(verdicts)} cells"
@@ -189,23 +188,11 @@ def _digest(folder: CampaignFolder, cell: int) -> int:
     return zlib.crc32(b"".join(folder.numbers(name, cell).filled(-1.0).tobytes() for name in names))
 
 
-def _against(noise: str, required: AnyRequirement) -> str:
-    """Return what restricts the decision that a requirement is met: game noise is one adversary."""
-    is_bounded = required.quantity in ("miss_m", "hit")
-    return " against this adversary" if noise == NoiseKind.GAME.value and is_bounded else ""
-
-
 def _verdict_json(verdict: Verdict | None) -> dict[str, object] | None:
     if verdict is None:
         return None
-    return {
-        "decision": verdict.decision.value,
-        "value": verdict.value,
-        "lower": verdict.lower,
-        "upper": verdict.upper,
-        "known": verdict.known,
-        "runs_needed": verdict.runs_needed,
-    }
+    names = ("value", "lower", "upper", "known", "runs_needed")
+    return {"decision": verdict.decision.value, **{name: getattr(verdict, name) for name in names}}
 
 
 def _unknown_notes(verdicts: Sequence[Verdict | None], required: AnyRequirement) -> list[str]:
@@ -252,25 +239,17 @@ def _decision_tables(table: SweepTable, noise: str) -> Iterator[Part]:
         at = values_text(rest, indices)
         shown = number_table("", *(value_text(second, value) for value in second.values))
         for row, value in enumerate(first.values):
-            shown.add_row(
-                value_text(first, value), *(_entry(table.verdict(cell, noise)) for cell in grid[row].tolist())
-            )
+            verdicts = [table.verdict(cell, noise) for cell in grid[row].tolist()]
+            entries = ["-" if one is None else f"{one.decision}\n{number(one.value)}\n{one.runs}" for one in verdicts]
+            shown.add_row(value_text(first, value), *entries)
         title = f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}"
         units = {"rows": unit_of(first.key), "columns": unit_of(second.key)}
         unit_text = ", ".join(f"{name} in {unit}" for name, unit in units.items() if unit)
-        cell_text = f"lines of a cell: decision, {_estimate_name(table.required)} (- if too few runs), number of runs"
+        unit = QUANTITY_NAMES[table.required.quantity].partition(", ")[2]
+        estimate = f"{table.required.name} in {unit}" if unit else table.required.name
+        cell_text = f"lines of a cell: decision, {estimate} (- if too few runs), number of runs"
         yield f"{title}\n{unit_text}; {cell_text}" if unit_text else f"{title}\n{cell_text}"
         yield shown
-
-
-def _entry(verdict: Verdict | None) -> str:
-    return "-" if verdict is None else f"{verdict.decision}\n{number(verdict.value)}\n{verdict.runs}"
-
-
-def _estimate_name(required: AnyRequirement) -> str:
-    """Return the name of the required estimate with its unit."""
-    unit = QUANTITY_NAMES[required.quantity].partition(", ")[2]
-    return f"{required.name} in {unit}" if unit else required.name
 
 
 def quantile_options(

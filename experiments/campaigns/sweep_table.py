@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples, shown_value
 from experiments.campaigns.sweep_axes import sweep_cells, tied_keys, unit_of
-from experiments.interception.study import SetCounts
+from infoset.arrays import Floats
 from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement, Scenario
 from sim.closed_form import possible_miss_of
 from sim.requirement import AnyRequirement, Decision, Verdict, judge
@@ -72,20 +72,19 @@ class SweepTable:
         order = (Decision.NOT_MET, Decision.UNDECIDED, Decision.MET)
         return next(decision for decision in order if decision in decisions)
 
-    def sample(self, cell: int, noise: str) -> Sample | None:
-        """Return the sample of a cell and a noise; None without runs."""
-        return next((sample for sample in self.cells[cell] if sample.noise == noise), None)
+    def sample(self, cell: int, noise: str) -> Sample:
+        """Return the sample of a cell and a noise, which may have no runs."""
+        return next((sample for sample in self.cells[cell] if sample.noise == noise), Sample(noise))
 
     def estimate(self, cell: int, noise: str, quantile: QuantileName) -> QuantileEstimate | None:
         """Return a quantile of a cell; None if it is not known."""
-        sample = self.sample(cell, noise)
-        estimates = () if sample is None else sample.quantiles.get(quantile.quantity, ())
+        estimates = self.sample(cell, noise).quantiles.get(quantile.quantity, ())
         return next((estimate for estimate in estimates if estimate.level == quantile.level), None)
 
     def value(self, cell: int, noise: str, quantile: QuantileName) -> float | None:
         """Return a quantile of a cell; None if its runs do not show it."""
         sample, estimate = self.sample(cell, noise), self.estimate(cell, noise, quantile)
-        return None if sample is None or estimate is None else shown_value(sample, quantile.quantity, estimate)
+        return None if estimate is None else shown_value(sample, quantile.quantity, estimate)
 
     def grid(self, noise: str, quantile: QuantileName) -> np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]:
         """Return a quantile over the axes, masked where the runs do not show it."""
@@ -101,32 +100,28 @@ class SweepTable:
         for cell, values in enumerate(combinations):
             for noise in self.noises:
                 sample = self.sample(cell, noise)
+                verdict = self.verdict(cell, noise)
                 row: dict[str, Any] = {"cell": cell}
                 row |= {
                     key: value for axis, value in zip(self.axes, values, strict=True) for key in tied_keys(axis.key)
                 }
-                row |= {"noise": noise, "runs": 0 if sample is None else sample.runs}
-                for name in OUTCOMES:
-                    row[name.replace("-", "_")] = 0 if sample is None else sample.outcomes.get(name, 0)
-                sets = SetCounts() if sample is None else sample.sets
-                row |= {"truth_kept": sets.truth_kept, "set_emptied": sets.set_emptied}
-                verdict = self.verdict(cell, noise)
-                hits = None if sample is None else sample.hits
-                for name in ("hits", "probability", "lower", "upper"):
-                    row[name if name == "hits" else f"hit_{name}"] = None if hits is None else getattr(hits, name)
+                row |= {"noise": noise, "runs": sample.runs}
+                row |= {name.replace("-", "_"): sample.outcomes.get(name, 0) for name in OUTCOMES}
+                row |= {"truth_kept": sample.sets.truth_kept, "set_emptied": sample.sets.set_emptied}
+                row["hits"] = getattr(sample.hits, "hits", None)
+                row |= {f"hit_{name}": getattr(sample.hits, name, None) for name in ("probability", "lower", "upper")}
                 row["requirement"] = None if verdict is None else verdict.decision.value
                 for name in ("value", "lower", "upper", "known"):
-                    row[f"required_{name}"] = None if verdict is None else getattr(verdict, name)
+                    row[f"required_{name}"] = getattr(verdict, name, None)
                 for quantity, level in itertools.product(QUANTITIES, self.levels):
                     estimate = self.estimate(cell, noise, QuantileName(quantity, level))
                     name = f"{quantity}_{level_name(level)}"
                     row |= {
                         name: self.value(cell, noise, QuantileName(quantity, level)),
-                        f"{name}_lower": None if estimate is None else estimate.lower,
-                        f"{name}_upper": None if estimate is None else estimate.upper,
+                        f"{name}_lower": getattr(estimate, "lower", None),
+                        f"{name}_upper": getattr(estimate, "upper", None),
                     }
-                for quantity in QUANTITIES:
-                    row[f"{quantity}_max"] = None if sample is None else sample.worst.get(quantity)
+                row |= {f"{quantity}_max": sample.worst.get(quantity) for quantity in QUANTITIES}
                 rows.append(row)
         columns = {name: [row[name] for row in rows] for name in rows[0]}
         units = {key: unit_of(key) for axis in self.axes for key in tied_keys(axis.key)}
@@ -144,14 +139,13 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Seq
     cells = tuple(tuple(samples(folder, cell, levels)) for cell in numbers)
     read = partial(folder.sample, required.quantity, unknown=required.unknown)
     by_noise = [{noise: read(noise, cell) for noise in noises} for cell in numbers]
-    verdicts = tuple(
-        {
-            noise: _of_cell(judge(values, required, watched=folder.manifest.is_watched), len(noises))
-            for noise, values in samples.items()
-            if values.size
-        }
-        for samples in by_noise
-    )
+
+    def judged(values: Floats) -> Verdict:
+        """Return a verdict whose runs are those of all noises, like --runs and --most-runs."""
+        verdict = judge(values, required, watched=folder.manifest.is_watched)
+        return replace(verdict, runs_needed=verdict.runs_needed and len(noises) * verdict.runs_needed)
+
+    verdicts = tuple({noise: judged(values) for noise, values in one.items() if values.size} for one in by_noise)
     estimates = [[sample.hits for sample in samples if sample.hits is not None] for samples in cells]
     hits = tuple(min(group, key=lambda hits: hits.probability, default=None) for group in estimates)
     axes, body = folder.manifest.axes, folder.manifest.scenario.body
@@ -172,11 +166,6 @@ def _closed_forms(scenario: Scenario, axes: Sequence[Axis]) -> tuple[float | Non
         except ValueError:
             values.append(None)
     return tuple(values)
-
-
-def _of_cell(verdict: Verdict, noises: int) -> Verdict:
-    """Return a verdict whose `runs_needed` counts the runs of a cell with all noises, like --runs and --most-runs."""
-    return replace(verdict, runs_needed=None if verdict.runs_needed is None else noises * verdict.runs_needed)
 
 
 @dataclass(frozen=True)
