@@ -72,14 +72,12 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
         note(line)
     for warning in warnings[: MOST_WARNINGS if campaign.cells else None]:
         note(f"warning: {warning}")
-    with _workers(options, note) as workers:
+    with _workers(options, note) as (executor, workers, cores):
         if campaign.engagements >= ESTIMATED_FROM:
-            note(_estimate(campaign, workers.cores))
+            note(_estimate(campaign, cores))
         began_s = time.perf_counter()
         with campaign_progress(campaign.kind, options.quiet) as progress:
-            result = campaign.run(
-                workers.executor, workers=workers.count, resume=options.resume, progress=progress, beside=files
-            )
+            result = campaign.run(executor, workers=workers, resume=options.resume, progress=progress, beside=files)
     for damage in result.redone:
         note(f"{damage.file}: {damage.reason}; its runs were simulated again")
     return Flown(result, warnings, time.perf_counter() - began_s)
@@ -115,27 +113,14 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
         raise InputError(f"--dask: the cluster failed: {str(error)[:300]}{resume_hint}") from None
 
 
-@dataclass(frozen=True)
-class _Workers:
-    """Workers that simulate engagements.
-
-    Threads of this process are no executor; `count` is then their number, otherwise the number of chunks that the
-    executor gets at a time. `cores` engagements are simulated at the same time.
-    """
-
-    executor: Executor | None
-    count: int | None
-    cores: int
-
-
 @contextlib.contextmanager
-def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]:
-    """Start the workers of the options: threads or processes on this machine, or a cluster."""
+def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[tuple[Executor | None, int | None, int]]:
+    """Start threads, processes or a cluster: executor or None, its chunks at a time or threads, and cores."""
     if sum(option is not None for option in (options.dask, options.workers, options.processes)) > 1:
         raise InputError("--workers, --processes and --dask (a cluster) cannot be combined; give only one of them")
     if options.processes is not None:
         with worker_processes(options.processes) as pool:
-            yield _Workers(pool, 2 * options.processes, options.processes)
+            yield pool, 2 * options.processes, options.processes
     elif options.dask is not None:
         if is_open(options.dask):
             note(
@@ -145,9 +130,9 @@ def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]
         with connected(options.dask) as cluster:
             note(f"{cluster.workers} Dask workers, {cluster.threads} threads")
             # With two chunks per thread all threads have work while results are sent, and workers can join later.
-            yield _Workers(cluster.executor, max(2 * cluster.threads, 16), cluster.threads)
+            yield cluster.executor, max(2 * cluster.threads, 16), cluster.threads
     else:
-        yield _Workers(None, options.workers, options.workers or os.cpu_count() or 1)
+        yield None, options.workers, options.workers or os.cpu_count() or 1
 
 
 def _estimate(campaign: Campaign, cores: int) -> str:

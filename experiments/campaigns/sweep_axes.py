@@ -17,7 +17,7 @@ from typing import Any, Literal
 from experiments.common.display_units import split_unit
 from experiments.common.errors import InputError, shown
 from experiments.common.toml_form import ENDS, similar_key
-from experiments.common.toml_values import LARGEST, SMALLEST, number_text
+from experiments.common.toml_values import NUMBER, number_text
 from experiments.interception.scenario_checks import LINEAR_KEYS
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from experiments.interception.scenario_tables import LATER_KEYS, OPTIONAL_SENSORS, SPACE_KEYS
@@ -30,9 +30,6 @@ EXAMPLE = "--vary angle_sensor.scale=1:8:8,thruster.greatest_impulse_m_s=2.5:20:
 
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
-
-_OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target", "body")
-
 
 _LATER_NUMBERS = sorted(LATER_KEYS - {("angle_sensor", "bias"), ("thruster", "impulses_s")})
 _WHOLE = (("thruster", "delay_steps"),)
@@ -156,7 +153,10 @@ def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
         raise InputError(f"--vary: {key} must be greater than 0, found {shown(written)}")
     if scale == "log" and first <= 0:
         raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
-    count = _count(parts[2], key)
+    if not re.fullmatch(r"[0-9]{1,9}", parts[2]) or not 2 <= int(parts[2]) <= MOST_VALUES:
+        problem = f"the count must be a whole number from 2 to {MOST_VALUES}, found {shown(parts[2])}"
+        raise InputError(f"--vary: {key}: {problem}")
+    count = int(parts[2])
     values = _spaced(first, last, count, scale, whole=whole)
     if len(set(values)) < count:
         raise InputError(
@@ -169,7 +169,8 @@ def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
 def _unknown(key: str, known: Mapping[str, bool]) -> str:
     names = list(known)
     table = key.partition(".")[0]
-    if table in _OPTIONAL and table not in {other.partition(".")[0] for other in known}:
+    is_missing = table not in {other.partition(".")[0] for other in known}
+    if is_missing and table in ("sun", *OPTIONAL_SENSORS, "target", "body"):
         return f"the scenario has no [{table}]; add that table to its file, or vary another key"
     if f"{key}.least" in known:
         return f"{key} is a pair; vary {key}.least or {key}.greatest"
@@ -187,17 +188,9 @@ def _number(text: str, key: str) -> Decimal:
         value = None
     if value is None:
         raise InputError(f"--vary: {key}: must be a number, found {shown(text)}; for example {EXAMPLE}")
-    if value.copy_abs() > LARGEST:
-        raise InputError(f"--vary: {key}: must be at most {LARGEST:g} in size, found {shown(text)}")
-    if 0 < value.copy_abs() < SMALLEST:
-        raise InputError(f"--vary: {key}: must be 0 or at least {SMALLEST:g} in size, found {shown(text)}")
+    if problem := NUMBER.problem(value):
+        raise InputError(f"--vary: {key}: {problem}, found {shown(text)}")
     return value
-
-
-def _count(text: str, key: str) -> int:
-    if re.fullmatch(r"[0-9]{1,9}", text) and 2 <= int(text) <= MOST_VALUES:
-        return int(text)
-    raise InputError(f"--vary: {key}: the count must be a whole number from 2 to {MOST_VALUES}, found {shown(text)}")
 
 
 def _spaced(first: Decimal, last: Decimal, count: int, scale: str, *, whole: bool) -> tuple[float, ...]:

@@ -26,7 +26,7 @@ from experiments.interception.course import (
 from infoset import Convention, InformationSet, Section
 from infoset.arrays import Floats, Integers
 from infoset.sensors import SENSORS
-from sim import Record, Scenario, StepRecord
+from sim import Record, Scenario
 from sim.gravity import on_board_model
 
 MOST_RECORDS = 2
@@ -40,28 +40,16 @@ STEPS_OF_A_BOX = 65535
 
 def interception_page(records: Sequence[Record]) -> str:
     """Return the replay page of one engagement, or of two side by side, as HTML."""
-    names = list(dict.fromkeys(record.scenario.name for record in records))
-    clock = Clock.of(records)
-    titles = record_titles(records)
-    return page(
-        f"Replay of {' and '.join(names)}",
-        [
-            "sets.js",
-            *(["b-plane.js", "projection.js"] if any(record.scenario.is_spatial for record in records) else []),
-            "interception.js",
-        ],
-        {
-            "heading": f"Replay of {' and '.join(names)}",
-            "about": list(
-                dict.fromkeys(record.scenario.description for record in records if record.scenario.description)
-            ),
-            "counts_down": clock.counts_down,
-            "records": [
-                _data(record, title, kept)
-                for record, title, kept in zip(records, titles, _kept_steps_of(records), strict=True)
-            ],
-        },
-    )
+    heading = f"Replay of {' and '.join(dict.fromkeys(record.scenario.name for record in records))}"
+    in_space = any(record.scenario.is_spatial for record in records)
+    data = {
+        "heading": heading,
+        "about": list(filter(None, dict.fromkeys(record.scenario.description for record in records))),
+        "counts_down": Clock.of(records).counts_down,
+        "records": list(map(_data, records, record_titles(records), _kept_steps_of(records))),
+    }
+    scripts = ["sets.js", *(["b-plane.js", "projection.js"] if in_space else []), "interception.js"]
+    return page(heading, scripts, data)
 
 
 def _kept_steps_of(records: Sequence[Record]) -> list[list[int]]:
@@ -107,7 +95,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "measured_range_m": [step.measured.get("range") for step in steps],
         "complete_steps": int(np.searchsorted(kept, possible_misses(record)[0].max(initial=-1), side="right")),
         "true_range_m": [step.true_range_m for step in steps],
-        "next_range_m": [step.true_range_m for step in _next(record, kept)],
+        "next_range_m": [record.steps[index].true_range_m for index in _next(record, kept)],
         "modulus_m_s": moduli[kept].tolist(),
         "fired_s": [record.steps[index].time_s for index in fired],
         "fired_modulus_m_s": moduli[fired].tolist(),
@@ -144,18 +132,17 @@ def _measured_name(scenario: Scenario, axis: str) -> str:
     return f"measured angle along {axis}" if scenario.is_spatial else "measured angle"
 
 
-def _next(record: Record, kept: Sequence[int]) -> list[StepRecord]:
+def _next(record: Record, kept: Sequence[int]) -> list[int]:
     """Return the steps after some steps; the last step follows itself."""
-    return [record.steps[min(index + 1, len(record.steps) - 1)] for index in kept]
+    return [min(index + 1, len(record.steps) - 1) for index in kept]
 
 
 def _axis_data(record: Record, axis: str, kept: Sequence[int]) -> dict[str, object]:
     """Return what belongs to one lateral axis: the line of sight in its plane with x, impulses and predicted misses."""
     steps = [record.steps[index].axes[axis] for index in kept]
-    after = [step.axes[axis] for step in _next(record, kept)]
+    after = [record.steps[index].axes[axis] for index in _next(record, kept)]
     model = on_board_model(record.scenario).axis(axis)
     misses = true_predicted_misses(record)[axis]
-    next_misses = misses[np.minimum(np.array(kept) + 1, len(misses) - 1)]
     return {
         "axis": axis,
         "angle_error_rad": model.angle_sensor.error_at_zero_range_rad,
@@ -172,7 +159,7 @@ def _axis_data(record: Record, axis: str, kept: Sequence[int]) -> dict[str, obje
         "true_predicted_miss_m": misses[kept].tolist(),
         "next_angle_rad": [step.true_angle_rad for step in after],
         "next_rate_rad_s": [step.true_rate_rad_s for step in after],
-        "next_predicted_miss_m": next_misses.tolist(),
+        "next_predicted_miss_m": misses[_next(record, kept)].tolist(),
         "predicted_miss_m": [step.predicted_miss_m for step in steps],
         "impulse_m_s": [step.impulse_m_s for step in steps],
     }

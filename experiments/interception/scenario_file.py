@@ -258,7 +258,9 @@ def scenario_to_toml(scenario: Scenario) -> str:
             lines += [
                 f"{key} = {value_text(key, value)}"
                 for key, value in written.items()
-                if value is not None and _is_written(table, key, value, is_spatial=scenario.is_spatial)
+                if value is not None
+                and (scenario.is_spatial or (table, key) not in SPACE_KEYS)
+                and ((table, key) not in LATER_KEYS or value != keys_of(ScenarioTables, (table,))[key].default)
             ]
     return "\n".join(lines) + "\n"
 
@@ -267,13 +269,6 @@ def _error_keys(sensor: AngleSensor) -> dict[str, object]:
     """Return the keys of the error law of an angle sensor; those of the other law are None."""
     line = dict.fromkeys(("error_at_nominal_range_rad", "error_at_zero_range_rad"))
     return {"pixel_error_rad": sensor.pixel_error_rad, **line} if sensor.is_camera else {"pixel_error_rad": None}
-
-
-def _is_written(table: str, key: str, value: object, *, is_spatial: bool) -> bool:
-    """Whether a written file has a key."""
-    if (table, key) in LATER_KEYS:
-        return bool(value != keys_of(ScenarioTables, (table,))[key].default)
-    return is_spatial or (table, key) not in SPACE_KEYS
 
 
 def _values(part: object | None) -> dict[str, object] | None:

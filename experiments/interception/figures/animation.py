@@ -15,10 +15,10 @@ from PIL import Image, ImageSequence
 
 from experiments.common.errors import InputError
 from experiments.common.figure_style import INK, new_figure, place_axes, plain, style
-from experiments.interception.course import Clock, angle_name, evenly, record_titles
+from experiments.interception.course import Clock, evenly, record_titles
 from experiments.interception.figures.approach import count_down
 from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
-from experiments.interception.figures.sets import Plane, angle_unit, draw_plane, level_planes, planes_at
+from experiments.interception.figures.sets import Plane, draw_plane, label_plane, level_planes, planes_at
 from infoset.arrays import Floats
 from sim import Record
 
@@ -119,16 +119,6 @@ def _draw_planes(row: Sequence[Axes], planes: Sequence[Plane], clock: Clock) -> 
     level_planes(row, planes)
     for axes, plane in zip(row, planes, strict=True):
         draw_plane(axes, plane)
-        in_space = plane.record.scenario.is_spatial
-        along = f" along {plane.axis}" if in_space else ""
-        title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
         time_s = plane.step.time_s
         time = clock.text(plane.record, time_s) if clock.counts_down else f"t = {time_s:.1f} s"
-        axes.set_title(f"{title}, {time}")
-        axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s")
-        axes.set_ylabel(
-            f"{angle_name(plane.record.scenario, plane.axis)}{along}, {angle_unit(axes)}"
-            if in_space or axes is row[0]
-            else ""
-        )
-        axes.tick_params(labelleft=in_space or axes is row[0])
+        label_plane(axes, plane, "", time, axes is row[0])

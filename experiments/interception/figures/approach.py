@@ -53,6 +53,7 @@ _TICK_LETTER_MM, _TICK_GAP_MM = 1.4, 1.5
 MARK_LOOK: dict[str, Any] = {"color": LIMIT, "linewidth": 0.8, "linestyle": (0, (1.5, 1.5))}
 _CENTRED_LOOK: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
 _TRUE_LOOK: dict[str, Any] = {"color": INK, "linewidth": 0.9}
+_END_LOOK: dict[str, Any] = {"color": INK, "marker": "x", "markersize": 6.0, "mew": 1.4, "linestyle": "none"}
 _LOGARITHMIC_FROM = 10.0
 """Ratio of the greatest and the least impulse above which their axis is logarithmic."""
 _LEAST_SHOWN = 1e-3
@@ -92,11 +93,7 @@ def draw_approach(records: Sequence[Record]) -> Figure:
             below = place(left, foot, WIDTH_MM - _RIGHT_MM - left, _IMPULSES_MM)
             _draw_possible(above, record)
             _draw_moduli(below, record)
-            for axes in (above, below):
-                count_down(axes, record.scenario)
-            name_marks(above, record.scenario)
-            above.tick_params(labelbottom=False)
-            above.xaxis.label.set_visible(False)
+            count_down_pair(above, below, record.scenario)
             if record.scenario.is_spatial:
                 _draw_b_plane(place(_LEFT_MM, foot, _SIDE_MM, _SIDE_MM), record)
         figure.legend(handles=_handles(records), loc="lower center", ncols=3, columnspacing=2.0)
@@ -121,6 +118,15 @@ def count_down(axes: Axes, scenario: Scenario) -> None:
     axes.set_xlabel(f"time before {'the nominal ' if width_mm(axes) > _NARROW_MM else ''}arrival")
     for time in marks(scenario).values():
         axes.axvline(time, zorder=1.5, **MARK_LOOK)
+
+
+def count_down_pair(above: Axes, below: Axes, scenario: Scenario) -> None:
+    """Give two axes the time axis of `count_down`, labelled below, with the names of its times above."""
+    for axes in (above, below):
+        count_down(axes, scenario)
+    name_marks(above, scenario)
+    above.tick_params(labelbottom=False)
+    above.xaxis.label.set_visible(False)
 
 
 def name_marks(axes: Axes, scenario: Scenario) -> None:
@@ -209,23 +215,14 @@ def _draw_b_plane(axes: Axes, record: Record) -> None:
     half = 1.15 * max(sizes) or 1.0
     draw_discs(axes, half, levels.get("radius"), levels.get("guarantee"))
     for y, z in boxes:
-        axes.add_patch(
-            Rectangle(
-                (y[0], z[0]),
-                y[1] - y[0],
-                z[1] - z[0],
-                facecolor=SET_FILL,
-                edgecolor=SET_EDGE,
-                zorder=2.0,
-                label="_last",
-            )
-        )
+        look: dict[str, Any] = {"facecolor": SET_FILL, "edgecolor": SET_EDGE, "zorder": 2.0, "label": "_last"}
+        axes.add_patch(Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], **look))
     axes.plot(*true.T, zorder=3.0, label="_path", **_TRUE_LOOK)
     fired = [index for index, step in enumerate(record.steps[:-1]) if step.impulse_m_s != 0.0]
     axes.plot(
         *true[[index + 1 for index in fired]].T, ".", color=IMPULSE, markersize=5.0, markeredgewidth=0.0, zorder=3.5
     )
-    axes.plot(*end, marker="x", color=INK, markersize=6.0, markeredgewidth=1.4, linestyle="none", zorder=4.0)
+    axes.plot(*end, zorder=4.0, **_END_LOOK)
     axes.plot(0.0, 0.0, marker="+", color=INK, markersize=7.0, markeredgewidth=1.1, linestyle="none", zorder=4.0)
     axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal", xlabel="miss along y, m", ylabel="miss along z, m")
     for one in (axes.xaxis, axes.yaxis):
@@ -245,14 +242,7 @@ def _handles(records: Sequence[Record]) -> list[Line2D | Patch]:
         Line2D([], [], color=IMPULSE, marker=".", linewidth=0.9, label="impulse"),
     ]
     if is_spatial:
-        mark: dict[str, Any] = {
-            "color": INK,
-            "marker": "x",
-            "linestyle": "none",
-            "markersize": 6.0,
-            "markeredgewidth": 1.4,
-        }
-        handles.append(Line2D([], [], label="closest approach", **mark))
+        handles.append(Line2D([], [], label="closest approach", **_END_LOOK))
     if "guarantee" in levels:
         handles.append(Line2D([], [], label="guaranteed miss Φ of the run", **GUARANTEE_LOOK))
     if "radius" in levels:

@@ -187,11 +187,8 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
         if shows(count, level) and (drawn := ellipse(each.across_m, level)) is not None:
             centre, (width, height), angle_rad = drawn
             look = {"edgecolor": TRUTH, "linestyle": dashes, "linewidth": 1.2, "fill": False, "path_effects": halo}
-            shape = Ellipse(
-                (centre[0], centre[1]), 2 * width, 2 * height, angle=np.degrees(angle_rad), zorder=3.0, **look
-            )
-            shape.set_label(f"_ellipse {level:g}")
-            axes.add_patch(shape)
+            look |= {"angle": np.degrees(angle_rad), "label": f"_ellipse {level:g}", "zorder": 3.0}
+            axes.add_patch(Ellipse((centre[0], centre[1]), 2 * width, 2 * height, **look))
     draw_discs(axes, half, radius_m, each.guaranteed_m)
     axes.plot(0.0, 0.0, marker="+", color=INK, markersize=7.0, markeredgewidth=1.1, linestyle="none", zorder=4.0)
     beyond = int((np.abs(each.across_m) > half).any(axis=1).sum())
@@ -215,13 +212,10 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
 def draw_discs(axes: Axes, half: float, radius_m: float | None, guaranteed_m: float | None) -> None:
     """Draw the disc of the body and the circle of the guaranteed miss, if they are known and within the axes."""
     if radius_m is not None and radius_m <= half:
-        look = {"edgecolor": RADIUS_LOOK["color"], **{key: RADIUS_LOOK[key] for key in ("linestyle", "linewidth")}}
         axes.add_patch(Circle((0.0, 0.0), radius_m, facecolor=BODY_FILL, edgecolor="none", zorder=0.5))
-        axes.add_patch(Circle((0.0, 0.0), radius_m, fill=False, zorder=3.2, label="_radius", **look))
+        axes.add_patch(Circle((0.0, 0.0), radius_m, fill=False, zorder=3.2, label="_radius", **RADIUS_LOOK))
     if guaranteed_m is not None and guaranteed_m <= half:
-        look = {**GUARANTEE_LOOK, "edgecolor": GUARANTEE_LOOK["color"]}
-        del look["color"]
-        axes.add_patch(Circle((0.0, 0.0), guaranteed_m, fill=False, zorder=3.1, label="_guarantee", **look))
+        axes.add_patch(Circle((0.0, 0.0), guaranteed_m, fill=False, zorder=3.1, label="_guarantee", **GUARANTEE_LOOK))
 
 
 def disc_handles(radius_m: float | None, guaranteed: Sequence[bool], half: float, of: str) -> list[Line2D | Patch]:

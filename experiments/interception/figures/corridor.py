@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from experiments.common.figure_style import IMPULSE, SET_EDGE, SET_FILL, TRUTH, new_figure, place_axes, style
 from experiments.interception.course import Courses, marks
 from experiments.interception.curves import Curve
-from experiments.interception.figures.approach import MARK_LOOK, count_down, name_marks
+from experiments.interception.figures.approach import MARK_LOOK, count_down_pair
 from experiments.interception.figures.b_plane import GUARANTEE_LOOK
 from experiments.interception.figures.distributions import RADIUS_LOOK
 from sim.statistics import shows
@@ -57,11 +57,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
             _draw_impulses(below, course)
             meter = f", {'' if curve.range_meter else 'no '}range meter" if len(curves) > 2 else ""
             axes.set_title(f"({letter}) {curve.noise.value} noise{meter}, {len(course.possible_m)} runs")
-            for one in (axes, below):
-                count_down(one, course.scenario)
-            name_marks(axes, course.scenario)
-            axes.tick_params(labelbottom=False)
-            axes.xaxis.label.set_visible(False)
+            count_down_pair(axes, below, course.scenario)
             axes.set_ylabel("possible miss, m")
             below.set_ylabel("impulse, m/s")
             pairs.append((axes, below))

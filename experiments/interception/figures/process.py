@@ -299,7 +299,8 @@ def _note_exit(axes: Axes, values: Floats, trace: Trace, scale: float, unit: str
     if abs(value) >= 1e3:
         value, unit = 1e-3 * value, unit.removeprefix("m")
     space = " " if width_mm(axes) > _NARROW_MM else "\n"
-    text = f"reaches {_signed(value)} {unit}{space}at {trace[0].steps[worst].time_s:g} s"
+    number = f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+    text = f"reaches {number} {unit}{space}at {trace[0].steps[worst].time_s:g} s"
     # The four corners of the part before the curve leaves the axes: the one with the fewest values.
     across = np.interp([step.time_s for step in trace[0].steps], axes.get_xlim(), (0.0, 1.0))
     up = (values - low) / (high - low)
@@ -409,7 +410,3 @@ def _extent(trace: Trace, sensor: str, field: str, range_share: float) -> tuple[
 
 def _marker(record: Record) -> str:
     return "o" if len(record.steps) == 1 else ""
-
-
-def _signed(value: float) -> str:
-    return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")

@@ -74,13 +74,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             for axes, plane in zip(row, planes, strict=True):
                 _shade_allowed(axes, plane)
                 draw_plane(axes, plane)
-                title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
-                axes.set_title(f"{next(letters)}{title}, {clock.text(plane.record, plane.step.time_s)}")
-                along = f" along {plane.axis}" if in_space else ""
-                axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s", labelpad=2.0)
-                axes.set_ylabel(f"{angle_name(plane.record.scenario, plane.axis)}{along}, {angle_unit(axes)}")
-                axes.yaxis.label.set_visible(in_space or axes is row[0])
-                axes.tick_params(labelleft=in_space or axes is row[0])
+                label_plane(axes, plane, next(letters), clock.text(plane.record, plane.step.time_s), axes is row[0])
         measured = any("angle" in plane.along.measured for planes in rows for plane in planes)
         handles: list[Line2D | Patch] = [
             Line2D([], [], label=TRUTH_MARK, **_TRUTH_LOOK),
@@ -189,6 +183,18 @@ def draw_plane(axes: Axes, plane: Plane) -> None:
     axes.plot(rate, along.true_angle_rad * 1e3, zorder=6, label=TRUTH_MARK, path_effects=halo, **_TRUTH_LOOK)
     if not outlines:
         axes.text(0.5, 0.94, "no section is left", transform=axes.transAxes, ha="center", va="top")
+
+
+def label_plane(axes: Axes, plane: Plane, letter: str, time: str, is_first: bool) -> None:
+    """Write title and labels; in a plane, only the first axes of a row have labels on the left."""
+    in_space = plane.record.scenario.is_spatial
+    along = f" along {plane.axis}" if in_space else ""
+    title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
+    axes.set_title(f"{letter}{title}, {time}")
+    axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s", labelpad=2.0)
+    axes.set_ylabel(f"{angle_name(plane.record.scenario, plane.axis)}{along}, {angle_unit(axes)}")
+    axes.yaxis.label.set_visible(in_space or is_first)
+    axes.tick_params(labelleft=in_space or is_first)
 
 
 def _shade_allowed(axes: Axes, plane: Plane) -> None:

@@ -23,7 +23,7 @@ from experiments.interception.scenario_file import scenario_hash, scenario_to_to
 from guidance import NoiseKind
 from infoset import AngleSensor, Convention
 from infoset.sensors import SENSORS
-from sim import AxisStep, Inconsistency, Record, StepRecord, fly_one
+from sim import AxisStep, Record, StepRecord, fly_one
 
 
 def run(options: Engage) -> None:
@@ -72,7 +72,8 @@ def run(options: Engage) -> None:
 
 
 def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
-    scenario, contradiction = record.scenario, record.inconsistency
+    scenario, first = record.scenario, record.inconsistency
+    contradiction = first and {"step": first.step, "time_s": record.steps[first.step].time_s, "label_m": first.label_m}
     return {
         "seed": record.seed,
         "run": record.run,
@@ -83,7 +84,7 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
         "range_meter": scenario.range_sensor is not None,
         **{name: values[0] for name, values in outcome_columns(record.result).items()},
         "hit": record.result.hit.tolist()[0],
-        "inconsistency": None if contradiction is None else _where(record, contradiction),
+        "inconsistency": contradiction,
         "steps": [
             {
                 "time_s": step.time_s,
@@ -96,12 +97,6 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
             for step in record.steps
         ],
     }
-
-
-def _where(record: Record, contradiction: Inconsistency) -> dict[str, object]:
-    """Return the step and the label at which the measurements contradicted the model."""
-    step = contradiction.step
-    return {"step": step, "time_s": record.steps[step].time_s, "label_m": contradiction.label_m}
 
 
 def steps_csv(records: Sequence[Record]) -> str:
