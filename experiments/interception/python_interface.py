@@ -45,9 +45,19 @@ lower_bound = _by_name(sim.lower_bound)
 
 
 def save(results: Results | Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write results as ``.csv`` or ``.json``, or the record of one engagement as ``.npz`` for `load_record`.
+    """Write results as CSV or JSON, or the record of one engagement as ``.npz``.
 
-    Raise `InputError` if the suffix is none of these, or the file exists or cannot be written.
+    Parameters
+    ----------
+    results : Results or Record
+        `load_record` reads a record again.
+    path : str or path
+        Its suffix selects the format: ``.csv`` or ``.json`` for results, ``.npz`` for a record.
+
+    Raises
+    ------
+    InputError
+        If the suffix is none of these, or the file exists or cannot be written.
     """
     file = Path(path)
     if isinstance(results, Record):
@@ -66,8 +76,11 @@ def save(results: Results | Record, path: str | os.PathLike[str], *, overwrite: 
 def plot(results: Results | Record | Sequence[Record]) -> Figure:
     """Draw results, or the course of up to two engagements.
 
-    Results give the distributions of miss and impulse, each with its 95 % confidence band. Records give angle, rate,
-    predicted miss and impulses over time (`draw_process`).
+    Parameters
+    ----------
+    results : Results, Record or sequence of Record
+        Results give the distributions of miss and impulse, each with its 95 % confidence band. Records give angle,
+        rate, predicted miss and impulses over time (`draw_process`).
     """
     if not isinstance(results, Results):
         return draw_process([results] if isinstance(results, Record) else results)

@@ -62,8 +62,6 @@ def scenario_text(name: str) -> str:
 def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Scenario:
     """Read a built-in scenario or a scenario file, each number rounded once after the change to SI units.
 
-    Raise `InputError` if there is no such scenario or file, or it is not valid; the message lists all its problems.
-
     Parameters
     ----------
     name_or_path : str or path
@@ -71,6 +69,11 @@ def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] 
         path separator or ends in ``.toml``.
     settings : sequence of str or None, optional
         KEY=VALUE: values in place of those of the file, for example ``["thruster.greatest_impulse_m_s=5"]``.
+
+    Raises
+    ------
+    InputError
+        If there is no such scenario or file, or the file is not a valid scenario; the message lists all its problems.
     """
     return _to_scenario(load_tables(FORM, name_or_path, settings), str(name_or_path))
 

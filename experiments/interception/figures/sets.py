@@ -42,8 +42,14 @@ _LABEL_MM, _LABEL_ROOM_MM = 14.0, 19.0
 def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0), sections: int = 5) -> Figure:
     """Draw sections of the sets after the measurement: one row per time, one column per record and lateral axis.
 
-    The planes of a row have the same limits for each lateral axis. The step nearest to each time, s, is shown, with at
-    most so many sections, evenly chosen over the range, the first and the last included.
+    The planes of a row have the same limits for each lateral axis.
+
+    Parameters
+    ----------
+    times_s : sequence of float
+        The nearest step is shown, and the title says which it is.
+    sections : int
+        Most sections to show, evenly chosen over the range, the first and the last included.
     """
     if not records or not times_s:
         raise ValueError("at least one record and one time are needed")
