@@ -19,10 +19,11 @@ from experiments.common.errors import on_a_screen
 from experiments.interception import record_file
 from experiments.interception.page import interception_page
 from experiments.interception.record_file import load_record, write_record
-from experiments.interception.scenario_file import load_scenario, scenario_text
+from experiments.interception.scenario_file import load_scenario
 from infoset import StateBox
 from sim import Campaign, Record, fly_one
 from sim.storage.manifest import checksum
+from tests.built_in import scenario_text
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 PACKAGES = {

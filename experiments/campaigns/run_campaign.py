@@ -27,6 +27,10 @@ def run(options: Options) -> None:
     ):
         need_arrow()
         scenario, model_notes = scenario_of(options)
+        try:
+            rule = None if options.until is None else StoppingRule.parse(options.until)
+        except ValueError as error:
+            raise InputError(f"--until: {error}") from None
         campaign = Campaign(
             scenario,
             options.runs,
@@ -36,7 +40,7 @@ def run(options: Options) -> None:
             strategy=own_strategy(options.strategy, scenario),
             guarantee=options.guarantee,
             chunk=options.chunk,
-            until=_rule(options.until),
+            until=rule,
         )
         flown = fly(campaign, options, model_notes)
         stored = flown.result.folder
@@ -55,13 +59,6 @@ def run(options: Options) -> None:
         written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]
         written.deliver("--json", summary)
     show(_parts(flown, table, notes), options.quiet, stdout_taken=written.stdout_taken)
-
-
-def _rule(text: str | None) -> StoppingRule | None:
-    try:
-        return None if text is None else StoppingRule.parse(text)
-    except ValueError as error:
-        raise InputError(f"--until: {error}") from None
 
 
 def _parts(flown: Flown, table: Table, notes: Sequence[str]) -> Iterator[Part]:

@@ -30,8 +30,8 @@ from experiments.campaigns.samples import (
     stop_notes,
     worst_runs,
 )
-from experiments.campaigns.sweep_report import default_requirement, figure_names, quantile_options, sweep_report
-from experiments.campaigns.sweep_table import TABLE
+from experiments.campaigns.sweep_report import SweepReport, default_requirement, figure_names, quantile_options
+from experiments.campaigns.sweep_table import TABLE, sweep_table
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output_of, to_json
@@ -102,7 +102,7 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begi
             "infoset sweep --guarantee, or give a bound of miss_m"
         )
     progress = begin("report")
-    report = sweep_report(folder, required, shown)
+    report = SweepReport(folder, sweep_table(folder, required, shown), shown)
     progress(0.5)
     written.save("report.json", to_json(report.to_json()), "--json")
     if options.out is not None:

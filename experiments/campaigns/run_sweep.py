@@ -9,7 +9,8 @@ import typer
 from experiments.campaigns.command import Sweep as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, scenario_of
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_report import default_requirement, quantile_options, sweep_report
+from experiments.campaigns.sweep_report import SweepReport, default_requirement, quantile_options
+from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import say, show
@@ -60,7 +61,7 @@ def run(options: Options) -> None:
         if not options.yes:
             _ask(swept)
         flown = fly(swept, options, notes)
-        report = sweep_report(flown.result.folder, required, shown)
+        report = SweepReport(flown.result.folder, sweep_table(flown.result.folder, required, shown), shown)
         summary = to_json(report.to_json(flown.elapsed_s))
         folder = Output(options.out, {}, overwrite=True)
         report.save(folder)

@@ -19,7 +19,6 @@ from experiments.campaigns.sweep_table import (
     TABLE,
     SweepTable,
     answers,
-    sweep_table,
     value_text,
     values_text,
 )
@@ -274,8 +273,3 @@ def quantile_options(
 def default_requirement(*, has_size: bool) -> str:
     """Return the requirement of a sweep without --require: a hit, if the body has a size."""
     return "hit>=0.95" if has_size else "miss_m p99<10"
-
-
-def sweep_report(folder: CampaignFolder, required: AnyRequirement, shown: tuple[QuantileName, ...]) -> SweepReport:
-    """Summarise a sweep, finished or not."""
-    return SweepReport(folder, sweep_table(folder, required, shown), shown)

@@ -151,9 +151,7 @@ def separate_labels(axes: Axes, gap_points: float = 2.0) -> None:
 
     If labels of a logarithmic axis touch, those at powers of ten are kept first.
     """
-    figure = axes.get_figure(root=True)
-    if figure is None:
-        raise ValueError("these axes are in no figure")
+    figure: Any = axes.figure
     gap = gap_points * figure.dpi / 72.0
     shown = []
     for one, end in ((axes.xaxis, 0), (axes.yaxis, 1)):
@@ -236,22 +234,16 @@ def plain(text: str) -> str:
 
 def width_mm(axes: Axes) -> float:
     """Return the width of placed axes, mm."""
-    figure = axes.get_figure(root=True)
-    if figure is None:
-        raise ValueError("these axes are in no figure")
+    figure: Any = axes.figure
     return float(axes.get_position().width * figure.get_figwidth() * _MM_PER_INCH)
 
 
 def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
     """Return a figure as PDF and as PNG of 200 dpi, each with its file ending; the same figure gives the same bytes."""
-    options: list[tuple[str, dict[str, Any]]] = [
-        ("pdf", {"metadata": {"CreationDate": None}}),
-        ("png", {"metadata": {"Software": None}, "dpi": PNG_DPI}),
-    ]
     files = []
-    for kind, option in options:
+    for kind, undated in (("pdf", "CreationDate"), ("png", "Software")):
         content = io.BytesIO()
         with style():
-            figure.savefig(content, format=kind, **option)
+            figure.savefig(content, format=kind, metadata={undated: None}, dpi=PNG_DPI if kind == "png" else "figure")
         files.append((kind, content.getvalue()))
     return files

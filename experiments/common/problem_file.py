@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import Enum
@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel
 
 from experiments.common.errors import InputError
-from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in
 from experiments.common.output import library_version
-from experiments.common.toml_form import Form, KeyPath, Known, Problem, Tables, no_checks
+from experiments.common.toml_form import Form, KeyPath, Known, Problem, Tables
 from experiments.common.toml_values import Constant, Description, Name, Table, key, quoted_text
 
 MOST_RADIANS = Decimal(1000)
@@ -70,15 +69,10 @@ class ReadProblem(Generic[OfProblem]):
             raise InputError(f"{self.source}: the numbers are so large that results are not finite; check the units")
 
 
-def problem_text(name: str) -> str:
-    """Return the file of a built-in problem, with its comments; `InputError` if there is no such problem."""
-    return built_in(name, PROBLEM_COMMANDS, "no built-in problem").text
-
-
 def problem_form(
     kind: str,
     tables: type[Tables],
-    checks: Callable[[Known], Iterator[Problem]] = no_checks,
+    checks: Callable[[Known], Iterable[Problem]] = lambda _: (),
     written: Sequence[str] = (),
 ) -> Form[Tables]:
     """Return the form of the problem files of a kind; the parameters are those of `Form`."""

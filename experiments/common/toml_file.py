@@ -78,7 +78,7 @@ def _text_of(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> tuple[
     marks = [mark for mark in (os.sep, os.altsep) if mark]
     is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and not any(mark in given for mark in marks)
     kinds = [form.kind] if form.kind else PROBLEM_COMMANDS
-    if is_name and (given in built_in_names(kinds) or not _exists(given)):
+    if is_name and (given in built_in_names(kinds) or not os.path.lexists(given)):
         return built_in(given, kinds, f"no file and no built-in {form.noun}").text, f"{given} (built in)"
     return _text_of_file(form, given), given
 
@@ -208,13 +208,6 @@ def _with_end(pair: object, end: str, value: object, key: str) -> list[object]:
     ends = list(pair) if isinstance(pair, list) and len(pair) == len(ENDS) else [pair, pair]
     ends[ENDS.index(end)] = value
     return ends
-
-
-def _exists(path: str) -> bool:
-    try:
-        return bool(path) and Path(path).exists()
-    except (OSError, ValueError):  # a name too long, or with a null in it
-        return False
 
 
 def _text_of_file(form: Form[Tables], path: str) -> str:

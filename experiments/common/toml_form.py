@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typing
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Generic, TypeVar
@@ -67,11 +67,6 @@ class Known:
         return None if fixed is None else (fixed, fixed)
 
 
-def no_checks(_known: Known) -> Iterator[Problem]:
-    """Yield no problem."""
-    return iter(())
-
-
 @dataclass(frozen=True)
 class Form(Generic[Tables]):
     """A kind of file: its tables, and its names in messages.
@@ -96,7 +91,7 @@ class Form(Generic[Tables]):
     listed_by: str
     begun_by: str
     tables: type[Tables]
-    checks: Callable[[Known], Iterator[Problem]] = no_checks
+    checks: Callable[[Known], Iterable[Problem]] = lambda _: ()
     written: Sequence[str] = ()
     kind: str = SCENARIO
     schema: int = 1

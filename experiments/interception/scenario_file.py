@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 from pydantic import BaseModel
 
 from experiments.common.errors import InputError, shown
-from experiments.common.file_kinds import SCENARIO, built_in, built_in_names
 from experiments.common.toml_file import load_tables, read_tables
 from experiments.common.toml_form import Form, keys_of, template
 from experiments.common.toml_values import si_name, si_values, value_text
@@ -47,16 +46,6 @@ FORM = Form(
 )
 
 Part = TypeVar("Part")
-
-
-def scenario_names() -> tuple[str, ...]:
-    """Return the names of the built-in scenarios, in alphabetical order."""
-    return tuple(built_in_names([SCENARIO]))
-
-
-def scenario_text(name: str) -> str:
-    """Return the file of a built-in scenario, with its comments; `InputError` if there is no such scenario."""
-    return built_in(name, [SCENARIO], "no built-in scenario").text
 
 
 def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Scenario:

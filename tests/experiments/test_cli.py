@@ -21,9 +21,10 @@ from experiments.common.command import LOADING
 from experiments.common.errors import InputError
 from experiments.common.options import FileOptions
 from experiments.common.output import output_of, to_csv, to_json, write_file
-from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
+from experiments.interception.scenario_file import load_scenario, scenario_hash
 from infoset import kernels
 from sim import Scenario, simulate
+from tests.built_in import scenario_text
 from tests.experiments.command_line import Command
 
 CURVE_KEYS = [

@@ -17,14 +17,7 @@ import numpy as np
 from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in_files
 from experiments.common.toml_file import read_tables
 from experiments.interception import record_file
-from experiments.interception.scenario_file import (
-    load_scenario,
-    read_scenario,
-    scenario_names,
-    scenario_text,
-    scenario_to_toml,
-    scenario_warnings,
-)
+from experiments.interception.scenario_file import load_scenario, read_scenario, scenario_to_toml, scenario_warnings
 from experiments.multipoint.file import load_multipoint
 from experiments.observer.file import load_observer
 from experiments.pareto.file import load_pareto
@@ -34,6 +27,7 @@ from experiments.reachability.file import load_rendezvous
 from infoset import AngleSensor, StateBox
 from sim import Campaign, CampaignNoise, Record, Scenario, fly_one
 from sim.storage import CampaignFolder
+from tests.built_in import scenario_names, scenario_text
 
 Found = TypeVar("Found")
 

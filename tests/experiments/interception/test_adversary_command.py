@@ -206,7 +206,7 @@ def test_an_existing_record_is_replaced_when_told(infoset: Command) -> None:
 
 
 def test_where_no_engagement_counts_it_is_said(infoset: Command, tmp_path: Path) -> None:
-    from experiments.interception.scenario_file import scenario_text
+    from tests.built_in import scenario_text
 
     text = scenario_text("asteroid-1997").replace("vx_km_s = [-59.0, -57.0]", "vx_km_s = [-110.1, -110.0]")
     text = text.replace("vx_km_s = [-58.1, -57.9]", "vx_km_s = [-110.05, -110.0]")

@@ -19,10 +19,10 @@ import infoset
 import sim
 from experiments import find_worst, fly_one, load_record, load_scenario, lower_bound, plot, save, simulate
 from experiments.common.errors import InputError
-from experiments.interception.scenario_file import scenario_text
 from sim import CampaignNoise, Record, Results
 from sim.chunk import Chunk
 from sim.results import join
+from tests.built_in import scenario_text
 
 NAME = "asteroid-1997-single"
 

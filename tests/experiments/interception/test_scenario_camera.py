@@ -9,10 +9,11 @@ import pytest
 from experiments import load_scenario
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.common.errors import InputError
-from experiments.interception.scenario_file import read_scenario, scenario_text, scenario_to_toml, scenario_warnings
+from experiments.interception.scenario_file import read_scenario, scenario_to_toml, scenario_warnings
 from infoset import AngleSensor
 from infoset.sensors import Bias
 from sim import Scenario
+from tests.built_in import scenario_text
 
 PLANE = scenario_text("asteroid-1997")
 LINE = [line for line in PLANE.splitlines() if line.startswith("error_at_")]

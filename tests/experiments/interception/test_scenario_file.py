@@ -20,9 +20,7 @@ from experiments.interception.scenario_file import (
     load_scenario,
     read_scenario,
     scenario_hash,
-    scenario_names,
     scenario_template,
-    scenario_text,
     scenario_to_toml,
     scenario_warnings,
 )
@@ -33,6 +31,7 @@ from infoset.model import InitialSet, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor, Convention, ErrorShape, RangeSensor
 from sim.gravity import on_board_model
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
+from tests.built_in import scenario_names, scenario_text
 
 BUILT_IN = (
     "asteroid-1997",

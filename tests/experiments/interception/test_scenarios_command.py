@@ -12,13 +12,8 @@ from typer.testing import CliRunner
 
 from experiments.common.errors import InputError
 from experiments.files_command import scenarios
-from experiments.interception.scenario_file import (
-    load_scenario,
-    scenario_hash,
-    scenario_names,
-    scenario_template,
-    scenario_text,
-)
+from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_template
+from tests.built_in import scenario_names, scenario_text
 
 NAMES = list(scenario_names())
 

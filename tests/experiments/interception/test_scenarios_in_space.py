@@ -16,13 +16,13 @@ from experiments.interception.scenario_file import (
     read_scenario,
     scenario_hash,
     scenario_template,
-    scenario_text,
     scenario_to_toml,
     scenario_warnings,
 )
 from experiments.interception.scenario_tables import SPACE_KEYS, ScenarioTables
 from infoset.sensors import Convention, ErrorShape
 from sim import Manoeuvre, Scenario, Target
+from tests.built_in import scenario_text
 
 BEFORE = Path(__file__).parents[2] / "data" / "first-format" / "scenarios"
 """Built-in scenarios as `scenario_to_toml` wrote them before there were engagements in space."""

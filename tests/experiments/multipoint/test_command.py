@@ -13,10 +13,10 @@ import pytest
 
 from experiments.common.figure_style import figure_bytes
 from experiments.common.file_kinds import built_in_files
-from experiments.common.problem_file import problem_text
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import KIND, Axes, load_multipoint
 from experiments.multipoint.report import Scene, cost_curves
+from tests.built_in import problem_text
 from tests.experiments.command_line import strict
 
 FIGURES = ["figure-control", "figure-costates", "figure-path", "figure-times"]

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.common.problem_file import problem_text
 from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
 from experiments.pareto.file import load_pareto
 from rendezvous.pareto import analyse_coalitions, solve_encounter, sweep_meeting_time, total_impulse
+from tests.built_in import problem_text
 from tests.experiments.command_line import strict
 
 FIGURES = ["figure-controls", "figure-costs", "figure-front", "figure-trajectories"]

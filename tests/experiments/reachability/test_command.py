@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from experiments.common.file_kinds import built_in_files
-from experiments.common.problem_file import problem_text
 from experiments.reachability.figures import FIGURES as DRAWINGS
 from experiments.reachability.figures import shown_times
 from experiments.reachability.file import KIND, load_rendezvous
 from experiments.reachability.printed_tables import TABLES, compare_published, corrected, is_published
 from experiments.reachability.report import Request, make_report
 from rendezvous.reachability import solve
+from tests.built_in import problem_text
 
 FIGURES = ["figure-controls", "figure-planes", "figure-positions", "figure-velocities"]
 KEYS = [

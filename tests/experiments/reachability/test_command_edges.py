@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from experiments.cli import main
-from experiments.common.problem_file import problem_text
+from tests.built_in import problem_text
 
 CASES = Path(__file__).parents[2] / "rendezvous" / "reachability" / "cases"
 

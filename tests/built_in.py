@@ -1,0 +1,17 @@
+"""The built-in files."""
+
+from __future__ import annotations
+
+from experiments.common.file_kinds import PROBLEM_COMMANDS, SCENARIO, built_in, built_in_names
+
+
+def scenario_names() -> tuple[str, ...]:
+    return tuple(built_in_names([SCENARIO]))
+
+
+def scenario_text(name: str) -> str:
+    return built_in(name, [SCENARIO], "no built-in scenario").text
+
+
+def problem_text(name: str) -> str:
+    return built_in(name, PROBLEM_COMMANDS, "no built-in problem").text
