@@ -55,7 +55,7 @@ def checked_impulses(wanted: object, situation: Situation, tracking: Flags, stra
     real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
     if real and values.shape == shape and (np.isfinite(values) | ~tracking).all():
         return values.astype(np.float64, copy=False)
-    needed = f"{shape[-1]} finite impulses (m/s), one an engagement"
+    needed = f"{shape[-1]} finite impulses (m/s), one for each engagement"
     if len(shape) > 1:
         needed = f"finite impulses (m/s) of the shape {shape}, along y and z"
     elif values.shape == (2, *shape):

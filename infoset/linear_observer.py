@@ -59,7 +59,7 @@ class Estimate:
     def polygons(self) -> ConvexPolygons:
         """The sets of two states; a ValueError is raised if the system has another number of states."""
         if not isinstance(self.sets, Polygons):
-            raise ValueError(f"the set has {self.states} states; its runs are .polytopes")
+            raise ValueError(f"the set has {self.states} states, not two: use .polytopes")
         polygons = ConvexPolygons.unchecked(self.sets.vertices, self.sets.counts)
         return polygons[0] if self.single else polygons
 
@@ -120,7 +120,7 @@ class LinearObserver:
     output_matrix : array_like, shape (q, n) or (K, q, n)
         C.
     initial : ConvexPolygons, Polytope or Zonotope
-        Set of the state at step 0, before its measurement; for two states also one polygon a run, shape (B,).
+        Set of the state at step 0, before its measurement; for two states also one polygon for each run, shape (B,).
     noise : array_like, shape () or (q,), or ConvexPolygons or Polytope
         Half-widths of the box V, or V.
     disturbance : ConvexPolygons, Polytope or Zonotope, optional
@@ -174,11 +174,11 @@ class LinearObserver:
             )
         self._c = _matrices("output_matrix", output_matrix)
         if self._c.shape[-1] != self.states:
-            raise ValueError(f"output_matrix must have {self.states} columns, one a state: got {self._c.shape}")
+            raise ValueError(f"output_matrix must have {self.states} columns, one for each state: got {self._c.shape}")
         self.outputs = self._c.shape[-2]
         self._b = np.zeros((self.states, 0)) if input_matrix is None else _matrices("input_matrix", input_matrix)
         if self._b.shape[-2] != self.states:
-            raise ValueError(f"input_matrix must have {self.states} rows, one a state: got {self._b.shape}")
+            raise ValueError(f"input_matrix must have {self.states} rows, one for each state: got {self._b.shape}")
         self.inputs = self._b.shape[-1]
         self._offset = np.zeros(self.states) if offset is None else finite_values("offset", offset, "...")
         if self._offset.ndim not in (1, 2) or self._offset.shape[-1] != self.states:
@@ -204,7 +204,7 @@ class LinearObserver:
             raise TypeError(f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}")
         space = 2 if isinstance(value, ConvexPolygons) else value.space
         if space != self.states:
-            raise ValueError(f"{name} must have {self.states} coordinates, one a state: got {space}")
+            raise ValueError(f"{name} must have {self.states} coordinates, one for each state: got {space}")
         if isinstance(value, ConvexPolygons) and value.shape not in ((), shape):
             raise ValueError(f"{name} must be a single polygon, or a batch of shape (runs,): got {value.shape}")
         if not isinstance(value, Zonotope) and np.any(value.is_empty):
@@ -319,7 +319,7 @@ class LinearObserver:
         if values.ndim == rank:
             return values
         if step >= len(values):
-            raise ValueError(f"{name} has {len(values)} steps, and step {step} is wanted")
+            raise ValueError(f"{name} has {len(values)} steps, none for step {step}")
         return np.asarray(values[step])
 
 
@@ -339,7 +339,7 @@ class _Noise:
                 raise ValueError("noise must not be empty")
             polytope = polytope_of(noise)
             if polytope.space != outputs:
-                raise ValueError(f"noise must have {outputs} coordinates, one an output: got {polytope.space}")
+                raise ValueError(f"noise must have {outputs} coordinates, one for each output: got {polytope.space}")
             return cls(*_half_spaces(polytope), polytope)
         half = finite_values("noise", noise, "...")
         if half.shape not in ((), (outputs,)) or (half < 0.0).any():

@@ -20,7 +20,7 @@ class Zonotope:
     centre : array_like, shape (n,)
         Point of symmetry.
     generators : array_like, shape (m, n)
-        One generator g_i a row; none for a point.
+        One generator g_i in each row; no rows for a point.
     """
 
     centre: Floats

@@ -237,7 +237,7 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     """
     size, share = values.size, requirement.share
     if not size or np.isnan(values).any():
-        raise ValueError("a requirement is judged on at least one value, none of them NaN")
+        raise ValueError("a requirement needs at least one value, and none may be NaN")
     holding = np.cumsum(requirement.holds(values))
     fewest_met, most_missed = critical_counts(size, share, watched=watched)
     value: float | None

@@ -64,9 +64,9 @@ def shadow(
     works but the cost grows fast. Vertices of the result are points of the set; the set extends beyond its facets by no
     more than the relative `tolerance`. An ArithmeticError is raised if there are more than `most_facets`.
 
-    The hull of the points known is enlarged: each facet (and each direction across it, where it is flat) beyond which
-    the set extends gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a
-    polytope.
+    The hull of the known points is enlarged: each facet (and each direction across it, if it is flat) beyond which the
+    set extends gives a new point. It ends if there is none, after one program for each facet and each vertex of the
+    result; it is exact for a polytope.
     """
     unit = np.eye(space)
     points = np.array([furthest(direction) for direction in np.vstack([unit, -unit])])

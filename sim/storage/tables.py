@@ -104,7 +104,7 @@ def _need_sound(table: Any) -> None:
         for end in ends:
             problem = _LIMITS[name].problem(end)
             if problem is not None:
-                raise ValueError(f"{name} {problem}, and holds {end:g}")
+                raise ValueError(f"{name} {problem}: got {end:g}")
 
 
 def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:

@@ -239,7 +239,7 @@ class VectorReturns(Returns):
 def test_impulses_of_another_shape_are_refused(value: Any) -> None:
     now, one_state = situations(MODEL)[2], [None]
     with pytest.raises(
-        ValueError, match=r"Returns must return 3 finite impulses \(m/s\), one an engagement, .* step 2"
+        ValueError, match=r"Returns must return 3 finite impulses \(m/s\), one for each engagement, .* step 2"
     ):
         decide(Returns(value), now, [None, None], ALL)
     with pytest.raises(

@@ -527,7 +527,7 @@ def test_matrices_may_change_with_the_step() -> None:
     estimates = observer.run(y)
     for ours, other in zip(estimates, constant, strict=True):
         np.testing.assert_array_equal(ours.polygons.polygon(), other.polygons.polygon())
-    with pytest.raises(ValueError, match="state_matrix has 4 steps, and step 4 is wanted"):
+    with pytest.raises(ValueError, match="state_matrix has 4 steps, none for step 4"):
         observer.predict()
 
 

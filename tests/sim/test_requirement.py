@@ -156,7 +156,7 @@ def test_runs_without_a_value_do_not_satisfy_the_bound() -> None:
 
 @pytest.mark.parametrize("values", [[], [math.nan], [1.0, math.nan]])
 def test_no_sample_for_a_decision(values: list[float]) -> None:
-    with pytest.raises(ValueError, match="at least one value, none of them NaN"):
+    with pytest.raises(ValueError, match="at least one value, and none may be NaN"):
         judge(np.array(values), P99, watched=True)
 
 
