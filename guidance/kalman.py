@@ -188,8 +188,13 @@ class Kalman(Checked):
     members : int
         Number of filters, one for each interval of the possible ranges.
     process_noise : float
-        Standard deviation of the acceleration along z, constant over a step and independent between steps, in units of
-        that of an acceleration uniform within the bound of the set's model.
+        Standard deviation of the acceleration along z, constant over a step and independent between steps,
+        in units of that of an acceleration uniform within the bound of the set's model.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is negative or not finite, or there is no filter.
 
     Notes
     -----

@@ -226,11 +226,17 @@ class LeastSquares(Checked):
 
     Parameters
     ----------
-    dead_zone, last_s : float
-        Half-width of the dead zone in standard deviations, and the time to go below which there is none, s: as in
-        `Kalman`.
+    dead_zone : float
+        Half-width of the dead zone of the estimated miss, in standard deviations.
+    last_s : float
+        Time to go below which there is no dead zone, s. With a cut-off, the time before the cut-off.
     iterations : int
         Gauss-Newton steps after each measurement, starting from the previous fit.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is negative or not finite, or `iterations` is less than 1.
 
     Notes
     -----

@@ -108,8 +108,16 @@ class MeasurementNoise(Protocol):
     """A rule that chooses measurement errors within their bounds."""
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
-        """Choose the measurements of a step, rad, m or rad/s, shape (B,), by sensor.
+        """Choose the measurements of a step.
 
-        `sight` has the true line of sight, and the sensors that measure. A sensor that is left out gives no measurement
-        in this step. In space, angles in the convention of the sensor and rates have shape (2, B).
+        Parameters
+        ----------
+        sight : LineOfSight
+            True line of sight, and the sensors that measure.
+
+        Returns
+        -------
+        mapping of str to ndarray, shape (B,)
+            Measured values by sensor, rad, m or rad/s. A sensor that is left out gives no measurement in this step. In
+            space, angles in the convention of the sensor and rates have shape (2, B).
         """

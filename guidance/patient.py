@@ -18,7 +18,12 @@ class Patient:
     ----------
     share : float
         Share of the correction that later impulses can give, from 0 to 1, on which the strategy relies. With 0 it is
-        U_s; with 1 it waits as long as it can. A ValueError is raised for other values.
+        U_s; with 1 it waits as long as it can.
+
+    Raises
+    ------
+    ValueError
+        If the share is not from 0 to 1.
 
     Notes
     -----

@@ -12,8 +12,16 @@ from infoset.limits import POSITIVE
 def zero_effort_miss(omega_rad_s: Floats, range_m: Floats, closing_speed_m_s: float) -> Floats:
     """Return the signed miss (m) without further impulses, omega x^2 / e, which equals z + V x/e.
 
-    `omega_rad_s` and `range_m` are the rate of the line of sight and the range x, of any common shape, and
-    `closing_speed_m_s` is the nominal closing speed e (Kumkov and Patsko (1997), section 5, with the sign kept).
+    Parameters
+    ----------
+    omega_rad_s, range_m : ndarray
+        Line-of-sight rate and range x, of any common shape.
+    closing_speed_m_s : float
+        Nominal closing speed e.
+
+    References
+    ----------
+    Kumkov and Patsko (1997), section 5, with the sign kept.
     """
     POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     return omega_rad_s * range_m**2 / closing_speed_m_s

@@ -36,7 +36,13 @@ def strategy_names() -> list[str]:
 
 
 def make_strategy(name: str) -> Strategy:
-    """Return a registered strategy with its default settings; raise ValueError if the name is not registered."""
+    """Return a registered strategy with its default settings.
+
+    Raises
+    ------
+    ValueError
+        If the name is not registered.
+    """
     if name not in _STRATEGIES:
         raise ValueError(f"no strategy is called '{name}'; there are: {', '.join(strategy_names())}")
     return _STRATEGIES[name]()

@@ -91,6 +91,11 @@ class RandomNoise(ScriptedNoise):
         Constant errors of the centroid part of a camera's bound, in units of that part; `errors` are then those of the
         pixel part. None draws errors of the whole bound.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If an error or a bias is not within [-1, 1].
+
     References
     ----------
     Kumkov and Patsko (1997), section 7.

@@ -94,10 +94,12 @@ class Situation:
         return float(self.later_times_s[-1]) - self.time_s if self.later_times_s.size else self.lead_s
 
     def pending_m(self, time_to_go_s: Floats) -> Floats:
-        """Return the changes of a predicted miss by the pending impulses, m; the miss after them is the predicted miss
-        less these.
+        """Return the changes of a predicted miss by the pending impulses, m, which are to be subtracted from it.
 
-        `time_to_go_s`, shape (B,) or (B, S), is the time to x = 0 of the predicted misses.
+        Parameters
+        ----------
+        time_to_go_s : ndarray, shape (B,) or (B, S)
+            Time to x = 0 of the predicted misses.
         """
         change = np.zeros(time_to_go_s.shape)
         for time_s, impulse in self.pending:

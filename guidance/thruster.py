@@ -74,7 +74,10 @@ class Thruster:
     def impulse_steps(self, arrival_s: float, step_s: float) -> Sequence[int] | None:
         """Return the steps in which impulses can be given, increasing; None is every step from `delay_steps`.
 
-        `arrival_s` is the time from the start to the nominal arrival, `step_s` the length of a step.
+        Parameters
+        ----------
+        arrival_s, step_s : float
+            Time from the start to the nominal arrival, and length of a step.
 
         Raises
         ------
@@ -113,8 +116,14 @@ class Thruster:
     def give(self, wanted_m_s: Floats, budget_left_m_s: Floats) -> Floats:
         """Return the impulses that the engine gives, m/s.
 
-        Zero if |wanted| < mu1 or n < mu1, otherwise `wanted_m_s` with its modulus limited to min(mu2, n). The budget n
-        that is left, `budget_left_m_s`, has the shape (B,), the impulses (B,), or (2, B) along y and z in space.
+        Zero if |wanted| < mu1 or n < mu1, otherwise `wanted` with its modulus limited to min(mu2, n).
+
+        Parameters
+        ----------
+        wanted_m_s : ndarray, shape (B,), or (2, B) in space
+            Impulses of the strategy: signed, or (y, z).
+        budget_left_m_s : ndarray, shape (B,)
+            Budget n that is left.
         """
         size, limit = modulus(wanted_m_s), np.minimum(self.greatest_impulse_m_s, budget_left_m_s)
         given, over = wanted_m_s, size > limit
@@ -129,10 +138,14 @@ class Thruster:
         return np.where(idle, 0.0, given)
 
     def executed(self, impulse_m_s: Floats, size: Floats | None, direction: Floats | None) -> Floats:
-        """Return commanded impulses, shape (B,), or (2, B) in space, as they are executed, m/s.
+        """Return impulses as they are executed, m/s.
 
-        `size` and `direction`, shape (B,), are the errors of the modulus, and of the direction from y toward z, in
-        units of their bounds; None is zero.
+        Parameters
+        ----------
+        impulse_m_s : ndarray, shape (B,), or (2, B) in space
+            Commanded impulses.
+        size, direction : ndarray, shape (B,), or None
+            Errors of the modulus, and of the direction from y toward z, in units of their bounds; None is zero.
         """
         if size is not None:
             impulse_m_s = impulse_m_s * (1.0 + self.execution_error_relative * size)

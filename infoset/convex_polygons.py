@@ -98,13 +98,17 @@ class ConvexPolygons(PolygonArrays):
     ) -> ConvexPolygons:
         """Return the intersection with the strip lower <= normal . p <= upper.
 
-        `normal` has the shape (2,) or (..., 2), and any length; a ValueError is raised if it is zero. The bounds have
-        the shape () or (...); infinite ones give half-planes, and lower > upper gives the empty set. The strip is wider
-        on both sides by `slack_ulp` ulp of the products in normal . p: a point that satisfies the bounds up to rounding
-        is not lost.
+        `normal` has the shape (2,) or (..., 2), and any length. The bounds have the shape () or (...); infinite ones
+        give half-planes, and lower > upper gives the empty set. The strip is wider on both sides by `slack_ulp` ulp of
+        the products in normal . p: a point that satisfies the bounds up to rounding is not lost.
 
         O(n). Vertices inside do not change; new ones are within a few ulp of the coordinates. A vertex on a border is
         inside.
+
+        Raises
+        ------
+        ValueError
+            If the normal is zero.
         """
         normals = self._vectors(normal, "normal")
         if not np.logical_or.reduce(normals, axis=-1).all():
@@ -171,10 +175,14 @@ class ConvexPolygons(PolygonArrays):
     def minkowski_difference(self, other: ConvexPolygons) -> ConvexPolygons:
         """Return the Pontryagin difference {p: p + q in the set for all q in the other}.
 
-        If only the other set is empty, every point satisfies the condition: a ValueError is raised for single sets, and
-        a member of a batch becomes the empty set. O(n (n + m)). The sides move inward by the support function of the
-        other set, rounded a few times; their intersection is exact within a few ulp. For flat sets rounding decides
-        whether the difference is empty.
+        A member of a batch without a bounded difference, because only the other set is empty, gives the empty set.
+        O(n (n + m)). The sides move inward by the support function of the other set, rounded a few times; their
+        intersection is exact within a few ulp. For flat sets rounding decides whether the difference is empty.
+
+        Raises
+        ------
+        ValueError
+            If the other set is empty and this one is not, both single: every point satisfies the condition.
         """
         one, two = self._with(other)
         absent = two.counts == 0

@@ -23,7 +23,10 @@ class InformationSetView(SetQueries):
     def axis(self, name: str) -> InformationSetView:
         """Return the view of the plane of x and one lateral axis, "y" or "z", with the queries of a planar set.
 
-        A ValueError is raised if the set does not have the axis.
+        Raises
+        ------
+        ValueError
+            If the set does not have the axis.
         """
         if name not in self.axes:
             raise ValueError(f"name must be one of the lateral axes, {', '.join(self.axes)}: got {name!r}")
@@ -32,7 +35,10 @@ class InformationSetView(SetQueries):
     def copy(self) -> InformationSet:
         """Return an independent information set that starts from the state of this one.
 
-        A TypeError is raised if this is the view of one axis of a set in space.
+        Raises
+        ------
+        TypeError
+            If this is the view of one axis of a set in space.
         """
         if self.axes != self._state.model.axes:
             raise TypeError(
@@ -138,19 +144,26 @@ class InformationSet(InformationSetView):
     ) -> None:
         """Remove the ranges that contradict a range measurement: keep x_m/(1 + b) <= x <= x_m/(1 - b).
 
-        It narrows the interval of labels and leaves the polygons of the others unchanged.
-
         Parameters
         ----------
         range_m : array_like, shape () or (B,)
-            Measured range x_m, m; a ValueError is raised if it is negative.
+            Measured range x_m, m.
         relative_error : float
             Bound b, in [0, 1).
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
         alpha_rad : array_like, shape () or (B,), in space (2,) or (2, B), or None
-            Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without a
-            measured angle, alpha is bounded by the greatest possible displacement across x.
+            Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
+            a measured angle, alpha is bounded by the greatest possible displacement across x.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a value is not finite, the range is negative, or the error bound is not in [0, 1).
+
+        Notes
+        -----
+        A range measurement narrows the interval of labels and leaves the polygons of the others unchanged.
         """
         PART.need("relative_error", relative_error)
         measured = real_array("range_m", range_m, (self.batch,))
@@ -249,7 +262,10 @@ class InformationSet(InformationSetView):
     def drop_below_threshold(self) -> Flags:
         """Remove the sections whose range will be below the threshold after the next step.
 
-        Return which stored sections were removed, shape (B, S).
+        Returns
+        -------
+        ndarray of bool, shape (B, S)
+            Stored sections that were removed.
         """
         state, active, least_label = self._state, self.tracking, self._least_label_next()
         computes_phi = self._computes_phi

@@ -57,7 +57,13 @@ class Estimate:
 
     @property
     def polygons(self) -> ConvexPolygons:
-        """The sets of two states; a ValueError is raised if the system has another number of states."""
+        """The sets of two states.
+
+        Raises
+        ------
+        ValueError
+            If the system has another number of states.
+        """
         if not isinstance(self.sets, Polygons):
             raise ValueError(f"the set has {self.states} states, not two: use .polytopes")
         polygons = ConvexPolygons.unchecked(self.sets.vertices, self.sets.counts)
@@ -90,7 +96,10 @@ class Estimate:
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
         """Return the least and the greatest values of matrix x, each of shape (m,) or (B, m); NaN for the empty set.
 
-        A ValueError is raised if the `matrix` does not have the shape (m, n).
+        Raises
+        ------
+        ValueError
+            If the matrix does not have the shape (m, n).
         """
         rows = real_values("matrix", matrix)
         if rows.ndim != 2 or rows.shape[1] != self.states:
@@ -211,18 +220,35 @@ class LinearObserver:
             raise ValueError(f"{name} must not be empty")
 
     def predict(self, inputs: ArrayLike | None = None) -> None:
-        """Move the sets to the next step, with `inputs` u of shape (p,) or (B, p); without them zero.
+        """Move the sets to the next step.
 
-        A ValueError is raised if the inputs have another shape or are not finite, or a matrix for this step is missing,
-        an ArithmeticError if a polytope has more than 5000 vertices.
+        Parameters
+        ----------
+        inputs : array_like, shape (p,) or (B, p), optional
+            u between this step and the next one; without it zero.
+
+        Raises
+        ------
+        ValueError
+            If the inputs have another shape or are not finite, or a matrix for this step is missing.
+        ArithmeticError
+            If a polytope has more than 5000 vertices.
         """
         self._sets = self._sets.predicted(self._motion(self.step, inputs))
         self.step += 1
 
     def update(self, measurement: ArrayLike) -> None:
-        """Cut the sets by the `measurement` y of this step, shape (q,) or (B, q); NaN is a missing measurement.
+        """Cut the sets by the measurement of this step.
 
-        A ValueError is raised if it has another shape, or is infinite.
+        Parameters
+        ----------
+        measurement : array_like, shape (q,) or (B, q)
+            y; NaN is a missing measurement.
+
+        Raises
+        ------
+        ValueError
+            If it has another shape, or is infinite.
         """
         y = self._rows("measurement", measurement, self.outputs, missing=True)
         matrix = self._at(self._c, "output_matrix", self.step)
@@ -260,6 +286,11 @@ class LinearObserver:
             y of this step and of the next ones.
         inputs : array_like, shape (N, p) or (N, B, p), optional
             u after each measurement; one row less is enough.
+
+        Raises
+        ------
+        ValueError
+            As `predict` and `update`, or if there are too few inputs.
         """
         estimates = []
         rows = real_values("measurements", measurements)
@@ -280,10 +311,14 @@ class LinearObserver:
         Parameters
         ----------
         estimates : sequence of Estimate
-            Estimates of successive steps, as `run` returns them; a ValueError is raised if the steps are not
-            successive.
+            Estimates of successive steps, as `run` returns them.
         inputs : array_like, shape (N, p) or (N, B, p), optional
             u after each of them; the last one is not used.
+
+        Raises
+        ------
+        ValueError
+            If the steps are not successive, or there are too few inputs.
         """
         if any(after.step != before.step + 1 for before, after in pairwise(estimates)):
             raise ValueError("estimates must belong to successive steps")

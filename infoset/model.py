@@ -98,8 +98,12 @@ class StateBox:
         return ("z",) if self.y_m is None else ("y", "z")
 
     def axis(self, name: str) -> StateBox:
-        """Return the planar box of x and one lateral axis, "y" or "z", which is z in it; raise ValueError if there is
-        none.
+        """Return the planar box of x and one lateral axis, "y" or "z", which is z in it.
+
+        Raises
+        ------
+        ValueError
+            If the box does not have the axis.
         """
         if name not in self.axes:
             raise ValueError(f"StateBox: its lateral axes are {', '.join(self.axes)}: got {name!r}")
@@ -228,7 +232,13 @@ class SetModel:
         return self if len(self.axes) == 1 else _planar_model(self, name)
 
     def check_period(self, name: str, sensor: Sensor) -> None:
-        """Raise ValueError if the period of a sensor is not a whole number of steps; `name` is for the message."""
+        """Refuse a sensor whose period is not a whole number of steps; `name` is its name in the message.
+
+        Raises
+        ------
+        ValueError
+            If the period is another number.
+        """
         steps = sensor.period_s / self.step_s
         whole = self.steps_in(sensor.period_s)
         if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
@@ -237,12 +247,19 @@ class SetModel:
             )
 
     def check_start(self, name: str, box: StateBox) -> None:
-        """Check that starts are above the range threshold, and that the error bound of the angle is positive there.
+        """Refuse starts below the range threshold, and starts where the error bound of the angle is not positive.
+
+        Parameters
+        ----------
+        name : str
+            Name of the box, for the message.
+        box : StateBox
+            Possible starts.
 
         Raises
         ------
         ValueError
-            If they are not; `name` is the name of the box in the message.
+            If there are such starts.
         """
         if self.range_threshold_m >= box.x_m[0]:
             raise ValueError(
@@ -292,7 +309,10 @@ class SetModel:
     def label_limits_m(self) -> Interval:
         """Least and greatest label of a true state, m: its range at t = 0 divided by 1 + eta.
 
-        A ValueError is raised if eta may be 1 or more, for which the guaranteed model has no labels.
+        Raises
+        ------
+        ValueError
+            If eta may be 1 or more, for which the guaranteed model has no labels.
         """
         least, greatest = self.bounds.x_m
         eta = self.speed_error

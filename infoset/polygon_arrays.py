@@ -87,9 +87,13 @@ class PolygonArrays:
         """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the polygon. O(n).
 
         Rings of different lengths are a list of arrays of shape (n, 2), or have `counts` vertices, shape (...). A ring
-        may repeat vertices, also its first at the end, and have vertices along a side. A ValueError with the first
-        reflex vertex is raised if a ring is not convex, which is decided exactly. `from_points` takes the convex hull
-        of any points instead.
+        may repeat vertices, also its first at the end, and have vertices along a side.
+
+        Raises
+        ------
+        ValueError
+            If a ring is not convex; the message has the first reflex vertex. This is decided exactly. `from_points`
+            takes the convex hull of any points instead.
         """
         if isinstance(rings, list | tuple) and counts is None and len({np.shape(ring) for ring in rings}) > 1:
             return cls.stack([cls.from_vertices(ring) for ring in rings])
@@ -113,9 +117,13 @@ class PolygonArrays:
     def from_constraints(cls, normals: ArrayLike, offsets: ArrayLike) -> Self:
         """Return {p: normals p <= offsets}, with normals of shape (..., k, 2), of any length, and offsets (..., k).
 
-        Infinite offsets are no limit. A ValueError is raised if a set is unbounded. O(k^2). Exact: which constraints
-        are redundant, and whether the set is empty, is decided without rounding, and each coordinate is within a few
-        ulp of itself.
+        Infinite offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether the set is empty, is
+        decided without rounding, and each coordinate is within a few ulp of itself.
+
+        Raises
+        ------
+        ValueError
+            If a set is unbounded.
         """
         rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "...", "k", 2)
         shape = common_shape("normals and offsets", rows.shape[:-1], limits.shape)
@@ -204,7 +212,10 @@ class PolygonArrays:
     def stack(cls, sets: Sequence[Self]) -> Self:
         """Return a batch of single polygons, or of batches of equal shape, along a new first axis.
 
-        A ValueError is raised if the shapes of the batches differ.
+        Raises
+        ------
+        ValueError
+            If the shapes of the batches differ.
         """
         shapes = {need_set("each of sets", one, cls).shape for one in sets}
         if len(shapes) > 1:
@@ -241,7 +252,13 @@ class PolygonArrays:
         return (self[i] for i in range(len(self)))
 
     def polygon(self) -> Floats:
-        """Return the vertices of a single polygon, shape (count, 2); raise ValueError for a batch."""
+        """Return the vertices of a single polygon, shape (count, 2).
+
+        Raises
+        ------
+        ValueError
+            If this is a batch.
+        """
         if self.shape:
             raise ValueError(f"this is a batch of shape {self.shape}: choose one with an index first")
         return np.array(self.vertices[: int(self.counts)])
@@ -249,7 +266,10 @@ class PolygonArrays:
     def broadcast_to(self, shape: tuple[int, ...]) -> Self:
         """Return the batch repeated along new axes to another shape; the vertices are shared, not copied.
 
-        A ValueError is raised if the batch cannot be broadcast to this shape.
+        Raises
+        ------
+        ValueError
+            If the batch cannot be broadcast to this shape.
         """
         if shape == self.shape:
             return self

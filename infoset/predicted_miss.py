@@ -12,8 +12,10 @@ from infoset.pictures import predicted_miss_svg
 class ExtremePoints:
     """States that reach an end of the predicted-miss interval, one for each engagement.
 
-    Arrays of line-of-sight angle, its rate and range, rad, rad/s and m, have the shape (B,), in space (2, B) along y
-    and z.
+    Parameters
+    ----------
+    alpha_rad, omega_rad_s, range_m : ndarray, shape (B,)
+        Line-of-sight angle, its rate, and range: rad, rad/s, m. Shape (2, B) in space, along y and z.
     """
 
     alpha_rad: Floats

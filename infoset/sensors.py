@@ -128,10 +128,16 @@ class Sensor(ABC):
 
     @abstractmethod
     def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
-        """Cut sets, for example an `InformationSet`, by the measurement of this sensor.
+        """Cut sets by the measurement of this sensor.
 
-        `measured` has all measurements of the step by sensor, shape (..., B), rad, m and rad/s; `where`, shape (B,),
-        the engagements that have measured.
+        Parameters
+        ----------
+        sets : Cuttable
+            Sets of a batch, for example an `InformationSet`.
+        measured : mapping of str to ndarray, shape (..., B)
+            All measurements of the step (rad, m, rad/s), that of this sensor among them.
+        where : ndarray of bool, shape (B,)
+            Engagements that have measured.
         """
 
     def measures_at(self, before_arrival_s: float) -> bool:
@@ -141,10 +147,20 @@ class Sensor(ABC):
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats] | None:
         """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
 
-        The first value is whether it is a band of the predicted miss z + V x/e (otherwise it is one of z), the second
-        one its half-width, m, at ranges x = `range_m`, with the closing speed e. `errors` is the half-width of the
-        interval of the measured quantity, in units of the bound. None means that a measurement leaves V and z as they
-        are.
+        Parameters
+        ----------
+        range_m : ndarray
+            Ranges x, m.
+        closing_speed_m_s : float
+            Closing speed e.
+        errors : float
+            Half-width of the interval of the measured quantity, in units of the bound.
+
+        Returns
+        -------
+        tuple of (bool, ndarray), or None
+            Whether it is a band of the predicted miss z + V x/e (otherwise of z), and its half-width, m. None if a
+            measurement leaves V and z as they are.
         """
         return None
 
@@ -314,8 +330,12 @@ class AngleSensor(Sensor):
         return bound
 
     def error_bounds(self, range_m: Floats) -> Floats:
-        """Return the greatest size of the error of each angle, rad, at ranges (m) of shape (..., B); (2, B) if the axes
-        differ.
+        """Return the greatest size of the error of each angle, rad, at ranges (m) of shape (..., B).
+
+        Returns
+        -------
+        ndarray, shape (..., B)
+            (2, B) if the two axes differ.
         """
         if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
             return self.error_bound(range_m)
@@ -353,10 +373,12 @@ class AngleSensor(Sensor):
         return not (too_early or too_late)
 
     def with_bias(self, sight: Geometry, error: Floats, bias: Floats) -> Floats:
-        """Return the error of a camera in units of its bound, shape (..., B).
+        """Return the error of a camera in units of its bound, from those of the pixel and of the centroid part.
 
-        `error` and `bias` are those of the pixel and the centroid part in units of the bounds of the two parts, within
-        [-1, 1] or the unit disc.
+        Parameters
+        ----------
+        error, bias : ndarray, shape (..., B)
+            Errors in units of the bounds of the two parts, within [-1, 1] or the unit disc.
         """
         share = self.pixel_error_rad / self.error_bound(sight.range_m)
         return share * error + (1.0 - share) * bias
@@ -399,8 +421,10 @@ class AngleSensor(Sensor):
     def nearest(self, sight: Geometry, wanted: Floats) -> Floats:
         """Return the possible measurement that is nearest to wanted angles; in a disc, with their direction of error.
 
-        `wanted` are atan2(y, x) and atan2(z, x), rad, shape (..., B); the measurement is in the convention of the
-        sensor.
+        Parameters
+        ----------
+        wanted : ndarray, shape (..., B)
+            Angles atan2(y, x) and atan2(z, x), rad; the measurement is in the convention of the sensor.
         """
         wanted = self.of_plane_angles(wanted)
         if not self.is_disc:
@@ -459,6 +483,11 @@ class RangeSensor(Checked, Sensor):
     relative_error : float
         Greatest |d_m - d| / d, in (0, 1).
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits.
+
     References
     ----------
     Kumkov and Patsko (1997), equations (5) and (11).
@@ -503,6 +532,11 @@ class RateSensor(Checked, Sensor):
         Time between measurements, s; the first is at t = 0.
     error_rad_s : float
         Greatest |omega_m - omega|, rad/s.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits.
 
     References
     ----------

@@ -64,9 +64,19 @@ class Section:
 
 
 def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
-    """Map polygons from the (V, z) plane, m/s and m, to the (omega, alpha) plane, rad/s and rad, at a range.
+    """Map polygons from the (V, z) plane to the (omega, alpha) plane at a range.
 
-    With the range x and the closing speed e, omega = (V + e z/x)/x and alpha = z/x.
+    Parameters
+    ----------
+    polygon : ConvexPolygons
+        Polygons of (V, z), m/s and m.
+    range_m, closing_speed_m_s : float
+        Range x, m, and closing speed e, m/s.
+
+    Returns
+    -------
+    ConvexPolygons
+        omega = (V + e z/x)/x in rad/s, alpha = z/x in rad.
     """
     POSITIVE.need("range_m", range_m)
     POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
@@ -181,9 +191,12 @@ class SetQueries:
         return np.where(tracked, least, 0.0), np.where(tracked, greatest, 0.0)
 
     def least_and_greatest_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return the least and the greatest line-of-sight angle of the living sections, rad, and their ranges, m.
+        """Return the least and the greatest line-of-sight angle of the living sections, and their ranges.
 
-        All have the shape (B,), in space (2, B), and are zero where no section lives.
+        Returns
+        -------
+        alpha_least, alpha_greatest, range_of_least, range_of_greatest : ndarray, shape (B,), in space (2, B)
+            rad and m; zeros where no section lives.
         """
         ranges = self.ranges_m
         # Empty or unused slots may have any range, and so may the sections of stopped engagements.
@@ -253,10 +266,21 @@ class SetQueries:
         return Section(label_m, range_m, self.model.closing_speed_m_s, *polygons[::-1])
 
     def section_at(self, label_m: float, engagement: int = 0) -> Section:
-        """Return the section at any label, computed by replaying the history; its polygon is empty if the data exclude
-        the label.
+        """Return the section at any label, computed by replaying the history.
 
-        `label_m` is the range at t = 0, m. The cost is about 30 ns per event of the history.
+        Parameters
+        ----------
+        label_m : float
+            Range at t = 0, m.
+
+        Returns
+        -------
+        Section
+            Its polygon is empty if the data exclude the label.
+
+        Notes
+        -----
+        About 30 ns per event of the history.
         """
         NUMBER.need("label_m", label_m)
         self._need_engagement(engagement)
@@ -274,14 +298,17 @@ class SetQueries:
     def margin(self, label_m: float, alpha_rad: ArrayLike, omega_rad_s: ArrayLike, engagement: int = 0) -> float:
         """Return the signed distance of a state to the boundary of its section: positive inside, negative outside.
 
-        It is that in the plane of V x/e and z, m, in space the lesser one of both; -inf if the section is empty.
-
         Parameters
         ----------
         label_m : float
             Range at t = 0 of the state, m.
         alpha_rad, omega_rad_s : float, in space array_like, shape (2,)
             Line-of-sight angle, rad, and its rate, rad/s, now.
+
+        Returns
+        -------
+        float
+            Distance in the plane of V x/e and z, m, in space the lesser one of both; -inf if the section is empty.
         """
         shape = () if len(self._channels) == 1 else (len(self._channels),)
         alphas = np.atleast_1d(real_array("alpha_rad", alpha_rad, shape)).tolist()
@@ -305,9 +332,15 @@ class SetQueries:
             raise IndexError(f"engagement must be less than {self.batch}, the number of engagements: got {engagement}")
 
     def living_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Return the least and the greatest range, m, shape (B,), that agree with the history, to rounding; zeros if
-        none does.
+        """Return the least and the greatest range, m, that agree with the history, to rounding.
 
+        Returns
+        -------
+        least, greatest : ndarray, shape (B,)
+            m; zeros where no range agrees.
+
+        Notes
+        -----
         The ends are located between the stored sections by about ten replays each.
         """
         refined = self._state.copy()

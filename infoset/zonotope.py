@@ -20,7 +20,12 @@ class Zonotope:
     centre : array_like, shape (n,)
         Point of symmetry.
     generators : array_like, shape (m, n)
-        One generator g_i in each row; no rows for a point.
+        One generator g_i a row; none for a point.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not agree, or a number is not finite.
     """
 
     centre: Floats

@@ -110,7 +110,10 @@ class WorstEngagement:
     def record(self, strategy: Strategy | None = None) -> Record:
         """Simulate the engagement again and return its record.
 
-        `strategy` None is the scenario's. A strategy different from that of the search has a different miss.
+        Parameters
+        ----------
+        strategy : Strategy or None
+            None is the scenario's. A strategy different from that of the search has a different miss.
         """
         return replace(fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise()), noise=WORST_FOUND)
 
@@ -145,6 +148,8 @@ def find_worst(
 
     Raises
     ------
+    TypeError, ValueError
+        If the budget or the number of threads is not an integer from 1, or the seed not one from 0.
     BudgetError
         If the first plans of so many steps need too much memory.
     NothingCountsError

@@ -42,7 +42,10 @@ FEWEST_A_SHARD = 50
 class CampaignResult:
     """The stored runs of a campaign or a sweep.
 
-    `redone` are the damaged shards whose runs were simulated again.
+    Parameters
+    ----------
+    redone : tuple of Damage
+        Damaged shards whose runs were simulated again.
     """
 
     folder: CampaignFolder
@@ -334,7 +337,12 @@ class Sweep(Campaign):
     """A sweep: the same runs in many cells. Starts and errors are the same, so that only the varied values differ.
 
     The parameters are those of `Campaign`; `runs` is the number of engagements per cell, and the guaranteed miss is not
-    computed by default. A ValueError is raised if there is no axis.
+    computed by default.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `Campaign`, or if there is no axis.
     """
 
     def __init__(

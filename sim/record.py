@@ -92,7 +92,10 @@ class StepRecord:
 class Inconsistency:
     """The first measurement that contradicts all states of the set.
 
-    `label_m` is the label nearest to consistency: its range at t = 0.
+    Parameters
+    ----------
+    label_m : float
+        Label nearest to consistency: its range at t = 0.
     """
 
     step: int

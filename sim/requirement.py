@@ -49,9 +49,21 @@ class Decision(Enum):
 
 @dataclass(frozen=True)
 class Requirement(Checked):
-    """An upper bound of a quantile, in the unit of its quantity, written `miss_m p99<10`.
+    """An upper bound of a quantile, written `miss_m p99<10`.
 
     It is a requirement on a share of the runs: at least 99 % of the misses are less than 10 m.
+
+    Parameters
+    ----------
+    quantile : QuantileName
+        What is bounded.
+    bound : float
+        In the unit of the quantity.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the bound is not positive.
     """
 
     quantile: QuantileName
@@ -92,7 +104,18 @@ class Requirement(Checked):
 
 @dataclass(frozen=True)
 class HitRequirement(Checked):
-    """A lower bound of the probability of a hit, written `hit>=0.95`: the least share of the runs that hit."""
+    """A lower bound of the probability of a hit, written `hit>=0.95`.
+
+    Parameters
+    ----------
+    share : float
+        Least share of the runs that hit, between 0 and 1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the share is not between 0 and 1.
+    """
 
     share: Fraction
 

@@ -142,7 +142,10 @@ class Results:
     def to_pandas(self) -> Any:
         """Return the columns as a pandas `DataFrame`, one row per run, with the units in ``frame.attrs["units"]``.
 
-        A ModuleNotFoundError is raised if pandas is not installed.
+        Raises
+        ------
+        ModuleNotFoundError
+            If pandas is not installed.
         """
         try:
             import pandas as pd

@@ -32,6 +32,11 @@ class Sun(Checked):
         Direction of the Sun seen from the spacecraft at t = 0, from the x axis toward z, rad.
     elevation_rad : float
         Angle of that direction out of the plane (x, z), toward y, rad. For space only.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits.
     """
 
     gravitational_parameter_m3_s2: Positive
@@ -66,6 +71,11 @@ class Target(Checked):
         Acceleration along y, m/s^2; None is that along z. For space only.
     switching_period_s : float
         Time between changes of sign (bang-bang), or the mean time (random telegraph), s.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not within its limits.
     """
 
     manoeuvre: Manoeuvre
@@ -76,7 +86,18 @@ class Target(Checked):
 
 @dataclass(frozen=True)
 class Body(Checked):
-    """The size of the object, a sphere: an engagement hits if its miss is at most `radius_m`, m."""
+    """The size of the object.
+
+    Parameters
+    ----------
+    radius_m : float
+        Radius of a sphere, m: an engagement hits if its miss is at most this radius.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the radius is not a positive number.
+    """
 
     radius_m: Positive
 
@@ -84,8 +105,6 @@ class Body(Checked):
 @dataclass(frozen=True)
 class Scenario:
     """An interception: true motion, sensors, engine, guidance and noise.
-
-    A TypeError or ValueError is raised if a value is not within its limits, or two of them contradict each other.
 
     Parameters
     ----------
@@ -99,6 +118,11 @@ class Scenario:
         A target that manoeuvres; None does not.
     body : Body or None
         The size of the object; None is a point, and no engagement has a hit or a miss.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not within its limits, or two of them contradict each other.
     """
 
     name: str

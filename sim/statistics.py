@@ -40,7 +40,17 @@ class Distribution:
 def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distribution:
     """Return the empirical distribution of a sample with its Dvoretzky-Kiefer-Wolfowitz band.
 
-    A ValueError is raised if the sample is empty or not finite, or the confidence is not in (0, 1).
+    Parameters
+    ----------
+    sample : array_like, shape (n,)
+        At least one finite value.
+    confidence : float
+        In (0, 1).
+
+    Raises
+    ------
+    ValueError
+        If the sample is empty or not finite, or the confidence is not in (0, 1).
 
     References
     ----------
@@ -63,7 +73,10 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
 def band_half_width(size: int, confidence: float) -> float:
     """Return the half-width of the band for `size` n and `confidence` c: sqrt(ln(2 / (1 - c)) / (2 n)).
 
-    A ValueError is raised if the confidence is not between 0 and 1.
+    Raises
+    ------
+    ValueError
+        If the confidence is not between 0 and 1.
     """
     COUNT.need("size", size)
     if not 0.0 < confidence < 1.0:
@@ -74,7 +87,10 @@ def band_half_width(size: int, confidence: float) -> float:
 def quantiles(sample: ArrayLike, levels: ArrayLike) -> Floats:
     """Return quantiles of a sample at some levels in [0, 1], linearly interpolated between order statistics.
 
-    A ValueError is raised if the sample is empty or not finite, or a level is out of its range.
+    Raises
+    ------
+    TypeError, ValueError
+        If the sample is empty or not finite, or a level is out of its range.
     """
     values, at = real_values("sample", sample), real_values("levels", levels)
     if values.size == 0 or not np.isfinite(values).all() or not ((at >= 0.0) & (at <= 1.0)).all():
@@ -100,9 +116,16 @@ def shown_quantiles(sample: Floats, levels: Sequence[float]) -> list[float | Non
 
 @dataclass(frozen=True)
 class QuantileEstimate:
-    """The `value` of the quantile of a level in [0, 1] of a sample, with a confidence interval [`lower`, `upper`].
+    """A quantile of a sample with a confidence interval.
 
-    An end of the interval is None if the sample is too small to bound that side.
+    Parameters
+    ----------
+    level : float
+        In [0, 1].
+    value : float
+        Quantile of the sample.
+    lower, upper : float or None
+        Ends of the interval; None if the sample is too small to bound that side.
     """
 
     level: float
@@ -117,13 +140,26 @@ class QuantileEstimate:
 
 
 def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: float = 0.95) -> list[QuantileEstimate]:
-    """Return quantiles of a sample, in the order of the levels in [0, 1], with distribution-free confidence intervals.
+    """Return quantiles of a sample, in the order of the levels, with distribution-free confidence intervals.
 
-    The `confidence`, in (0, 1), is the least probability that an interval contains the true quantile. A ValueError is
-    raised if the sample is empty or not finite, or a level or the confidence is out of its range. O(n log n).
+    Parameters
+    ----------
+    sample : array_like, shape (n,)
+        At least one finite value.
+    levels : sequence of float
+        In [0, 1].
+    confidence : float
+        Least probability that an interval contains the true quantile, in (0, 1).
 
+    Raises
+    ------
+    ValueError
+        If the sample is empty or not finite, or a level or the confidence is out of its range.
+
+    Notes
+    -----
     The ends of the interval are order statistics: the number of values below the true quantile is binomial with n
-    trials and the level as probability (David, Nagaraja 2003, Order Statistics, section 7.1).
+    trials and the level as probability (David, Nagaraja 2003, Order Statistics, section 7.1). O(n log n).
     """
     values = np.sort(real_values("sample", sample).ravel())
     if values.size == 0 or not np.isfinite(values).all():
@@ -146,7 +182,17 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
 
 @dataclass(frozen=True)
 class HitEstimate:
-    """The share of the runs that hit, `probability`, with its Clopper-Pearson interval from `lower` to `upper`."""
+    """The probability of a hit, estimated from a number of runs.
+
+    Parameters
+    ----------
+    runs, hits : int
+        Number of runs, and of those that hit.
+    probability : float
+        Share of the runs that hit.
+    lower, upper : float
+        Ends of the Clopper-Pearson interval, in [0, 1].
+    """
 
     runs: int
     hits: int
@@ -161,6 +207,11 @@ def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate
     If the true probability is less than `lower`, the probability of at least this number of hits is less than
     (1 - confidence) / 2. If it is greater than `upper`, the same holds for at most this number of hits. For each fixed
     number of runs, the interval therefore contains the true probability with at least this confidence.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `runs` is not at least 1, `hits` is not in [0, runs], or the confidence is not between 0 and 1.
 
     References
     ----------

@@ -25,9 +25,19 @@ NUMBER = rf"\s*(?P<number>{DIGITS})\s*"
 
 @dataclass(frozen=True)
 class QuantileName:
-    """A quantile of one of `QUANTITIES` at a level between 0 and 1, written `miss_m p99`.
+    """A quantile of a quantity, written `miss_m p99`.
 
-    A ValueError is raised if the quantity is unknown, or the level is out of its range.
+    Parameters
+    ----------
+    quantity : str
+        One of `QUANTITIES`.
+    level : float
+        Between 0 and 1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the quantity is unknown, or the level is out of its range.
     """
 
     quantity: str
@@ -51,7 +61,19 @@ class QuantileName:
 class StoppingRule(Checked):
     """Stop when the confidence interval of a quantile is narrower than a width, written `miss_m p99 ci<0.5`.
 
-    The width is in the unit of the quantity, the `confidence` of the interval in (0, 1).
+    Parameters
+    ----------
+    quantile : QuantileName
+        Quantile whose interval is compared with the width.
+    width : float
+        In the unit of the quantity.
+    confidence : float
+        Of the interval, in (0, 1).
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the width or the confidence is out of its range.
     """
 
     quantile: QuantileName

@@ -36,12 +36,18 @@ class PolytopeArrays:
 
     @classmethod
     def from_vertices(cls, points: ArrayLike, flat: float = FLAT) -> Self:
-        """Return the convex hull of `points`, shape (k, n); raise ValueError if there is none.
+        """Return the convex hull of `points`, shape (k, n), at least one.
 
         `flat` is the relative thickness below which a set counts as flat: greater for points that are known to fewer
         digits. The affine hull first, then Qhull in coordinates of it in which the set is round, then a check that
-        facets and vertices agree: an UncertainHullError is raised if rounding decides which points are vertices. Qhull
-        takes O(k log k) for n to 3, O(k^(n/2)) beyond at worst.
+        facets and vertices agree. Qhull takes O(k log k) for n to 3, O(k^(n/2)) beyond at worst.
+
+        Raises
+        ------
+        ValueError
+            If there is no point.
+        UncertainHullError
+            If rounding decides which points are vertices.
         """
         array = finite_values("points", points, "k", "n")
         if not len(array):
@@ -184,8 +190,12 @@ class PolytopeArrays:
         return not len(self.vertices)
 
     def needed(self) -> Self:
-        """Return the set itself; raise EmptyPolytopeError, with the least relaxation of the constraints, if it is
-        empty.
+        """Return the set itself.
+
+        Raises
+        ------
+        EmptyPolytopeError
+            If it is empty; the error has the least relaxation of the constraints.
         """
         if self.is_empty:
             raise EmptyPolytopeError(self.relaxation)

@@ -61,12 +61,17 @@ def shadow(
     """Return a polytope from its support vectors: a projection of a set that is known only by programs over it.
 
     `furthest` returns a point of the set furthest along a direction, both of shape (space,). `space` is 2 or 3; more
-    works but the cost grows fast. Vertices of the result are points of the set; the set extends beyond its facets by no
-    more than the relative `tolerance`. An ArithmeticError is raised if there are more than `most_facets`.
+    works but the cost grows fast. Vertices of the result are points of the set; the set extends beyond its facets, at
+    most `most_facets`, by no more than the relative `tolerance`.
 
-    The hull of the known points is enlarged: each facet (and each direction across it, if it is flat) beyond which the
-    set extends gives a new point. It ends if there is none, after one program for each facet and each vertex of the
-    result; it is exact for a polytope.
+    The hull of the points known is enlarged: each facet (and each direction across it, where it is flat) beyond which
+    the set extends gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a
+    polytope.
+
+    Raises
+    ------
+    ArithmeticError
+        If it has too many facets.
     """
     unit = np.eye(space)
     points = np.array([furthest(direction) for direction in np.vstack([unit, -unit])])
@@ -96,7 +101,10 @@ def shadow(
 def product(*polytopes: Polytope) -> Polytope:
     """Return the Cartesian product of `polytopes`, with v1 v2 ... vertices and f1 + f2 + ... facets.
 
-    A ValueError is raised if there is no polytope.
+    Raises
+    ------
+    ValueError
+        If there is no polytope.
     """
     if not [need_set("each factor", factor, Polytope) for factor in polytopes]:
         raise ValueError("a product needs at least one polytope")

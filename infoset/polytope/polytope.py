@@ -109,7 +109,10 @@ class Polytope(PolytopeArrays):
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
 
-        A ValueError is raised if the other set is empty and this one is not: every point would satisfy the condition.
+        Raises
+        ------
+        ValueError
+            If the other set is empty and this one is not: every point would satisfy the condition.
         """
         self._need_other(other)
         if self.is_empty:

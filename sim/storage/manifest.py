@@ -33,9 +33,19 @@ _DERIVED = ("format", "schema", "version", "kind", "name", "scenario_hash", "sha
 
 @dataclass(frozen=True)
 class Axis:
-    """A key that a sweep varies, as in a scenario file, with its table and unit, and at least two values in this unit.
+    """A key that a sweep varies.
 
-    A TypeError or ValueError is raised if there are fewer values, or one is out of range.
+    Parameters
+    ----------
+    key : str
+        Key as in a scenario file, with its table and unit.
+    values : tuple of float
+        At least two values, in the unit of the file.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there are fewer values, or one is out of range.
     """
 
     key: str
