@@ -36,7 +36,8 @@ from experiments.common.toml_values import (
     wrong,
 )
 from rendezvous.pursuit_evasion import Game, Gravity, Player
-from rendezvous.two_body import OrbitalElements, perigee_m, semi_major_axis_m
+from rendezvous.pursuit_evasion.game import orbit_fault
+from rendezvous.two_body import OrbitalElements
 
 KIND = "pursuit-evasion"
 SUSPICIOUSLY_SMALL_KM = Decimal(100)
@@ -188,7 +189,7 @@ def _check_orbits(known: Known) -> Iterator[Problem]:
         position, velocity = (np.asarray(vector, dtype=float) for vector in start)
         positions[name] = position
         axis_km = known.number(name, "semi_major_axis_km")
-        problem = _orbit_problem(position, velocity, mu_si, planet_m)
+        problem = orbit_fault(position, velocity, mu_si, planet_m)
         if problem is not None:
             remedy = "choose an orbit above the planet, or correct planet_radius_km"
             if axis_km is not None and axis_km < SUSPICIOUSLY_SMALL_KM:
@@ -224,23 +225,6 @@ def _start(known: Known, name: str, mu_si: float) -> tuple[ArrayLike, ArrayLike]
     if any(value is None for value in numbers.values()):
         return None
     return _state({element: float(value or 0) for element, value in numbers.items()}, mu_si)
-
-
-def _orbit_problem(position_m: np.ndarray, velocity_m_s: np.ndarray, mu_si: float, planet_m: float) -> str | None:
-    if not position_m.any():
-        return "is the centre of the planet"
-    axis_m = semi_major_axis_m(position_m, velocity_m_s, mu_si)
-    if not 0.0 < axis_m < math.inf:
-        return "starts on a parabola or a hyperbola: the velocity is not below the escape velocity"
-    perigee = perigee_m(position_m, velocity_m_s, mu_si)
-    if perigee <= 1e-6 * axis_m:
-        return "starts a fall along a line through the planet's centre"
-    if perigee <= planet_m:
-        return (
-            f"gives an orbit that meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the "
-            f"planet's radius is {planet_m / 1e3:.6g} km"
-        )
-    return None
 
 
 FORM = problem_form(KIND, PursuitTables, _checks, [f"{player}.{element}" for player in PLAYERS for element in ELEMENTS])

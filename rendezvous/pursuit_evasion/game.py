@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import Craft, Pair
 from rendezvous.two_body import perigee_m, semi_major_axis_m
 
@@ -116,12 +117,8 @@ class Game:
         _need(self.longest_s > 0.0, "the longest duration must be positive")
         for name, player in (("pursuer", self.pursuer), ("evader", self.evader)):
             state = np.array(player.position_m), np.array(player.velocity_m_s)
-            _need(bool(np.any(state[0] != 0.0)), f"the {name} is at the centre of the planet")
-            axis = semi_major_axis_m(*state, self.gravity.parameter_m3_s2)
-            _need(0.0 < axis < math.inf, f"the {name}'s orbit is not an ellipse: its speed is too high")
-            perigee = perigee_m(*state, self.gravity.parameter_m3_s2)
-            _need(perigee > 1e-6 * axis, f"the {name} falls along a line through the planet's centre")
-            _need(perigee > self.gravity.planet_radius_m, f"the {name}'s orbit reaches into the planet")
+            fault = orbit_fault(*state, self.gravity.parameter_m3_s2, self.gravity.planet_radius_m)
+            _need(fault is None, f"{name}: {fault}")
         _need(self.distance_m > 0.0, "pursuer and evader are at the same position")
         _need(self.distance_m > self.capture_radius_m, "the evader is within the capture radius at the start")
 
@@ -129,6 +126,24 @@ class Game:
     def distance_m(self) -> float:
         """Return the distance of the two at the start."""
         return float(np.linalg.norm(np.subtract(self.evader.position_m, self.pursuer.position_m)))
+
+
+def orbit_fault(position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, planet_radius_m: float) -> str | None:
+    """Return why no game can start on an orbit; None if one can."""
+    if not position_m.any():
+        return "the position is the centre of the planet"
+    axis = semi_major_axis_m(position_m, velocity_m_s, mu_m3_s2)
+    if not 0.0 < axis < math.inf:
+        return "the orbit is a parabola or a hyperbola: the velocity is not below the escape velocity"
+    perigee = perigee_m(position_m, velocity_m_s, mu_m3_s2)
+    if perigee <= 1e-6 * axis:
+        return "the orbit is a fall along a line through the planet's centre"
+    if perigee <= planet_radius_m:
+        return (
+            f"the orbit meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the planet's "
+            f"radius is {planet_radius_m / 1e3:.6g} km"
+        )
+    return None
 
 
 def _need(holds: bool | np.bool_, message: str) -> None:
