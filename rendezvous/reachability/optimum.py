@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -120,21 +121,19 @@ def admissible(block: Block) -> Block:
     relaxation = least_relaxation(lifted)[0]
     if relaxation <= _REACHED:
         return _relaxed(block, relaxation)
-    low, high = 0, block.periods
-    while high - low > 1:
-        middle = (low + high) // 2
-        if least_relaxation(lifted.until(middle))[0] <= _REACHED:
-            low = middle
-        else:
-            high = middle
-    _, point = least_relaxation(lifted.until(high))
+
+    def conflicts(time: int) -> bool:
+        return least_relaxation(lifted.until(time))[0] > _REACHED
+
+    first = 1 + bisect_left(range(1, block.periods), True, key=conflicts)
+    _, point = least_relaxation(lifted.until(first))
     gaps = lifted.limits - lifted.rows @ point
-    tight = (gaps < _REACHED) & (lifted.moments >= 0) & (lifted.moments <= high)
+    tight = (gaps < _REACHED) & (lifted.moments >= 0) & (lifted.moments <= first)
     names = dict.fromkeys(
         f"{block.names[label]} at t = {moment}"
         for label, moment in zip(lifted.labels[tight], lifted.moments[tight], strict=True)
     )
-    raise EmptyTubeError(high, relaxation, tuple(names)[:4])
+    raise EmptyTubeError(first, relaxation, tuple(names)[:4])
 
 
 def _relaxed(block: Block, relaxation: float) -> Block:

@@ -266,7 +266,8 @@ class LiftedSets:
         # If a state on the path of an optimal control is at its bound, no program is needed.
         lifted, program = self._set(kind, periods)
         best = np.full((periods + 1, size, 2), -np.inf)
-        for t in _coarse_first(periods):
+        # Multiples of the greatest powers of two first: any first part of the times is evenly spread.
+        for t in sorted(range(1, periods), key=lambda t: (-(t & -t), t)):
             for i in range(size):
                 for side, sign in enumerate((-1.0, 1.0)):
                     if best[t, i, side] < _AT_BOUND:
@@ -318,15 +319,3 @@ def optimal_set(optimum: BlockOptimum) -> Lifted:
         return optimum.optimal
     lifted = lift_with_states(optimum.block)
     return lifted.where(lifted.response[-1], -lifted.free[-1])
-
-
-def _coarse_first(periods: int) -> list[int]:
-    """Return the times 1..T - 1 in an order of which any first part is evenly spread."""
-    order: list[int] = []
-    step = 1
-    while step < periods:
-        step *= 2
-    while step >= 1:
-        order += [t for t in range(step, periods, step) if t not in set(order)]
-        step //= 2
-    return order

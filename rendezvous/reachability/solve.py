@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -206,8 +207,4 @@ def least_periods(problem: ReachabilityProblem) -> int | None:
         return next((periods for periods in range(1, problem.periods + 1) if reached(periods)), None)
     if not reached(problem.periods):
         return None
-    low, high = 0, problem.periods
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if reached(middle) else (middle, high)
-    return high
+    return 1 + bisect_left(range(1, problem.periods), True, key=reached)
