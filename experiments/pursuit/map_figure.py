@@ -9,7 +9,6 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from experiments.common.display_units import S_PER_HOUR, split_unit
 from experiments.common.figure_style import INK, LIMIT, new_figure, style
@@ -113,22 +112,13 @@ def _hatch_unknown(axes: Any, solved: CaptureMap) -> list[Patch]:
         if not len(where):
             continue
         look: dict[str, Any] = {"facecolor": colour, "edgecolor": LIMIT, "hatch": hatch, "linewidth": 0.0}
-        for j, first, last in _stretches(where):
+        ends = 1 + np.flatnonzero((np.diff(where, axis=0) != (0, 1)).any(axis=1))
+        for stretch in np.split(where, ends):  # adjacent cells of a row
+            (j, first), (_, last) = stretch[[0, -1]]
             left, right, bottom, top = across[first], across[last + 1], up[j], up[j + 1]
             axes.fill([left, right, right, left], [bottom, bottom, top, top], **look)
         handles.append(Patch(label=STATUS_WORDS[status], **look))
     return handles
-
-
-def _stretches(where: NDArray[np.int64]) -> list[tuple[int, int, int]]:
-    """Join adjacent cells of a row: row, first and last column of each stretch."""
-    out: list[tuple[int, int, int]] = []
-    for j, i in where.tolist():
-        if out and out[-1][0] == j and out[-1][2] == i - 1:
-            out[-1] = (j, out[-1][1], i)
-        else:
-            out.append((j, i, i))
-    return out
 
 
 def _edges(centres: Floats) -> Floats:
