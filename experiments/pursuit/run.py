@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from time import perf_counter
 
 from matplotlib.figure import Figure
@@ -38,14 +37,18 @@ def run(options: Pursuit) -> None:
         say_warnings(problem.warnings(), options.quiet)
         with progress_bar(options.quiet) as begin:
             report = _solve(problem, options, evader, begin)
-            _need_trajectory(report.solution, {"--html": options.html, "--csv": options.csv})
-            page = (
-                "" if options.html is None else pursuit_page(problem.name, problem.tables.description, report.solution)
-            )
+            solution = report.solution
+            has_trajectory = solution.capture is not None or solution.fallback is not None
+            wanted = " and ".join(option for option in ("--html", "--csv") if option in written.files)
+            if wanted and not has_trajectory:
+                raise InputError(
+                    f"{wanted}: there is no trajectory to show, the result is {solution.verdict.value}; omit {wanted}"
+                )
             written.save("results.json", to_json(report_json(report)), "--json")
-            written.deliver("--html", page)
-            if written.wants("--csv") and _has_trajectory(report.solution):
-                written.save(TRAJECTORIES, trajectories(report.solution), "--csv")
+            if options.html is not None:
+                written.deliver("--html", pursuit_page(problem.name, problem.tables.description, solution))
+            if written.wants("--csv") and has_trajectory:
+                written.save(TRAJECTORIES, trajectories(solution), "--csv")
             if options.out is not None:
                 written.save("problem.toml", problem.toml)
                 written.draw(_drawings(report), begin("figures"))
@@ -104,20 +107,6 @@ def _time_between_plans(game_s: float, asked_s: float | None) -> float:
             f"choose {game_s / MOST_PLANS:.3g} or more"
         )
     return asked_s
-
-
-def _has_trajectory(solution: Solution) -> bool:
-    return solution.capture is not None or solution.fallback is not None
-
-
-def _need_trajectory(solution: Solution, files: Mapping[str, Path | None]) -> None:
-    """Refuse options that need a trajectory if there is none."""
-    wanted = [option for option, file in files.items() if file is not None]
-    if wanted and not _has_trajectory(solution):
-        raise InputError(
-            f"{' and '.join(wanted)}: there is no trajectory to show, the result is {solution.verdict.value}; omit "
-            f"{' and '.join(wanted)}"
-        )
 
 
 def _drawings(report: Report) -> dict[str, Callable[[], Figure]]:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.common.output import Cell
 from experiments.reachability.file import Rendezvous, load_rendezvous
 from experiments.reachability.report import Member, fly_members
 from infoset.arrays import Floats
 from rendezvous.reachability import OptimalControls, Solution, minimum_energy, minimum_l1, nearest
 
 PROBLEM = "rendezvous-2021"
+Row = tuple[int, str, str, int, float, float | None, float]
 COLUMNS = ("table", "ours", "quantity", "period", "printed", "corrected", "computed")
 
 
@@ -105,7 +105,7 @@ class Comparison:
         return float(np.abs(self.ours.controls - self.printed.controls).max())
 
     @property
-    def rows(self) -> list[list[Cell]]:
+    def rows(self) -> list[Row]:
         """Rows of `COLUMNS`: every printed number, its correction, if it has one, and the computed number."""
         table, ours = self.table, self.ours
         corrections = {(quantity, t, component): value for quantity, t, component, value in table.misprints}
@@ -114,15 +114,15 @@ class Comparison:
             ("linear x", 1, table.linear, ours.linear[1:]),
             ("nonlinear x", 1, table.nonlinear, ours.nonlinear[1:]),
         )
-        rows: list[list[Cell]] = []
+        rows: list[Row] = []
         for quantity, first, printed, computed in blocks:
             for t, (known, ours_then) in enumerate(zip(printed, computed, strict=True), start=first):
                 for component, (number, value) in enumerate(zip(known, ours_then, strict=True), start=1):
                     correction = corrections.get((quantity, t, component))
                     name = f"{quantity}{component}"
-                    rows.append([table.number, table.ours, name, t, number, correction, float(value)])
+                    rows.append((table.number, table.ours, name, t, number, correction, float(value)))
         miss = ours.nonlinear_miss
-        rows.append([table.number, table.ours, "nonlinear miss", 4, table.nonlinear_miss, None, miss])
+        rows.append((table.number, table.ours, "nonlinear miss", 4, table.nonlinear_miss, None, miss))
         return rows
 
 

@@ -8,10 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from experiments.common.output import Cell
 from experiments.common.published_number import Progress, PublishedNumber, Reference, Reproduction
 from experiments.reachability.file import Rendezvous, load_rendezvous
-from experiments.reachability.printed_tables import PROBLEM, Comparison, compare_published, corrected
+from experiments.reachability.printed_tables import PROBLEM, Comparison, Row, compare_published, corrected
 from experiments.reachability.report import fly_members
 from infoset.arrays import Floats
 from rendezvous.reachability import ReachabilityProblem, solve
@@ -88,15 +87,11 @@ def _inverse(problem: ReachabilityProblem) -> Floats:
     return np.asarray(np.linalg.pinv(problem.control[0] / problem.state_bounds[:, None]) / problem.state_bounds)
 
 
-def _number(row: list[Cell], comparison: Comparison, problem: ReachabilityProblem) -> PublishedNumber:
+def _number(row: Row, comparison: Comparison, problem: ReachabilityProblem) -> PublishedNumber:
     table, _, quantity, t, printed, correction, ours = row
-    assert isinstance(quantity, str)
-    assert isinstance(t, int)
-    assert isinstance(printed, float)
-    assert isinstance(ours, float)
     component = int(quantity[-1]) if quantity[-1].isdigit() else 0
     text = _digits(printed, quantity, component)
-    right = None if correction is None else _digits(float(str(correction)), quantity, component)
+    right = None if correction is None else _digits(correction, quantity, component)
     note = "" if right is None else _NOTES["misprint"]
     beyond, unexplained = 0.0, False
     if quantity.startswith("u") and table == 2:
@@ -111,10 +106,11 @@ def _number(row: list[Cell], comparison: Comparison, problem: ReachabilityProble
         unexplained, note = True, _NOTES["nonlinear"]
         if table == 1 and component == 0:
             right = _NONLINEAR_MISS
+    unit = "" if quantity.startswith("u") or component == 0 else " (m)" if component <= 3 else " (m/s)"
     name = f"{quantity}({t})" if component else f"nonlinear, norm of x({t})"
     return _REFERENCE.number(
         f"table {table}",
-        f"{name}{_unit(quantity, component)}",
+        f"{name}{unit}",
         text,
         ours + 0.0,
         corrected=right,
@@ -122,12 +118,6 @@ def _number(row: list[Cell], comparison: Comparison, problem: ReachabilityProble
         beyond=beyond,
         note=note,
     )
-
-
-def _unit(quantity: str, component: int) -> str:
-    if quantity.startswith("u") or component == 0:
-        return ""
-    return " (m)" if component <= 3 else " (m/s)"
 
 
 def _digits(value: float, quantity: str, component: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import chain
 
 from rich.table import Table
 
@@ -61,7 +62,8 @@ def run(options: Reach) -> None:
             raise InputError(
                 f"cannot draw the tube: {error}; the numbers are in results.json, or use --json alone"
             ) from None
-    show(_parts(report, comparisons), options.quiet, stdout_taken=written.stdout_taken)
+    parts = chain(_summary(report), _tables(report, comparisons), _feedback(report))
+    show(parts, options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _selection(text: str) -> tuple[list[str], int]:
@@ -80,12 +82,6 @@ def _selection(text: str) -> tuple[list[str], int]:
             raise InputError(f"--select {name}: takes no number, found {digits[:20]!r}; write --select {name}")
         names.append(name)
     return names, count
-
-
-def _parts(report: Report, comparisons: Sequence[Comparison]) -> Iterator[Part]:
-    yield from _summary(report)
-    yield from _tables(report, comparisons)
-    yield from _feedback(report)
 
 
 def _summary(report: Report) -> Iterator[str]:
