@@ -356,7 +356,8 @@ def test_orders_that_do_not_fit_the_times_are_left_out(infoset: Infoset, mine: C
 
 
 @pytest.mark.parametrize(
-    ("number", "told"), [(500, "target: must have at most 200 of them, found 500"), (10_000, "is over 100 kB")]
+    ("number", "told"),
+    [(500, "target: must have at most 200 of them, found 500"), (10_000, "more than any problem file")],
 )
 def test_too_many_targets_are_refused_at_once(
     infoset: Infoset, mine: Callable[[str], Path], number: int, told: str
