@@ -1,13 +1,26 @@
-"""Running commands in an empty folder."""
+"""Running commands in an empty folder; PDF files that are written quickly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from experiments.common import figure_style
 from tests.experiments.command_line import Command
+
+
+@pytest.fixture(scope="session", autouse=True)
+def font_type_of_pdfs() -> Iterator[int]:
+    """Write PDF files with Type 3 fonts; return the type of the project's style, whose fonts take ten times as long.
+
+    `common/test_figure_style.py` tests the fonts of the style.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        type_of_the_style = figure_style._STYLE["pdf.fonttype"]
+        patch.setitem(figure_style._STYLE, "pdf.fonttype", 3)
+        yield type_of_the_style
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from experiments.common.figure_style import figure_grid, place_labels
+from experiments.common import figure_style
+from experiments.common.figure_style import figure_bytes, figure_grid, place_labels, style
 
 
 @pytest.mark.parametrize("centred", [False, True])
@@ -39,3 +40,13 @@ def test_labels_of_nested_outlines_do_not_touch_and_stay_inside_the_axes(centred
             box = text.get_window_extent()
             assert any(box.contains(*point) for point in axes.transData.transform(circle))
     figure.clear()
+
+
+def test_pdfs_have_truetype_fonts(font_type_of_pdfs: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(figure_style._STYLE, "pdf.fonttype", font_type_of_pdfs)
+    with style():
+        figure, (axes,) = figure_grid(40.0, 1, 1, (10.0, 5.0, 10.0, 5.0), (0.0, 0.0))
+        axes.set_xlabel("ν² of $\\Phi_0$, −1 to 1 µm")
+        files = dict(figure_bytes(figure))
+    assert files["pdf"].count(b"/FontFile2") == 2
+    assert b"/Type3" not in files["pdf"]
