@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 
 REDUCED = (
-    (r"^infoset experiment\b(?!.* --runs)", "infoset experiment --runs 4"),
-    (r"--runs \d+", "--runs 4"),
+    (r"^infoset experiment\b(?!.* --runs)", "infoset experiment --runs 2"),
+    (r"--runs \d+", "--runs 2"),
     (r"--single-runs \d+", "--single-runs 2"),
     (r"--engagements (\d+|N)", "--engagements 8"),
     (r"--budget \d+", "--budget 20"),
@@ -261,7 +261,7 @@ def test_the_reference_has_the_help_of_every_command(pages: list[Page]) -> None:
 
 def test_the_rules_make_lines_smaller() -> None:
     sweep = reduced("infoset sweep --vary a.b=0.5e-4:5e-4:8,c.d=log:2:20:7 --runs 400 --out x")
-    assert sweep == "infoset sweep --vary a.b=0.5e-4:5e-4:2,c.d=log:2:20:2 --runs 4 --out x"
+    assert sweep == "infoset sweep --vary a.b=0.5e-4:5e-4:2,c.d=log:2:20:2 --runs 2 --out x"
     assert is_complete("infoset compare --runs 300 --seed 0")
     assert not is_complete("infoset engage --noise NOISE --seed S --run K")
     assert not is_complete("infoset reach")
