@@ -54,9 +54,10 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Exclude the imported modules from garbage collection, which would take a twentieth of the time of the tests."""
+    """Collect garbage less often, and not in the imported modules: it would take an eighth of the time of the tests."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(100_000)
 
 
 @pytest.fixture(autouse=True)
