@@ -73,8 +73,6 @@ def _load_field(context: Any, builder: Any, kind: _Reference, pointer: Any, name
 def by_reference(record: T) -> T:
     """Make kernels take the address of a NamedTuple of arrays.
 
-    Notes
-    -----
     Otherwise each call of a kernel passes each size and each stride of each array, a seventh of the generated code.
     """
 
@@ -94,8 +92,6 @@ def record_of(fields: type) -> np.dtype[Any]:
 def constants(number: int) -> tuple[int, ...]:
     """Return the numbers 0, 1, ... as variables, for arguments of kernels: rows, sides, parts.
 
-    Notes
-    -----
     Numba compiles a kernel anew for each Python constant that is passed to it.
     """
     return tuple(cast(int, np.int64(value)) for value in range(number))

@@ -50,14 +50,9 @@ def start(
     bottom: tuple[float, float, float],
     top: tuple[float, float, float],
 ) -> None:
-    """Write a trapezium between two levels.
+    """Write a trapezium between two levels at time to go `tau`, s.
 
-    Parameters
-    ----------
-    tau : float
-        Time to go, s.
-    bottom, top : tuple of float
-        Least V, greatest V, m/s, and z, m, of each level.
+    `bottom` and `top` are the least V, the greatest V, m/s, and z, m, of each level.
     """
     for chain in (right, left):
         move_to_zero(chain)
@@ -87,19 +82,9 @@ def hand_over(
 ) -> None:
     """Move the vertices of a chain after its highest one to the front of the other chain.
 
-    Parameters
-    ----------
-    sign : float
-        1 if the giver is the right chain, else -1.
-    between : tuple of float
-        V, m and height of the giver's origin relative to the taker's.
-    same : tuple of float
-        Rounding errors of a difference of V, and of the difference of the origins' heights.
-    tau : float
-        Time to go, s.
+    `sign` is 1 if the giver is the right chain, else -1. `between` has V, m and height of the giver's origin relative
+    to the taker's, `same` the rounding errors of a difference of V, and of the difference of the origins' heights.
 
-    Notes
-    -----
     A decreasing time to go raises the right side, so only vertices whose predecessor is on the outer side are moved.
     Without a turn of the level, heights along it are equal to within rounding, and no vertex may be moved. Where both
     chains end in the same vertex, their copies differ only by rounding: moving it again would add a vertex at every
@@ -185,25 +170,11 @@ def heights(right: Chain, left: Chain, rings: Floats, tau: float) -> tuple[float
 def cut_end(
     chain: Chain, rings: Floats, end: int, other_end: int, way: int, up: float, tau: float, level: float
 ) -> int:
-    """Remove the part of a chain above a level, and add a vertex at the intersection.
+    """Remove the part of a chain above a level, and add a vertex at the intersection; return its number, the new end.
 
-    Parameters
-    ----------
-    end, other_end : int
-        Numbers of the end vertex to cut and of the one at the other end.
-    way : int
-        Direction from the first to the second: 1 or -1.
-    up : float
-        1 to remove greater z, -1 to remove lesser z.
-    tau : float
-        Time to go, s.
-    level : float
-        `up` times the height of the level relative to the chain's origin, m.
-
-    Returns
-    -------
-    int
-        Number of the new end vertex.
+    `end` is the end vertex to cut, `other_end` the one at the other end, and `way` the direction to it: 1 or -1. With
+    `up` = 1 greater z is removed, with -1 lesser z. `level` is `up` times the height of the level relative to the
+    chain's origin, m.
     """
     v, m = read(chain, rings, end)
     height = up * (m - tau * v)
@@ -227,14 +198,11 @@ def cut_end(
 
 @inlined
 def cut(right: Chain, left: Chain, rings: Floats, tau: float, lower: float, upper: float) -> tuple[bool, float]:
-    """Intersect a section at time to go `tau` with the band lower <= z <= upper.
+    """Intersect a section at time to go `tau` with the band lower <= z <= upper; return whether it lives, and the
+    overlap.
 
-    Returns
-    -------
-    living : bool
-        False if the intersection is empty; the section is then unchanged.
-    overlap : float
-        Smaller overlap of section and band at the two borders, m; minus their distance if they do not intersect.
+    If the intersection is empty, the section is unchanged. The overlap is the smaller one of section and band at the
+    two borders, m; minus their distance if they do not intersect.
     """
     least, greatest = heights(right, left, rings, tau)
     overlap = min(greatest - lower, upper - least)
@@ -259,17 +227,9 @@ def cut(right: Chain, left: Chain, rings: Floats, tau: float, lower: float, uppe
 def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int:
     """Return the number of the vertex with the greatest (right chain) or least (left chain) predicted miss; store it.
 
-    Parameters
-    ----------
-    sign : float
-        1 for the right chain, -1 for the left one.
-    magnitude : float
-        Magnitude of the terms of the predicted misses, to which their rounding error is relative, m.
-
-    Notes
-    -----
-    The search starts at the previous peak and ends where the miss decreases by more than rounding, so that vertices
-    that nearly coincide do not stop it.
+    `sign` is 1 for the right chain, -1 for the left one. `magnitude` is that of the terms of the predicted misses, to
+    which their rounding error is relative, m. The search starts at the previous peak and ends where the miss decreases
+    by more than rounding, so that vertices that nearly coincide do not stop it.
     """
     first, last = chain.begin, chain.end - 1
     peak = min(max(chain.peak, first), last)
@@ -315,17 +275,8 @@ def extreme_points(
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return points with the extremes of the predicted miss; `greatest_and_least_miss` must have stored the peaks.
 
-    Parameters
-    ----------
-    tau : float
-        Time to go, s.
-    relative, slack : float
-        Tolerances for equal misses, relative to the interval and to the magnitudes of the terms.
-
-    Returns
-    -------
-    upper, lower : tuple of float
-        V and m of the lowest point with the greatest miss, and of the highest point with the least.
+    They are V and m of the lowest point with the greatest miss, and of the highest point with the least. `relative` and
+    `slack` are tolerances for equal misses, relative to the interval and to the magnitudes of the terms.
     """
     upper_v, upper = vertex(right, rings, right.peak)
     lower_v, lower = vertex(left, rings, left.peak)

@@ -79,8 +79,6 @@ def bound_piece(
 ) -> tuple[float, float]:
     """Return bounds of z + V x/e over all sections of an axis with labels from p to q.
 
-    Notes
-    -----
     The support of the sections in a fixed direction is a concave function of the label, but the direction of z + V x/e
     turns with the label. With the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first term has
     a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- r.
@@ -121,20 +119,11 @@ def bound_leaving(
     outlines: Outlines,
     pieces: Floats,
 ) -> int:
-    """Bound the predicted miss of all living labels between two limits; return the number of pieces written.
+    """Bound the predicted miss of all living labels between two limits, m; return the number of pieces written.
 
-    The pieces of all axes have the same ends. With rates, the window of the tape consists of these limits.
-
-    Parameters
-    ----------
-    lower, upper : float
-        The limits, m.
-    known : float
-        A label between them that lives; less than `lower` if none is known.
-    room, outlines : Workspace, Outlines
-        Working arrays.
-    pieces : ndarray, shape (C, >= PIECES, 4)
-        Receives the pieces.
+    The pieces of all axes have the same ends; `pieces`, shape (C, >= PIECES, 4), receives them. With rates, the window
+    of the tape consists of these limits. `known` is a label between them that lives; less than `lower` if none is
+    known.
     """
     living, limits, replays = known, room.known, room.replays
     if errors is not None:
@@ -243,8 +232,6 @@ def bound_leaving_all(
 ) -> None:
     """Write the pieces of the active engagements and their numbers.
 
-    Notes
-    -----
     With rates, a window of labels is halved while its bound is loose, since the bands that are convex on a window are
     wider on a wider window. `floor` is the bound of the labels that have arrived: Phi is no less.
     """
@@ -316,12 +303,7 @@ def spread_at(
 class GuaranteedMiss:
     """Phi of a batch of engagements: an upper bound of the true miss over the labels that have left the set.
 
-    Parameters
-    ----------
-    batch : int
-        Number of engagements B.
-    speed_error : float
-        Greatest |eta|, the relative error of the closing speed.
+    `speed_error` is the greatest |eta|, the relative error of the closing speed.
     """
 
     def __init__(self, laws: tuple[SectionLaw, ...], batch: int, speed_error: float) -> None:
@@ -369,8 +351,6 @@ class GuaranteedMiss:
     def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
         """Add the bound of the living labels from `lower` to `upper` that leave in this step.
 
-        Notes
-        -----
         Each label is replayed from the start. Labels that leave during the following steps of a group are bounded
         too, so that the number of replays does not grow with the number of steps.
         """

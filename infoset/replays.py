@@ -155,10 +155,7 @@ AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
 def replay(label: float, tape: Tape, errors: Floats | None, laws: Laws, channel: int, room: ReplayRoom) -> int:
     """Compute the section at any label along one axis from a whole history, in row `PROBE` of the axis.
 
-    Returns
-    -------
-    int
-        Number of the event that made the section empty, or ALIVE.
+    Return the number of the event that made the section empty, or ALIVE.
     """
     right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
     start_section(right, left, room.rings, label, law_of(laws, channel))
@@ -169,19 +166,12 @@ def replay(label: float, tape: Tape, errors: Floats | None, laws: Laws, channel:
 def continue_replay(
     done: Replayed, label: float, tape: Tape, errors: Floats | None, laws: Laws, channel: int, room: ReplayRoom
 ) -> tuple[int, Replayed]:
-    """Apply the events of a tape that are not done yet; return what `replay` does, and the events done.
+    """Apply the events of a tape that are not done yet; return what `replay` does, and the events done. About 30 ns an
+    event.
 
-    Parameters
-    ----------
-    errors : ndarray, shape (>= events,), or None
-        Error bound of each rate, rad/s; None without rates. It is not a field of the tape because the compiler omits
-        the code for rates only if an argument is None.
-    room : ReplayRoom
-        Receives the section, and the overlaps with the bands of the measurements up to the one that makes it empty.
-
-    Notes
-    -----
-    About 30 ns per event.
+    `errors` are the error bounds of each rate, rad/s; None without rates. It is not a field of the tape because the
+    compiler omits the code for rates only if an argument is None. The `room` receives the section, and the overlaps
+    with the bands of the measurements up to the one that makes it empty.
     """
     kinds, values, applies, events, nearest, farthest = tape
     right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
@@ -220,19 +210,9 @@ def continue_replay(
 
 @allocation_free
 def run(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom) -> tuple[int, float, int]:
-    """Replay a label along all axes.
+    """Replay a label along all axes; return the event at which it became empty, or ALIVE, the overlap there, m, and its
+    axis.
 
-    Returns
-    -------
-    died : int
-        Event at which it became empty, or ALIVE.
-    overlap : float
-        Overlap with the band there, m, or zero.
-    emptied : int
-        Axis of that overlap.
-
-    Notes
-    -----
     A label becomes empty with the first of its axes. If several become empty at one event, the least overlap counts.
     """
     died, overlap, emptied = ALIVE, 0.0, 0
@@ -285,21 +265,9 @@ def outlives(one: Record, other: Record) -> bool:
 def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, laws: Laws) -> Floats:
     """Return the signed distances, m, of states (V, z) to the boundaries of sections during an engagement, (C, L, B).
 
-    Parameters
-    ----------
-    labels : ndarray, shape (B,)
-        Label of each engagement, m.
-    looks : ndarray of int, shape (L,)
-        Number of events before each state.
-    v, z : ndarray, shape (C, L, B)
-        The states along each axis, m/s and m.
-    laws : ndarray of records, shape (C,)
-        Constants of the model.
-
-    Returns
-    -------
-    ndarray, shape (C, L, B)
-        Positive inside; for an empty section its overlap with the band that made it empty.
+    They are positive inside; for an empty section the overlap with the band that made it empty. `labels` has the shape
+    (B,), and `looks`, shape (L,), the number of events before each state. The states `v` and `z`, shape (C, L, B), are
+    along each axis, m/s and m.
     """
     margins = np.empty(v.shape)
     room = replay_room(len(laws), history.events)

@@ -140,8 +140,6 @@ def law_of(laws: Laws, channel: int) -> SectionLaw:
 def _law(model: SetModel) -> SectionLaw:
     """Return the constants of a planar model.
 
-    Notes
-    -----
     Angles contain no information about scale: a true motion with closing speed e (1 + eta) has the angles of a motion
     of the model with all lengths, velocities and impulses divided by 1 + eta. Therefore the guaranteed model enlarges
     the bounds of lengths and velocities by eta, takes the greatest error bound of an angle over the ranges that

@@ -107,8 +107,6 @@ def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
 def start_section(right: Chain, left: Chain, rings: Floats, label: float, law: SectionLaw) -> None:
     """Write the section at t = 0.
 
-    Notes
-    -----
     The rectangle is that of the paper (section 4), but with V_x at the end of its interval that makes the rectangle
     larger. The printed formula always takes the lower end; both agree if z can have either sign.
     """
@@ -145,23 +143,14 @@ def nearest_range(travelled: float, law: SectionLaw) -> float:
 def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw) -> tuple[float, float]:
     """Return the greatest sizes of two measured angles, rad, that agree with the measurements up to a range.
 
-    Parameters
-    ----------
-    alpha, across : float
-        Measured angles of this axis and of the other one, rad.
+    `alpha` and `across` are the measured angles of this axis and of the other one. The distance is at most x/(cos(own)
+    cos(other)). If one of the angles is unbounded, the first is pi/2 and the second zero.
 
-    Returns
-    -------
-    own, other : float
-        The distance is at most x/(cos(own) cos(other)). If one of them is unbounded, `own` is pi/2 and `other` zero.
-
-    Notes
-    -----
     The bound of a camera is greatest at the least distance, that of the nearest label. Another error bound that grows
-    with the distance r grows with the angles: in a plane r = x/cos(alpha), in space r is at most
-    x/(cos(alpha_y) cos(alpha_z)). The greatest angles are the least solution of s = |alpha_m| + a + h(r(s)). Three
-    fixed-point iterations approach it from below; a fourth step of the length of the third passes it if the right-hand
-    side does not exceed s there.
+    with the distance r grows with the angles: in a plane r = x/cos(alpha), in space r is at most x/(cos(alpha_y)
+    cos(alpha_z)). The greatest angles are the least solution of s = |alpha_m| + a + h(r(s)). Three fixed-point
+    iterations approach it from below; a fourth step of the length of the third passes it if the right-hand side does
+    not exceed s there.
     """
     growth, other_growth = max(law.error_slope, 0.0) * range_m, max(law.other_error_slope, 0.0) * range_m
     centroid = 0.0
@@ -199,12 +188,8 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
 def slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
     """Return the least and the greatest slope z/x that agree with measured angles, at range x.
 
-    Parameters
-    ----------
-    alpha, across : float
-        Measured angles of this axis and of the other one, rad.
-    travelled : float
-        Decrease of the range since the start, m, the same for all labels.
+    `alpha` and `across` are the angles of this axis and of the other one, rad. `travelled` is the decrease of the range
+    since the start, m, the same for all labels.
     """
     if law.angles != PLANE:
         return wide_slope_band(alpha, across, travelled, x, law)
@@ -220,8 +205,6 @@ def slope_band(alpha: float, across: float, travelled: float, x: float, law: Sec
 def wide_slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
     """Return what `slope_band` does if the band of an axis depends on the angle of the other one, or is not concave.
 
-    Notes
-    -----
     Bounds over all labels need an upper bound whose product with x is a concave function of x. Therefore the factors by
     which the angle of the other axis widens the band are the same for all labels, and two error bounds have a wider
     band, whose product with x is linear. If the bound h(x) rises with range, x h(x) is convex: a chord and a tangent
@@ -280,17 +263,9 @@ def measure_section(
     across: float,
     law: SectionLaw,
 ) -> tuple[bool, float]:
-    """Cut a section by an angle measurement; `across` is the angle of the other axis.
+    """Cut a section by an angle measurement; return what `chain_steps.cut` does. `across` is the angle of the other
+    axis.
 
-    Returns
-    -------
-    living : bool
-        False if the section became empty.
-    overlap : float
-        Smaller overlap of section and band at the two borders, m; minus their distance if they do not intersect.
-
-    Notes
-    -----
     The band is widened by 16 ulp, so that rounding does not exclude true states on the border, which extremal noise
     produces. The ulp is that of the terms of a height and does not decrease with the range.
     """
@@ -358,8 +333,6 @@ def rate_band(
     On the window the lower bound is a convex function of the label and the upper one is concave. Sets that are cut by
     this band are convex in (z, V, label) on the window; sets that are cut by the exact bands of the labels are not.
 
-    Notes
-    -----
     The measured rate is (V_z x - V_x z)/(x^2 + z^2): the model's V/x + e z/x^2 times the square of cos(alpha). With
     z_j = alpha_j x_j at the last measured angle and the impulses since, the predicted miss m = z + V x/e gives
     V = (e/x_j)(m - alpha_j x_j - moved), so that
@@ -434,12 +407,7 @@ def measure_rate_section(
 ) -> tuple[bool, float]:
     """Cut a section by a line-of-sight rate, which is a band of the predicted miss omega x^2 / e.
 
-    Returns
-    -------
-    living : bool
-        False if the section became empty.
-    overlap : float
-        As in `measure_section`, in metres of predicted miss.
+    Return what `chain_steps.cut` does, with the overlap in metres of predicted miss.
     """
     if whole_chains.is_crowded(right, left):
         whole_chains.reduce_outward(right, left, rings, time_to_go(label, elapsed, law), points)

@@ -166,24 +166,10 @@ def step_all(
 ) -> int:
     """Predict, cut and summarise the living sections in one pass; return the number of labels that became empty.
 
-    Parameters
-    ----------
-    behind : ndarray of bool, shape (B,)
-        Engagements whose sections are at step `elapsed - 1` and are moved to step `elapsed`.
-    measured : ndarray of bool, shape (B,)
-        Engagements whose sections are cut by an angle measurement and summarised.
-    stale : ndarray of bool, shape (B,)
-        Engagements whose sections are summarised.
-    heights_wanted : bool
-        Whether to write the least and the greatest z of all sections.
-    alpha : ndarray, shape (C, B)
-        Measured angles, rad.
-    elapsed, event : int
-        Present step, and number of the measurement; -1 without one.
-    sections : Sections
-        The sections, changed in place.
-    laws : ndarray of records, shape (C,)
-        Constants of the model.
+    Sections of engagements that are `behind` are at step `elapsed` - 1 and are moved to step `elapsed`. Those that are
+    `measured` are cut by an angle, `alpha` of shape (C, B), rad, and summarised; those that are `stale` are summarised.
+    `event` is the number of the measurement, -1 without one. `heights_wanted` writes the least and the greatest z of
+    all sections.
     """
     deaths = 0
     labels, living = sections.labels, sections.living
@@ -333,21 +319,9 @@ def make_room_all(
 ) -> tuple[int, int]:
     """Compute the room that the living sections of the active engagements need; with `widen`, enlarge their rings.
 
-    Parameters
-    ----------
-    added : int
-        Number of vertices that every section must be able to gain.
-    active, elapsed, sections, laws, points
-        Engagements, present step, sections, constants of the model, and working array.
-    widen : bool
-        Whether to enlarge rings, for which memory must be allocated, and to reduce sections of `CAPACITY` vertices.
-
-    Returns
-    -------
-    floats : int
-        Number of floats by which the rings are too small.
-    spare : int
-        Number of vertices that every section may gain; negative if a section must be reduced first.
+    Every section must be able to gain `added` vertices. Return the number of floats by which the rings are too small,
+    for which memory must be allocated, and the number of vertices that every section may gain; it is negative if a
+    section must be reduced first, which `widen` does for those of `CAPACITY` vertices.
     """
     labels, used, living = sections.labels, sections.used, sections.living
     records, rings = sections.records, sections.rings
@@ -377,22 +351,12 @@ def make_room_all(
 
 @entry
 def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends: Floats) -> None:
-    """Write the predicted-miss interval of each engagement along each axis.
+    """Write the predicted-miss interval of each engagement along each axis, and whether it has a living section.
 
-    Parameters
-    ----------
-    elapsed : int
-        Present step.
-    exists : ndarray of bool, shape (B,)
-        Whether the engagement has a living section.
-    ends : ndarray, shape (C, B, 2, 4)
-        For the lower and the upper end: the predicted miss, m, and alpha, rad, omega, rad/s, and range, m, of a state
-        that reaches it. Not written for engagements without a living section.
-
-    Notes
-    -----
-    An extreme is usually reached on a whole edge. The lowest point is taken for the upper end and the highest for the
-    lower end, so that a mirrored engagement gives exactly mirrored results.
+    `ends`, shape (C, B, 2, 4), has for the lower and the upper end the predicted miss, m, and alpha, rad, omega, rad/s,
+    and range, m, of a state that reaches it; it is not written for engagements without a living section. An extreme is
+    usually reached on a whole edge. The lowest point is taken for the upper end and the highest for the lower end, so
+    that a mirrored engagement gives exactly mirrored results.
     """
     labels, used, living = sections.labels, sections.used, sections.living
     records, rings = sections.records, sections.rings

@@ -37,8 +37,6 @@ class SectionStack:
 
     Parameters
     ----------
-    laws : tuple of SectionLaw
-        Constants of the model for each axis.
     labels : ndarray, shape (B, S)
         Label of each slot, m; the slots in use are first, with increasing labels.
     used : ndarray of int, shape (B,)
@@ -196,8 +194,6 @@ class SectionStack:
     def predict(self, active: Flags, elapsed: int) -> None:
         """Move the living sections to step `elapsed`.
 
-        Notes
-        -----
         The move is postponed to the next measurement or query, so that one pass over the memory does both.
         """
         self._catch_up()
@@ -219,10 +215,7 @@ class SectionStack:
     def widest(self, elapsed: int, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
         """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`.
 
-        Parameters
-        ----------
-        pending : sequence of (float, ndarray)
-            Later impulses that count as given: time from now, s, and impulse, m/s, shape (C, B).
+        `pending` are later impulses that count as given: time from now, s, and impulse, m/s, shape (C, B).
         """
         self._summarise(Freshness.SUMMARISED)
         exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((len(self.laws), self.batch, 2, 4))

@@ -19,18 +19,10 @@ def is_crowded(right: Chain, left: Chain) -> bool:
 def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points: Floats) -> None:
     """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
 
-    Parameters
-    ----------
-    tau : float
-        Time to go, s.
-    points : ndarray, shape (2 CAPACITY + 4, 2)
-        Working array.
-
-    Notes
-    -----
     An edge is removed by extending its neighbours to their intersection; the edge that adds the least area is removed
     first, at O(CAPACITY) per edge. Vertices that are not convex because of rounding are removed before. If no edge can
-    be removed, three sides of a box around the chain replace it.
+    be removed, three sides of a box around the chain replace it. `points`, shape (2 CAPACITY + 4, 2), is a working
+    array.
     """
     in_right, in_left = right.end - right.begin, left.end - left.begin
     longer, sign = (right, 1.0) if in_right > in_left else (left, -1.0)
@@ -72,8 +64,6 @@ def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
 def outline(right: Chain, left: Chain, rings: Floats, tau: float, out: Floats) -> int:
     """Write the vertices (V, z), counter-clockwise; return their number, at most CAPACITY.
 
-    Notes
-    -----
     A point in which the chains meet is stored in both, equal to within rounding. It is written once.
     """
     made = ZERO
@@ -108,8 +98,6 @@ def cut_misses(
 ) -> tuple[bool, float]:
     """Intersect a section with the band lower <= m + V tilt <= upper; returns are those of `chain_steps.cut`.
 
-    Notes
-    -----
     This band is not parallel to the level, so that it may cut any edge: the chains are computed anew. O(vertices).
     `points` is a working array of CAPACITY + 2 vertices.
     """
