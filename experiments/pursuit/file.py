@@ -212,7 +212,7 @@ def _check_orbits(known: Known) -> Iterator[Problem]:
 
 
 def _start(known: Known, name: str, mu_si: float) -> tuple[ArrayLike, ArrayLike] | None:
-    """Return position and velocity of a player in SI, or None if a value is not sound."""
+    """Return position and velocity of a player in SI, or None if a value is invalid."""
     table = known.document.get(name)
     if not isinstance(table, dict):
         return None

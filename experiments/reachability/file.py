@@ -189,7 +189,7 @@ def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str
     """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
     tables = load_tables(FORM, name_or_path, settings)
     try:
-        return _rendezvous(tables, os.fspath(name_or_path))
+        return _rendezvous(tables)
     except InadmissibleStartError as error:
         violated = "; ".join(f"{name} by {excess:.6g}" for name, excess in error.broken)
         raise InputError(
@@ -249,7 +249,7 @@ def _size_problems(known: Known) -> Iterator[Problem]:
 
 
 def _numbers(value: object) -> list[float]:
-    """Return the numbers of a sound value: one number, or an array."""
+    """Return the numbers of a valid value: one number, or an array."""
     return [float(str(number)) for number in (value if isinstance(value, list) else [value])]
 
 
@@ -287,7 +287,7 @@ def _keep_in_problems(known: Known) -> Iterator[Problem]:
 FORM = problem_form(KIND, ReachabilityTables, _checks)
 
 
-def _rendezvous(tables: ReachabilityTables, source: str) -> Rendezvous:
+def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
     orbit = EllipticOrbit.of_size(
         *tables.orbit.si_numbers(
             "semi_major_axis_km", "eccentricity", "gravitational_parameter_m3_s2", "true_anomaly_deg"
@@ -319,7 +319,7 @@ def _rendezvous(tables: ReachabilityTables, source: str) -> Rendezvous:
     navigation = tables.navigation
     return Rendezvous(
         tables,
-        source,
+        tables.name,
         problem,
         motion,
         NonlinearMotion(orbit, tables.orbit.si("semi_major_axis_km")),
