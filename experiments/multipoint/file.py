@@ -12,13 +12,7 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError, input_errors
-from experiments.common.problem_file import (
-    ProblemTables,
-    ReadProblem,
-    angle_problems,
-    duplicate_names,
-    problem_form,
-)
+from experiments.common.problem_file import ProblemTables, ReadProblem, angle_problems, duplicate_names, problem_form
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import KeyPath, Known, Problem
 from experiments.common.toml_values import (

@@ -14,19 +14,7 @@ from experiments.common.errors import InputError
 from experiments.common.problem_file import ProblemTables, ReadProblem, problem_form
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
-from experiments.common.toml_values import (
-    NUMBER,
-    ZERO,
-    Items,
-    Line,
-    Name,
-    Number,
-    Positive,
-    Table,
-    Whole,
-    key,
-    wrong,
-)
+from experiments.common.toml_values import NUMBER, ZERO, Items, Line, Name, Number, Positive, Table, Whole, key, wrong
 from experiments.observer.command import MOST_STEPS
 from infoset import ConvexPolygons, LinearObserver, Zonotope
 from infoset.arrays import Floats

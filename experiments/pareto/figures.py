@@ -12,16 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from scipy.spatial import ConvexHull, QhullError
 
 from experiments.common.display_units import length_unit
-from experiments.common.figure_style import (
-    INK,
-    LIMIT,
-    LINE_LOOKS,
-    SET_EDGE,
-    SET_FILL,
-    figure_grid,
-    new_figure,
-    style,
-)
+from experiments.common.figure_style import INK, LIMIT, LINE_LOOKS, SET_EDGE, SET_FILL, figure_grid, new_figure, style
 from infoset.arrays import Floats
 from rendezvous.pareto import (
     Coalitions,
@@ -46,13 +37,7 @@ _CHOICES = {
     "preferred": ("h", "nearest to the preferred meeting"),
 }
 _MOST_NAMED = 8
-_MEETING: dict[str, Any] = {
-    "label": "meeting",
-    "marker": "*",
-    "markersize": 9.0,
-    "color": INK,
-    "linestyle": "none",
-}
+_MEETING: dict[str, Any] = {"label": "meeting", "marker": "*", "markersize": 9.0, "color": INK, "linestyle": "none"}
 _HOLLOW: dict[str, Any] = {"linestyle": "none", "color": "white", "markeredgecolor": INK}
 _DOTTED: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (2, 2))}
 _COST = "m$^2$/s$^3$"

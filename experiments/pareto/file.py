@@ -11,13 +11,7 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import input_errors
-from experiments.common.problem_file import (
-    ProblemTables,
-    ReadProblem,
-    angle_problems,
-    duplicate_names,
-    problem_form,
-)
+from experiments.common.problem_file import ProblemTables, ReadProblem, angle_problems, duplicate_names, problem_form
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
@@ -87,9 +81,7 @@ class ParetoTables(ProblemTables):
         "free components of the meeting, of x, y, z, vx, vy, vz", '["y", "z"]'
     )
     meet: Meeting = key(
-        '"rendezvous", or "intercept" (the same position, any velocities)',
-        '"rendezvous"',
-        default=Meeting.RENDEZVOUS,
+        '"rendezvous", or "intercept" (the same position, any velocities)', '"rendezvous"', default=Meeting.RENDEZVOUS
     )
     greatest_control_m_s2: Positive | None = key(
         "bound on each craft's control; without this key: none", "20.0", default=None

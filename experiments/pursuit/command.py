@@ -49,12 +49,10 @@ class Pursuit(FileOptions):
     ] = None
     delay_s: Annotated[float, typer.Option(metavar="S", min=0.0, help="Delay of the pursuer's observation, s.")] = 0.0
     position_noise_m: Annotated[
-        float,
-        typer.Option(metavar="M", min=0.0, help="Standard deviation of each observed position component, m."),
+        float, typer.Option(metavar="M", min=0.0, help="Standard deviation of each observed position component, m.")
     ] = 0.0
     velocity_noise_m_s: Annotated[
-        float,
-        typer.Option(metavar="M/S", min=0.0, help="Standard deviation of each observed velocity component, m/s."),
+        float, typer.Option(metavar="M/S", min=0.0, help="Standard deviation of each observed velocity component, m/s.")
     ] = 0.0
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Number of simulations with feedback.")] = 1
     seed: Seed = 0

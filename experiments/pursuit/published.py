@@ -10,12 +10,7 @@ import numpy as np
 from experiments.common.display_units import M_PER_KM
 from experiments.common.published_number import COMPUTED, Origin, Progress, PublishedNumber, Reference, Reproduction
 from experiments.pursuit.file import load_pursuit
-from rendezvous.linear_game import (
-    Thruster,
-    circular_orbit_capture,
-    free_space_capture,
-    mass_loss_capture,
-)
+from rendezvous.linear_game import Thruster, circular_orbit_capture, free_space_capture, mass_loss_capture
 from rendezvous.pursuit_evasion import Capture, Game, Gravity, Player, Policy, Solution, certify, fly, solve
 
 PAPER = "pursuit"

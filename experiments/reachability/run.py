@@ -159,11 +159,7 @@ def _published_table(comparisons: Sequence[Comparison]) -> Table:
     )
     table = number_table("paper", "our control", *titles, left=2)
     for comparison in comparisons:
-        misses = (
-            comparison.table.nonlinear_miss,
-            comparison.printed.nonlinear_miss,
-            comparison.ours.nonlinear_miss,
-        )
+        misses = (comparison.table.nonlinear_miss, comparison.printed.nonlinear_miss, comparison.ours.nonlinear_miss)
         row = [f"{comparison.largest_difference:.5f}", *(f"{miss:.4g}" for miss in misses)]
         table.add_row(f"table {comparison.table.number}", comparison.table.ours, *row)
     return table

@@ -11,13 +11,7 @@ from rendezvous.pareto.feasibility import (
     peak_control,
     total_impulse,
 )
-from rendezvous.pareto.front import (
-    ParetoSet,
-    distances,
-    front_of_two,
-    pareto_set,
-    simplex_weights,
-)
+from rendezvous.pareto.front import ParetoSet, distances, front_of_two, pareto_set, simplex_weights
 from rendezvous.pareto.selections import NotOptimalError, least_greatest_excess, least_sum_of_costs, nearest_to
 from rendezvous.pareto.solution import (
     CraftCost,

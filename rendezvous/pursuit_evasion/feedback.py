@@ -157,12 +157,7 @@ class _Pursuit:
     """One pursuit in progress, nondimensional."""
 
     def __init__(
-        self,
-        game: Game,
-        units: Units,
-        steering: Steering | None,
-        observation: Observation,
-        random: np.random.Generator,
+        self, game: Game, units: Units, steering: Steering | None, observation: Observation, random: np.random.Generator
     ) -> None:
         self._units, self._steering, self._observation, self._random = units, steering, observation, random
         scaled = scaled_game(game, units)

@@ -60,11 +60,7 @@ class Lifted:
     def only(self, kept: Places) -> Lifted:
         """Return the set with some of its rows."""
         return replace(
-            self,
-            rows=self.rows[kept],
-            limits=self.limits[kept],
-            moments=self.moments[kept],
-            labels=self.labels[kept],
+            self, rows=self.rows[kept], limits=self.limits[kept], moments=self.moments[kept], labels=self.labels[kept]
         )
 
     def where(self, equal: Floats, levels: Floats) -> Lifted:

@@ -51,11 +51,7 @@ def discretised(
 
 
 def between_periods(
-    motion: ConstantMotion | TschaunerHempel,
-    periods: int,
-    period_s: float,
-    acceleration_m_s2: float,
-    instants: int,
+    motion: ConstantMotion | TschaunerHempel, periods: int, period_s: float, acceleration_m_s2: float, instants: int
 ) -> Floats:
     """Return the matrices of states within the periods, x = matrix (x(t), u(t)), shape (periods, instants, 6, 9).
 
