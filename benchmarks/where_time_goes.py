@@ -66,7 +66,7 @@ class Clock:
 
         def part(behind: Any, measured: Any, _stale: Any, _heights: Any, *others: Any) -> str:
             sections = others[3]
-            self.section_steps += int((sections.living & (measured | behind)[:, None]).sum())
+            self.section_steps += int((sections.slots["living"] & (measured | behind)[:, None]).sum())
             return SECTION_STEPS
 
         return self.timed(part, work)
@@ -93,7 +93,7 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
     while flight.flying:
         flight.advance()
         sections = flight._information._state.stack.sections
-        records = sections.records.reshape(-1, 2)[sections.living.ravel()]
+        records = sections.records.reshape(-1, 2)[sections.slots["living"].ravel()]
         if len(records):
             count = (records["end"] - records["begin"]).sum(axis=1)
             means.append(float(count.mean()))

@@ -235,7 +235,7 @@ def bound_leaving_all(
     With rates, a window of labels is halved while its bound is loose, since the bands that are convex on a window are
     wider on a wider window. `floor` is the bound of the labels that have arrived: Phi is no less.
     """
-    stored, used, living, windows = sections.labels, sections.used, sections.living, room.windows
+    slots, used, windows = sections.slots, sections.used, room.windows
     for b in range(active.shape[0]):
         made[b] = 0
         if not active[b] or lower[b] >= upper[b]:
@@ -249,8 +249,8 @@ def bound_leaving_all(
             near, far = windows[count].near, windows[count].far
             known = near - 1.0
             for s in range(used[b]):
-                if living[b, s] and near <= stored[b, s] <= far:
-                    known = stored[b, s]
+                if slots[b, s].living and near <= slots[b, s].label <= far:
+                    known = slots[b, s].label
             window, middle = tape, 0.5 * (near + far)
             may_halve = errors is not None and MOST_LEAVING_WINDOWS * (far - near) > 1.5 * (upper[b] - lower[b])
             if errors is not None:

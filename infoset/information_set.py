@@ -361,10 +361,10 @@ class InformationSet(InformationSetView):
             history.retract(event, empty)
         history.record(section_life.WIDENING, applies=empty)
         # The sections that this measurement emptied live again; the refinement below recomputes their polygons.
-        sections = state.stack.sections
-        stored = np.arange(sections.labels.shape[1]) < sections.used[:, None]
-        killed = (sections.died == section_life.ALIVE) | (sections.died == (-1 if event is None else event))
-        sections.living[empty] = (stored & killed)[empty]
+        slots = state.stack.sections.slots
+        stored = np.arange(slots.shape[1]) < state.stack.sections.used[:, None]
+        killed = (slots["died"] == section_life.ALIVE) | (slots["died"] == (-1 if event is None else event))
+        slots["living"][empty] = (stored & killed)[empty]
         state.lower_label[empty], state.upper_label[empty] = lower[empty], upper[empty]
         state.status[empty] = SetStatus.TRACKING.value
         state.refine(empty, 2 * self.model.fewest_sections + 1)
@@ -373,10 +373,9 @@ class InformationSet(InformationSetView):
     def _nearest_to_living(self, b: int, event: int | None, lower: float, upper: float) -> float:
         """Label, m, whose section was closest to the band of a measurement that emptied the set."""
         state, sections = self._state, self._state.stack.sections
-        used = sections.used[b]
-        killed = sections.died[b, :used] == event
+        slots = sections.slots[b, : sections.used[b]]
+        killed = slots["died"] == event
         if event is not None and killed.any():
-            overlaps = np.where(killed, sections.overlaps[b, :used], -np.inf)
-            return float(sections.labels[b, overlaps.argmax()])
+            return float(slots["label"][np.where(killed, slots["overlap"], -np.inf).argmax()])
         middle = 0.5 * (state.lower_label[b] + state.upper_label[b])
         return float(min(max(middle, lower), upper))

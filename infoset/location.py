@@ -226,15 +226,16 @@ def locate_living(
         return none_lives
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
     # The limits, and the stored labels between them.
-    labels, alive, stored, known = sections.labels, sections.living, sections.used[b], room.known
+    slots, stored, known = sections.slots, sections.used[b], room.known
     end = 1
     first = last = 0
     for s in range(stored):
-        if limit_below < labels[b, s] < limit_above:
+        slot = slots[b, s]
+        if limit_below < slot.label < limit_above:
             new = known[end]
-            new.label, new.overlap, new.emptied = labels[b, s], sections.overlaps[b, s], sections.emptied[b, s]
-            new.died = ALIVE if alive[b, s] else sections.died[b, s]
-            if alive[b, s]:
+            new.label, new.overlap, new.emptied = slot.label, slot.overlap, slot.emptied
+            new.died = ALIVE if slot.living else slot.died
+            if slot.living:
                 first = first if last > 0 else end
                 last = end
             end += 1
@@ -266,10 +267,11 @@ def locate_living(
                 return none_lives
             below, above = limit_below, limit_above
             for s in range(stored):
-                if below < labels[b, s] < label:
-                    below = labels[b, s]
-                elif label < labels[b, s] < above:
-                    above = labels[b, s]
+                stored_label = slots[b, s].label
+                if below < stored_label < label:
+                    below = stored_label
+                elif label < stored_label < above:
+                    above = stored_label
             known[1].label = label
             if probe(known, FIRST, below, tape, errors, laws, room.replays):
                 keep_section(room.replays, LOWER)
@@ -317,15 +319,15 @@ def refine_all(
     rises with range in the paper's model.
     """
     spare = CAPACITY
-    labels, used, alive, died = sections.labels, sections.used, sections.living, sections.died
-    overlaps, summaries = sections.overlaps, sections.summaries
+    slots, used, summaries = sections.slots, sections.used, sections.summaries
     records, rings, new = sections.records, sections.rings, room.replays
-    for b in range(labels.shape[0]):
+    for b in range(len(used)):
         if not wanted[b]:
             continue
         tape = tape_of(tapes, b, room.replays.values, room.replays.applies)
         living = locate_living(b, limit_below[b], limit_above[b], sections, tape, errors, laws, room)
-        alive[b, : used[b]] = False
+        for s in range(used[b]):
+            slots[b, s].living = False
         if not living.exists:
             continue
         if errors is None and is_convex(laws):
@@ -337,17 +339,17 @@ def refine_all(
             label = living.lower + share * (living.upper - living.lower)
             if s > 0 and s == number - 1:
                 label = living.upper
-            labels[b, s] = label
-            row = PROBE
+            slot, row = slots[b, s], PROBE
+            slot.label = label
             if number > 1 and (s == 0 or s == number - 1):
                 row = LOWER if s == 0 else UPPER
-                died[b, s], overlaps[b, s] = ALIVE, 0.0
+                slot.died, slot.overlap = ALIVE, 0.0
             else:
-                died[b, s], overlaps[b, s], sections.emptied[b, s] = run(label, tape, errors, laws, room.replays)
-            alive[b, s] = died[b, s] == ALIVE
-            if alive[b, s]:
+                slot.died, slot.overlap, slot.emptied = run(label, tape, errors, laws, room.replays)
+            slot.living = slot.died == ALIVE
+            if slot.living:
                 for channel in range(laws.shape[0]):
-                    n, at = row_of(labels, channel, b, s), ROWS * channel + row
+                    n, at = row_of(sections, channel, b, s), ROWS * channel + row
                     copy_section(new.records, new.rings, at, records, rings, n)
                     right, left = chains_of(records, n)
                     summarise_section(right, left, rings, label, elapsed, law_of(laws, channel), summaries, b, s)

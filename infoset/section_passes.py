@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from infoset import chain_steps, chains, whole_chains
-from infoset._compile import ZERO, allocation_free, by_reference, entry, inlined
+from infoset._compile import ZERO, allocation_free, by_reference, entry, inlined, record_of
 from infoset.arrays import Flags, Floats, Integers
 from infoset.history import Tapes
 from infoset.section_law import Laws, SectionLaw, law_of
@@ -37,6 +38,31 @@ from infoset.section_life import (
 TIE_TOLERANCE = 1e-9
 
 
+class Slot(Protocol):
+    """Record of a slot.
+
+    Parameters
+    ----------
+    label : float
+        Label, m.
+    living : bool
+        Whether the slot contains sections that are not empty.
+    died : int
+        Number of the event that made a section empty, or ALIVE.
+    overlap : float
+        Overlap of an empty section with the band that made it empty, m: negative. The least one if several became empty
+        at that event.
+    emptied : int
+        Axis of the section with that overlap.
+    """
+
+    label: float
+    living: bool
+    died: int
+    overlap: float
+    emptied: int
+
+
 @by_reference
 class Sections(NamedTuple):
     """B engagements x S slots for one section each, in the plane of each of C lateral axes.
@@ -45,19 +71,10 @@ class Sections(NamedTuple):
 
     Parameters
     ----------
-    labels : ndarray, shape (B, S)
-        Label of each slot, m; the slots in use are first, with increasing labels.
+    slots : ndarray of `Slot`, shape (B, S)
+        The slots in use are first, with increasing labels.
     used : ndarray of int, shape (B,)
         Number of slots in use.
-    living : ndarray of bool, shape (B, S)
-        Whether the slot contains sections that are not empty.
-    died : ndarray of int, shape (B, S)
-        Number of the event that made a section empty, or ALIVE.
-    overlaps : ndarray, shape (B, S)
-        Overlap of an empty section with the band that made it empty, m: negative. The least one if several became
-        empty at that event.
-    emptied : ndarray of int, shape (B, S)
-        Axis of the section with that overlap.
     records, rings : ndarray
         The polygons, stored as in `chains`: slot s of engagement b is section (c B + b) S + s for axis c.
     summaries : ndarray, shape (C, B, S, columns)
@@ -66,12 +83,8 @@ class Sections(NamedTuple):
         Working array for a list of sections: row, engagement and slot.
     """
 
-    labels: Floats
+    slots: NDArray[np.record]
     used: Integers
-    living: Flags
-    died: Integers
-    overlaps: Floats
-    emptied: Integers
     records: chains.Records
     rings: Floats
     summaries: Floats
@@ -80,40 +93,37 @@ class Sections(NamedTuple):
 
 def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections:
     """Allocate the arrays of a batch of sections for a number of axes."""
-    shape = labels.shape
+    slots = np.zeros(labels.shape, dtype=record_of(Slot))
+    slots["label"], slots["died"] = labels, ALIVE
     records, rings = chains.empty_sections(channels * labels.size, chains.ROOM_AT_START)
     return Sections(
-        labels=labels,
+        slots=slots,
         used=used,
-        living=np.zeros(shape, dtype=bool),
-        died=np.full(shape, ALIVE, dtype=np.int64),
-        overlaps=np.zeros(shape),
-        emptied=np.zeros(shape, dtype=np.int64),
         records=records,
         rings=rings,
-        summaries=np.zeros((channels, *shape, SUMMARY_COLUMNS)),
+        summaries=np.zeros((channels, *labels.shape, SUMMARY_COLUMNS)),
         rows=np.empty((labels.size, 3), dtype=np.int64),
     )
 
 
 @inlined
-def row_of(labels: Floats, channel: int, b: int, s: int) -> int:
+def row_of(sections: Sections, channel: int, b: int, s: int) -> int:
     """Row of a section among the polygons."""
-    return int((channel * labels.shape[0] + b) * labels.shape[1] + s)
+    return int((channel * sections.slots.shape[0] + b) * sections.slots.shape[1] + s)
 
 
 @entry
 def start_all(sections: Sections, laws: Laws) -> None:
     """Write the initial sections of a batch, without their summaries."""
-    labels, used, living = sections.labels, sections.used, sections.living
+    slots, used = sections.slots, sections.used
     records, rings = sections.records, sections.rings
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
-        for b in range(labels.shape[0]):
+        for b in range(len(used)):
             for s in range(used[b]):
-                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
-                start_section(right, left, rings, labels[b, s], law)
-                living[b, s] = True
+                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
+                start_section(right, left, rings, slots[b, s].label, law)
+                slots[b, s].living = True
 
 
 @inlined
@@ -122,17 +132,19 @@ def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool
 
     The overlap of a label that an event makes empty is the least one of its axes, whatever their order.
     """
-    return bool(sections.living[b, s] or (channel > 0 and sections.died[b, s] == event))
+    slot = sections.slots[b, s]
+    return bool(slot.living or (channel > 0 and slot.died == event))
 
 
 @inlined
-def bury(sections: Sections, channel: int, event: int, b: int, s: int, overlap: float) -> int:
+def bury(slot: Slot, channel: int, event: int, overlap: float) -> int:
     """Note that an event has made a section empty; return 1 if the label lived until now, else 0."""
-    lived = sections.living[b, s]
-    if lived or overlap < sections.overlaps[b, s]:
-        sections.overlaps[b, s], sections.emptied[b, s] = overlap, channel
-    sections.living[b, s] = False
-    sections.died[b, s] = event
+    lived = slot.living
+    if lived or overlap < slot.overlap:
+        slot.overlap = overlap
+        slot.emptied = channel
+    slot.living = False
+    slot.died = event
     return 1 if lived else 0
 
 
@@ -141,13 +153,13 @@ def list_rows(
     channel: int, event: int, first: Flags, second: Flags, third: Flags, every: bool, sections: Sections
 ) -> int:
     """List the sections of an axis in any of three groups of engagements, or in all; return their number."""
-    used, labels, rows = sections.used, sections.labels, sections.rows
+    used, rows = sections.used, sections.rows
     count = 0
-    for b in range(labels.shape[0]):
+    for b in range(len(used)):
         if first[b] or second[b] or third[b] or every:
             for s in range(used[b]):
                 if is_cut(sections, channel, event, b, s):
-                    rows[count, 0], rows[count, 1], rows[count, 2] = row_of(labels, channel, b, s), b, s
+                    rows[count, 0], rows[count, 1], rows[count, 2] = row_of(sections, channel, b, s), b, s
                     count += 1
     return count
 
@@ -172,33 +184,33 @@ def step_all(
     all sections.
     """
     deaths = 0
-    labels, living = sections.labels, sections.living
-    summaries, rows = sections.summaries, sections.rows
+    slots, summaries, rows = sections.slots, sections.summaries, sections.rows
     records, rings = sections.records, sections.rings
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         count = list_rows(channel, event, behind, measured, stale, heights_wanted, sections)
         for k in range(count):
             b, s = rows[k, 1], rows[k, 2]
+            slot = slots[b, s]
             right, left = chains.chains_of(records, rows[k, 0])
             if k + 1 < count:
                 next_right, next_left = chains.chains_of(records, rows[k + 1, 0])
                 chains.expect(next_right, next_left, rings)
             if behind[b]:
-                predict_section(right, left, rings, labels[b, s], elapsed, law)
+                predict_section(right, left, rings, slot.label, elapsed, law)
             if measured[b]:
                 across = alpha[law.other, b] if law.other >= 0 else 0.0
                 survives, overlap = measure_section(
-                    right, left, rings, labels[b, s], elapsed, alpha[channel, b], across, law
+                    right, left, rings, slot.label, elapsed, alpha[channel, b], across, law
                 )
                 if not survives:
-                    deaths += bury(sections, channel, event, b, s, overlap)
-                if not living[b, s]:
+                    deaths += bury(slot, channel, event, overlap)
+                if not slot.living:
                     continue
             if measured[b] or stale[b]:
-                summarise_section(right, left, rings, labels[b, s], elapsed, law, summaries, b, s)
+                summarise_section(right, left, rings, slot.label, elapsed, law, summaries, b, s)
             if heights_wanted:
-                tau = time_to_go(labels[b, s], elapsed, law)
+                tau = time_to_go(slot.label, elapsed, law)
                 least, greatest = chain_steps.heights(right, left, rings, tau)
                 summaries[channel, b, s, Z_LEAST] = least
                 summaries[channel, b, s, Z_GREATEST] = greatest
@@ -259,17 +271,18 @@ def measure_rate_all(
     `omega` has the shape (C, B); `sights` contains the last sights after `done` events and is updated.
     """
     deaths = 0
-    labels, used, living = sections.labels, sections.used, sections.living
+    slots, used = sections.slots, sections.used
     records, rings = sections.records, sections.rings
-    for b in range(labels.shape[0]):
+    for b in range(len(used)):
         for channel in range(laws.shape[0]):
             law = law_of(laws, channel)
             sight = follow_sight(tapes, done, b, sights, law)
             for s in range(used[b]):
                 if not (active[b] and is_cut(sections, channel, event, b, s)):
                     continue
-                label = labels[b, s]
-                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
+                slot = slots[b, s]
+                label = slot.label
+                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
                 survives, overlap = measure_rate_section(
                     right,
                     left,
@@ -284,8 +297,8 @@ def measure_rate_all(
                     points,
                 )
                 if not survives:
-                    deaths += bury(sections, channel, event, b, s, overlap)
-                if living[b, s]:
+                    deaths += bury(slot, channel, event, overlap)
+                if slot.living:
                     summarise_section(right, left, rings, label, elapsed, law, sections.summaries, b, s)
     return deaths
 
@@ -293,22 +306,23 @@ def measure_rate_all(
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Laws) -> None:
     """Shift the living sections of the active engagements and their summaries by impulses of shape (C, B)."""
-    labels, used, living = sections.labels, sections.used, sections.living
+    slots, used = sections.slots, sections.used
     records, summaries = sections.records, sections.summaries
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
-        for b in range(labels.shape[0]):
+        for b in range(len(used)):
             if not active[b]:
                 continue
             along, across = impulse[channel, b], impulse[law.other, b] if law.other >= 0 else 0.0
             if along == 0.0 and across == 0.0:
                 continue
             for s in range(used[b]):
-                if not living[b, s]:
+                slot = slots[b, s]
+                if not slot.living:
                     continue
-                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
-                shift_section(right, left, labels[b, s], elapsed, along, across, law)
-                tau, error = time_to_go(labels[b, s], elapsed, law), impulse_doubt(along, across, law)
+                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
+                shift_section(right, left, slot.label, elapsed, along, across, law)
+                tau, error = time_to_go(slot.label, elapsed, law), impulse_doubt(along, across, law)
                 summaries[channel, b, s, UPPER_MISS] += (error - along) * tau
                 summaries[channel, b, s, LOWER_MISS] -= (error + along) * tau
 
@@ -323,21 +337,22 @@ def make_room_all(
     for which memory must be allocated, and the number of vertices that every section may gain; it is negative if a
     section must be reduced first, which `widen` does for those of `CAPACITY` vertices.
     """
-    labels, used, living = sections.labels, sections.used, sections.living
+    slots, used = sections.slots, sections.used
     records, rings = sections.records, sections.rings
     floats = ZERO
     spare = chains.CAPACITY
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
-        for b in range(labels.shape[0]):
+        for b in range(len(used)):
             if not active[b]:
                 continue
             for s in range(used[b]):
-                if not living[b, s]:
+                slot = slots[b, s]
+                if not slot.living:
                     continue
-                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
+                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
                 if widen and whole_chains.is_crowded(right, left):
-                    tau = time_to_go(labels[b, s], elapsed, law)
+                    tau = time_to_go(slot.label, elapsed, law)
                     whole_chains.reduce_outward(right, left, rings, tau, points)
                 count, room = chains.count_of(right, left), chains.room_of(right)
                 wanted = chains.room_for(min(count + added, chains.CAPACITY), room)
@@ -358,15 +373,15 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
     usually reached on a whole edge. The lowest point is taken for the upper end and the highest for the lower end, so
     that a mirrored engagement gives exactly mirrored results.
     """
-    labels, used, living = sections.labels, sections.used, sections.living
+    slots, used = sections.slots, sections.used
     records, rings = sections.records, sections.rings
     for channel in range(laws.shape[0]):
         law, summaries = law_of(laws, channel), sections.summaries
-        for b in range(labels.shape[0]):
+        for b in range(len(used)):
             lowest = highest = -1
             for s in range(used[b]):
                 # Only sections of stopped engagements can be at range zero.
-                if not living[b, s] or range_of(labels[b, s], elapsed, law) == 0.0:
+                if not slots[b, s].living or range_of(slots[b, s].label, elapsed, law) == 0.0:
                     continue
                 if lowest < 0 or summaries[channel, b, s, LOWER_MISS] < summaries[channel, b, lowest, LOWER_MISS]:
                     lowest = s
@@ -376,8 +391,8 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
                 continue
             exists[b] = True
             for end, s in ((0, lowest), (1, highest)):
-                tau, x = time_to_go(labels[b, s], elapsed, law), range_of(labels[b, s], elapsed, law)
-                right, left = chains.chains_of(records, row_of(labels, channel, b, s))
+                tau, x = time_to_go(slots[b, s].label, elapsed, law), range_of(slots[b, s].label, elapsed, law)
+                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
                 points = chain_steps.extreme_points(right, left, rings, tau, TIE_TOLERANCE, CUT_SLACK)
                 v, m = points[1 - end]
                 alpha = (m - tau * v) / x

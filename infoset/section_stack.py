@@ -69,17 +69,17 @@ class SectionStack:
     @property
     def batch(self) -> int:
         """Number of engagements B."""
-        return int(self.sections.labels.shape[0])
+        return len(self.sections.used)
 
     @property
     def labels(self) -> Floats:
         """Label of every slot, m, shape (B, S)."""
-        return self.sections.labels
+        return self.sections.slots["label"]
 
     @property
     def living(self) -> Flags:
         """Whether each slot contains a living section, shape (B, S)."""
-        return self.sections.living
+        return self.sections.slots["living"]
 
     @property
     def summaries(self) -> Floats:
@@ -146,7 +146,7 @@ class SectionStack:
         self.least_label = self._least_label()
 
     def _least_label(self) -> float:
-        return float(np.where(self.sections.living, self.sections.labels, np.inf).min())
+        return float(np.where(self.living, self.labels, np.inf).min())
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
         """Cut the living sections by angles of shape (C, B), rad; return the number of labels that became empty."""
@@ -205,11 +205,10 @@ class SectionStack:
 
     def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> tuple[Flags, int]:
         """Remove the living sections with labels outside [least, greatest]; return a mask of them and their number."""
-        sections = self.sections
-        inside = (least[:, None] <= sections.labels) & (sections.labels <= greatest[:, None])
-        used = np.arange(sections.labels.shape[1]) < sections.used[:, None]
-        removed = active[:, None] & used & sections.living & ~inside
-        sections.living[removed] = False
+        inside = (least[:, None] <= self.labels) & (self.labels <= greatest[:, None])
+        used = np.arange(self.labels.shape[1]) < self.sections.used[:, None]
+        removed = active[:, None] & used & self.living & ~inside
+        self.living[removed] = False
         return removed, int(np.count_nonzero(removed))
 
     def widest(self, elapsed: int, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
