@@ -35,12 +35,6 @@ class Report:
         """Whether the measurements contradict the model."""
         return bool(self.inconsistency.step >= 0)
 
-    def inside(self) -> int | None:
-        """Return the number of steps at which the true state is inside; None without a true state."""
-        if self.data.states is None:
-            return None
-        return sum(map(contains, self.estimates, self.data.states))
-
 
 def contains(estimate: Estimate, state: Floats) -> bool:
     """Whether a state is in a set."""
@@ -134,8 +128,8 @@ def report_parts(report: Report) -> Iterator[Part]:
     if report.smoothed is not None:
         yield "the same with later measurements (--smooth):"
         yield _bounds_table(problem.names, report.smoothed)
-    inside = report.inside()
-    if inside is not None:
+    if report.data.states is not None:
+        inside = sum(map(contains, report.estimates, report.data.states))
         yield f"true state inside the set: {inside} of {count} steps"
     if report.contradicted:
         where = report.inconsistency
