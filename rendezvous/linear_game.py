@@ -39,9 +39,13 @@ class LinearGameError(RuntimeError):
 class Thruster:
     """Constant thrust of a craft in free space; mass is that at the start of the game.
 
-    `exhaust_speed_m_s` is the specific impulse times standard gravity. The constructor raises `ValueError` if the
-    thrust is negative, or mass or exhaust speed is not positive. The methods raise it if all the mass is burnt
-    before `time_s`.
+    `exhaust_speed_m_s` is the specific impulse times standard gravity.
+
+    Raises
+    ------
+    ValueError
+        If the thrust is negative, or mass or exhaust speed is not positive. The methods raise ValueError if all the
+        mass is burnt before `time_s`.
     """
 
     thrust_n: float
@@ -93,6 +97,8 @@ class LinearCapture:
     `time_s` is that of the first zero of the gap, and `direction`, shape (3,), is nu, in the axes of the positions.
     `is_grazing` says that the gap comes within the tolerance of zero, but not clearly below it.
 
+    Notes
+    -----
     The gap is the greatest distance that the evader can keep at a time. The search begins at t = 0. Value, slope and a
     bound of the curvature give a lower bound of the gap; a step ends before that bound is zero, so that no contact is
     missed, however short. The tolerance is `CONTACT` times the lengths in the gap: distance and travels. A gap above
@@ -125,8 +131,12 @@ def free_space_capture(
     Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the accelerations are the greatest
     values. The evader escapes if its acceleration is not the smaller one and the players are not on a collision course.
 
-    The first root of |r + v t| = (a_P - a_E) t^2 / 2; nu is along r + v t. Raise `ValueError` if position or velocity
-    are not three finite numbers, or the position is zero.
+    The first root of |r + v t| = (a_P - a_E) t^2 / 2; nu is along r + v t.
+
+    Raises
+    ------
+    ValueError
+        If position or velocity are not three finite numbers, or the position is zero.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     advantage = pursuer_m_s2 - evader_m_s2
@@ -153,8 +163,12 @@ def mass_loss_capture(
     Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the thrusters are as at t = 0.
 
     The first root of |r + v t| = S_P(t) - S_E(t), S the travel of full thrust. The distance is convex; the second
-    derivative of the rest is bounded by S_P'' at the end of a step minus S_E'' at its start. Raise `ValueError` if
-    position or velocity are not three finite numbers, or the position is zero.
+    derivative of the rest is bounded by S_P'' at the end of a step minus S_E'' at its start.
+
+    Raises
+    ------
+    ValueError
+        If position or velocity are not three finite numbers, or the position is zero.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     last = min(pursuer.lasts_s, evader.lasts_s)
@@ -192,8 +206,13 @@ def circular_orbit_capture(
     The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt, a concave
     function of nu with one maximum: the evader's greatest distance at T, as both reachable sets have the same shape.
     With nu fixed it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
-    Raise `ValueError` if position or velocity are not three finite numbers, the position is zero, or the mean motion is
-    not positive, and `LinearGameError` if the greatest distance is not computed to its tolerance.
+
+    Raises
+    ------
+    ValueError
+        If position or velocity are not three finite numbers, the position is zero, or the mean motion is not positive.
+    LinearGameError
+        If the greatest distance is not computed to its tolerance.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     if not rate_rad_s > 0.0:

@@ -280,7 +280,13 @@ class MultipointProblem(ReadProblem[MultipointTables]):
 
 
 def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) -> MultipointProblem:
-    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
+
+    Raises
+    ------
+    InputError
+        If there is no such problem, or it is not sound.
+    """
     tables = load_tables(FORM, name_or_path, settings)
     with input_errors(name_or_path):
         tour = _hill(tables) if tables.axes is Axes.HILL else _inertial(tables)

@@ -220,7 +220,13 @@ class ObserverProblem(ReadProblem[ObserverTables]):
 
 
 def load_observer(name_or_path: str, settings: Sequence[str] | None = None) -> ObserverProblem:
-    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
+
+    Raises
+    ------
+    InputError
+        If there is no such problem, or it is not sound.
+    """
     tables = load_tables(FORM, name_or_path, settings)
     system = tables.system
     a, c = np.array(system.si("A")), np.array(system.si("C"))

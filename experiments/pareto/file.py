@@ -127,7 +127,13 @@ class ParetoProblem(ReadProblem[ParetoTables]):
 
 
 def load_pareto(name_or_path: str, settings: Sequence[str] | None = None) -> ParetoProblem:
-    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
+
+    Raises
+    ------
+    InputError
+        If there is no such problem, or it is not sound.
+    """
     tables = load_tables(FORM, name_or_path, settings)
     motion = ClohessyWiltshire(tables.si("orbit_rate_rad_s"), ORBITAL)
     craft = tuple(

@@ -122,7 +122,13 @@ def thrust_angles(player: PlayerHistory) -> Floats:
 
 @style()
 def draw_distance(solution: Solution) -> Figure:
-    """Draw the distance that the evader can keep against the duration, and the curvature that certifies it."""
+    """Draw the distance that the evader can keep against the duration, and the curvature that certifies it.
+
+    Parameters
+    ----------
+    solution : Solution
+        The solution of a game, with or without a capture.
+    """
     curve = solution.curve
     time, unit = _times(curve.duration_s)
     radius = solution.game.capture_radius_m / M_PER_KM

@@ -231,7 +231,13 @@ FORM = problem_form(KIND, PursuitTables, _checks, [f"{player}.{element}" for pla
 
 
 def load_pursuit(name_or_path: str, settings: Sequence[str] | None = None) -> PursuitProblem:
-    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
+
+    Raises
+    ------
+    InputError
+        If there is no such problem, or it is not sound.
+    """
     return PursuitProblem(load_tables(FORM, name_or_path, settings), name_or_path)
 
 

@@ -49,7 +49,13 @@ def counted(solved: CaptureMap) -> str:
 
 @style()
 def draw_map(solved: CaptureMap, column: str, row: str) -> Figure:
-    """Draw the capture times in hours with contours, over two parameters whose names contain their units."""
+    """Draw the capture times in hours with contours.
+
+    Parameters
+    ----------
+    column, row : str
+        Names of the parameters, with their units.
+    """
     hours = solved.capture_s / S_PER_HOUR
     figure = new_figure(height_mm=95.0, width_mm=150.0)
     has_unknown = any(solved.count(status) for status in _UNKNOWN)

@@ -186,7 +186,13 @@ class Rendezvous(ReadProblem[ReachabilityTables]):
 
 
 def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Rendezvous:
-    """Read a built-in problem or a file, with settings KEY=VALUE; `InputError` if it does not exist or is invalid."""
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
+
+    Raises
+    ------
+    InputError
+        If there is no such problem, or it is not sound.
+    """
     tables = load_tables(FORM, name_or_path, settings)
     try:
         return _rendezvous(tables)

@@ -215,8 +215,12 @@ def _segment_values(motion: TimeVaryingMotion, edges: Floats, start: Floats, cos
 class KeplerTargets(MovingTargets):
     """Targets on ellipses.
 
-    `initial`, shape (n, 6), are their inertial states, m and m/s, at their epochs, `epoch_s`, shape (n,). Raise
-    `ValueError` if there is no target, two have one name, or a number is not finite.
+    `initial`, shape (n, 6), are their inertial states, m and m/s, at their epochs, `epoch_s`, shape (n,).
+
+    Raises
+    ------
+    ValueError
+        If there is no target, two have one name, or a number is not finite.
     """
 
     targets: tuple[Target, ...]
@@ -243,9 +247,15 @@ class KeplerTour(Visits):
     """A chaser and the targets it visits, all under the gravity of one point.
 
     `start_state`, shape (6,), is the chaser's inertial state at t = 0, on an ellipse, m and m/s; epochs of the targets
-    refer to the same time. The constructor raises `ValueError` if the gravitational parameter is not positive, or the
-    start is not finite or not on an ellipse.
+    refer to the same time.
 
+    Raises
+    ------
+    ValueError
+        If the gravitational parameter is not positive, or the start is not finite or not on an ellipse.
+
+    Notes
+    -----
     The combined method of Mironov and Mironov (2007): x' = A(t) x + w(t) + B u with A and w from the last trajectory is
     a linear problem; its solution is the next trajectory. Where they agree, the solution satisfies the maximum
     principle of the nonlinear problem. Far from the coasting orbit the rounds do not converge: there the first
@@ -269,8 +279,11 @@ class KeplerTour(Visits):
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
         """Return a path that satisfies the conditions of least energy; its motion is linear about its trajectory.
 
-        Raise `NotSettledError` if re-linearising fails from the chaser's coasting orbit, and from a trajectory computed
-        by shooting in `order`.
+        Raises
+        ------
+        NotSettledError
+            If re-linearising fails from the chaser's coasting orbit, and from a trajectory computed by shooting in
+            `order`.
         """
         nodes = nodes_of(self.targets, order, time_s)
         check_times(self.start_s, nodes.arrive_s, nodes.leave_s)
@@ -283,8 +296,11 @@ class KeplerTour(Visits):
     def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
         """Return a function of N times that shoots paths of one `order`, from the nearest known one, at first `near`.
 
-        The function raises `NotSettledError` if the targets cannot be followed from the coasting orbit, and
-        `ValueError` if times do not increase.
+        Raises
+        ------
+        NotSettledError
+            By the function, if the targets cannot be followed from the coasting orbit; a ValueError if times do not
+            increase.
         """
         mu = self.targets.gravitational_parameter_m3_s2
         known: list[tuple[Floats, list[Floats]]] = []

@@ -51,9 +51,14 @@ def best_order(
     The search is depth first and starts with the cheapest partial order. The cost of a partial order at its best times
     is a lower bound of the cost of all orders that begin with it, and its times are their initial times. This holds for
     global minima. The computed minima are local, so the result is the best order found: a partial order is discarded
-    only if more starts find no lower minimum, and for Kepler's motion a factor is applied (`ruggedness`). Raise
-    `ValueError` if there are more than 9 targets, or they do not fit before the latest time, and `NotSettledError` if
-    no path is found for any order.
+    only if more starts find no lower minimum, and for Kepler's motion a factor is applied (`ruggedness`).
+
+    Raises
+    ------
+    ValueError
+        If there are more than 9 targets, or they do not fit before the latest time.
+    NotSettledError
+        If no path is found for any order.
     """
     count = _checked_count(tour)
     dwell = tour.dwell_s
@@ -95,8 +100,13 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
 
     Dynamic programming over (visited, last) if every visit is a rendezvous, as a leg's cost then depends on its two
     ends only; otherwise branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
-    Raise `ValueError` if there are more than 9 targets, times do not increase, or no order fits them, and
-    `NotSettledError` if no path is found for any order that fits.
+
+    Raises
+    ------
+    ValueError
+        If there are more than 9 targets, times do not increase, or no order fits them.
+    NotSettledError
+        If no path is found for any order that fits.
     """
     count, times = _checked_count(tour), np.asarray(time_s, dtype=np.float64)
     if times.shape != (count,):

@@ -155,8 +155,14 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     Unknowns are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k,
     with L_k the Cholesky factor of the Gramian, in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose
     normal equations are symmetric positive definite with 3 x 3 blocks on three diagonals. In contrast to R13 in the
-    paper's elimination, no inverted block is singular in a well-posed problem. O(N) time and memory. Raise `ValueError`
-    if times do not increase, and `NotSettledError` if the numbers overflow, or a Gramian is singular in floating point.
+    paper's elimination, no inverted block is singular in a well-posed problem. O(N) time and memory.
+
+    Raises
+    ------
+    ValueError
+        If times do not increase.
+    NotSettledError
+        If the numbers overflow, or a Gramian is singular in floating point.
     """
     starts = np.concatenate([[start_s], nodes.leave_s[:-1]])
     durations = nodes.arrive_s - starts

@@ -48,11 +48,21 @@ class Effort(Enum):
 
 @dataclass(frozen=True)
 class TimeLimits:
-    """Limits of the times: latest end of the last visit, least time between a departure and the next arrival.
+    """Limits of the times.
 
-    `price_per_s` is kappa, m^2/s^4, not negative; kappa times the duration is added to the energy. The constructor
-    raises `ValueError` if nothing limits the last time: the energy then has no minimum, because it decreases to zero as
-    time increases.
+    Parameters
+    ----------
+    latest_s : float or None
+        Latest end of the last visit.
+    least_gap_s : float
+        Least time between a departure and the next arrival.
+    price_per_s : float
+        kappa, m^2/s^4, not negative; kappa times the duration is added to the energy.
+
+    Raises
+    ------
+    ValueError
+        If nothing limits the last time: the energy then has no minimum, because it decreases to zero as time increases.
     """
 
     latest_s: float | None = None
@@ -166,13 +176,32 @@ def optimise_times(
 ) -> BestTimes:
     """Minimise the energy, or energy and price, over the times of N visits in one order.
 
-    `fly` returns the path for N times, all after `start_s`; `dwell_s`, shape (N,), are the durations of the stays.
-    `guesses` are additional initial times, s, of shape (N,); those outside the limits are ignored. A descent stops
-    below the objective `enough`, m^2/s^3. `progress` is called with the share of starts that are followed.
+    Parameters
+    ----------
+    fly : callable
+        Function that returns the path for N times.
+    start_s : float
+        Start of the first segment.
+    dwell_s : ndarray, shape (N,)
+        Duration of the stay with each target.
+    guesses : sequence of ndarray, shape (N,)
+        Additional initial times, s; those outside the limits are ignored.
+    enough : float
+        Objective, m^2/s^3, below which a descent stops.
+    progress : callable or None
+        Called with the share of starts that are followed.
 
-    Raise `NoRoomError` if the visits do not fit before the latest time, `ValueError` if there is no latest time and no
-    guess, and, with the final effort, `NotSettledError` if the conditions of a minimum are not satisfied.
+    Raises
+    ------
+    NoRoomError
+        If the visits do not fit before the latest time.
+    ValueError
+        If there is no latest time and no guess.
+    NotSettledError
+        If the conditions of a minimum are not satisfied; with the final effort only.
 
+    Notes
+    -----
     The problem is not convex. Many starts are evaluated, and the search begins with those that cost no more than their
     neighbours; a lower minimum elsewhere is not excluded. The descent is sequential quadratic programming in the gaps,
     on the logarithm of the objective, with the exact gradient dI/dt; then Newton's method, with differences of the

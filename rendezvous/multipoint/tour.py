@@ -29,7 +29,13 @@ class Meet(Enum):
 
 @dataclass(frozen=True)
 class Target:
-    """A target, with the duration of the stay with it, 0 for a flyby; `ValueError` if it is not finite, or negative."""
+    """A target; `dwell_s` is the duration of the stay with it, coasting, for a rendezvous only.
+
+    Raises
+    ------
+    ValueError
+        If the dwell is negative or not finite, or that of a flyby is not zero.
+    """
 
     name: str
     meet: Meet = Meet.FLYBY
@@ -47,7 +53,10 @@ class Target:
 class MovingTargets(ABC):
     """Targets whose motion is known, with their states at an epoch. They coast in the same dynamics as the chaser.
 
-    The constructor raises `ValueError` if there is no target, two have one name, or a state is not six finite numbers.
+    Raises
+    ------
+    ValueError
+        If there is no target, two have one name, or a state is not six finite numbers.
     """
 
     targets: tuple[Target, ...]
@@ -97,7 +106,13 @@ class DriftingTargets(MovingTargets):
 
 
 class Visits(ABC):
-    """A chaser's start (`start_s`, `start_state`) and its targets; `ValueError` if the start is not finite."""
+    """A chaser's start (`start_s`, `start_state`) and its targets.
+
+    Raises
+    ------
+    ValueError
+        If the start is not finite.
+    """
 
     targets: MovingTargets
     start_state: Floats
@@ -152,8 +167,10 @@ class Tour(Visits):
 def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) -> Nodes:
     """Return the nodes of a path that reaches `targets` in an `order`, first to last, at N times.
 
-    Raise `ValueError` if there is no visit, a target does not exist or is visited twice, or the number of times is not
-    that of visits.
+    Raises
+    ------
+    ValueError
+        If there is no visit, a target does not exist or is visited twice, or the number of times is not that of visits.
     """
     which, times = np.asarray(order), np.asarray(time_s, dtype=np.float64)
     if not len(which) or times.shape != which.shape:

@@ -65,8 +65,12 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     """Analyse every coalition of a `solution`, whose meeting is the best one for the group.
 
     With one M and equal weights c(S) = sum over pairs of d_ij^2 / |S|. c is superadditive with c({i}) = 0, so its core
-    is empty unless all ideals coincide. O(2^n n). Raise `ValueError` if there are more than 12 craft: there are 2^n
-    coalitions.
+    is empty unless all ideals coincide. O(2^n n).
+
+    Raises
+    ------
+    ValueError
+        If there are more than 12 craft: there are 2^n coalitions.
     """
     count = len(solution.costs)
     if count > MOST_CRAFT:

@@ -52,8 +52,12 @@ class Encounter:
 
     `free` lists the free components of the terminal state, at least one; for an intercept of the position only.
     `fixed`, shape (6,), contains the values of the other components, m and m/s; those of free components are ignored.
-    The constructor raises `ValueError` if there is no craft or no free component, a weight is negative or all are zero,
-    a craft starts at the meeting or later, frames differ, names repeat, or a number is not finite.
+
+    Raises
+    ------
+    ValueError
+        If there is no craft or no free component, a weight is negative or all are zero, a craft starts at the meeting
+        or later, frames differ, names repeat, or a number is not finite.
     """
 
     craft: tuple[Craft, ...]

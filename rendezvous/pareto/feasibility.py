@@ -68,8 +68,14 @@ def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck
     """Compare a `plan` with a bound u_max on the control; `common` components, 6 or 3 (an intercept), must be met.
 
     IMPOSSIBLE is certain: the bound is below a lower bound of every control's peak. A bound less than 1e-6 above that
-    counts as possible. Raise `ValueError` if the bound is not positive and finite, and `NotCertifiedError` if the least
-    peak is not computed to 1e-6.
+    counts as possible.
+
+    Raises
+    ------
+    ValueError
+        If the bound is not positive and finite.
+    NotCertifiedError
+        If the least peak is not computed to 1e-6.
     """
     if not (np.isfinite(greatest_m_s2) and greatest_m_s2 > 0.0):
         raise ValueError(f"the bound on the control must be positive and finite, found {greatest_m_s2!r} m/s^2")
@@ -84,8 +90,14 @@ def least_peak(plan: Plan, common: int = 6) -> float:
     """Return a lower bound, m/s^2, of the peak |u| of every control with the effect of a `plan` on `common` components.
 
     A control exists whose peak is at most 1e-6 above it, relative. The common components are 6, or 3 for an intercept.
-    Raise `NotCertifiedError` if this precision is not reached.
 
+    Raises
+    ------
+    NotCertifiedError
+        If this precision is not reached.
+
+    Notes
+    -----
     Krasovskii's problem of moments, by duality: the greatest l'e / int |B' Phi(T, t)' l| dt over directions l, where e
     is the required effect of the control. The effect of the control is whitened by the Gramian, int E E' dt = 1, and e
     is of unit length; Newton's method minimises I(l) = int |E' l| dt on l'e = 1. At its end two bounds are evaluated:

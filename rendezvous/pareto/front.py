@@ -65,7 +65,13 @@ def simplex_weights(craft: int, count: int) -> Floats:
 
 
 def distances(solution: EncounterSolution) -> Floats:
-    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution`, m/s^1.5, shape (n, n); `ValueError` if M differ."""
+    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, shape (n, n).
+
+    Raises
+    ------
+    ValueError
+        If the craft have different M.
+    """
     if not solution.same_matrix:
         raise ValueError("the craft have different cost matrices: there is no one distance between their ideals")
     scaled = solution.ideals @ solution.costs[0].root.T

@@ -120,8 +120,13 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
 
     With one M, or multiples of one, an exact projection onto the convex hull of the ideals; otherwise sequential
     quadratic programming over the weights from the nearest of many meetings of the set, which finds a local minimum.
-    Raise `ValueError` if the preferred values are not f finite numbers, and `NotOptimalError` if the computed point
-    does not satisfy the conditions of the nearest one.
+
+    Raises
+    ------
+    ValueError
+        If the preferred values are not f finite numbers.
+    NotOptimalError
+        If the computed point does not satisfy the conditions of the nearest one.
     """
     preferred = np.asarray(preferred, dtype=np.float64)
     if preferred.shape != solution.point.shape or not np.isfinite(preferred).all():

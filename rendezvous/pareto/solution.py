@@ -81,10 +81,18 @@ class Plan:
 class CraftCost:
     """J^2(p) = J*^2 + (p - p*)' M (p - p*) of one craft.
 
-    `ideal`, shape (f,), is p*, the cheapest free values for this craft alone, and `ideal_cost_squared` is J*^2,
-    m^2/s^3. `root`, shape (f, f), is R, upper triangular, M = R' R, in m/s^1.5 over the units of p. The scaled effort
-    is y(p) = base + slope p, |y|^2 = J^2, with `effort_base`, shape (c,), and `effort_slope`, (c, f); `to_costate`, (6,
-    c), leads from y to the costate at the meeting.
+    Parameters
+    ----------
+    ideal : ndarray, shape (f,)
+        p*: the cheapest free values for this craft alone.
+    ideal_cost_squared : float
+        J*^2, m^2/s^3.
+    root : ndarray, shape (f, f)
+        R, upper triangular, M = R' R; m/s^1.5 over the units of p.
+    effort_base, effort_slope : ndarray, shapes (c,) and (c, f)
+        The scaled effort y(p) = base + slope p, |y|^2 = J^2.
+    to_costate : ndarray, shape (6, c)
+        From y to the costate at the meeting.
     """
 
     craft: Craft
@@ -157,8 +165,12 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
 
     (2.1) to (2.7) of Barseghyan and Stepanyan (2008) for any free components. States are divided by (T, T, T, 1, 1, 1)
     before the Cholesky factor of the Gramian is computed, and the ideal is a least-squares problem of that factor, so
-    J* loses no digits. O(n) small matrices. Raise `ValueError` if the numbers overflow, or a Gramian is singular: the
-    craft's control does not reach all components.
+    J* loses no digits. O(n) small matrices.
+
+    Raises
+    ------
+    ValueError
+        If the numbers overflow, or a Gramian is singular: the craft's control does not reach all components.
     """
     common, opening, base = encounter.common, encounter.opening, encounter.base
     factors: dict[tuple[int, float], tuple[Floats, Floats, Floats]] = {}

@@ -150,7 +150,12 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
 
     The scan looks for a direction that keeps the evader farther away. Cost: 0.3 s for one revolution, and at least 0.5
     s more for the directions. All deviations together take at most twice the work limit of a game; in games of more
-    than six revolutions the last ones may be inconclusive. Raise `ValueError` if there is no capture.
+    than six revolutions the last ones may be inconclusive.
+
+    Raises
+    ------
+    ValueError
+        If there is no capture.
     """
     capture = solution.capture
     if capture is None:

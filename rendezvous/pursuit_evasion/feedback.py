@@ -34,7 +34,12 @@ class Observation:
     """The pursuer's observation of the evader when it plans.
 
     `delay_s` is its age; the pursuer assumes that the evader has been optimal since. The errors are standard deviations
-    of each component. The constructor raises `ValueError` if a value is negative or not finite.
+    of each component.
+
+    Raises
+    ------
+    ValueError
+        If a value is negative or not finite.
     """
 
     delay_s: float = 0.0
@@ -96,10 +101,17 @@ def fly(
 
     `steering` is that of the evader; None is optimal against the true state of the pursuer. No `observation` observes
     the evader exactly; otherwise `seed` is that of its errors. `solution` is that of the game, if it is known.
-    `progress` is called with the fraction of the predicted time that has passed. Raise `ValueError` if the game has no
-    capture and therefore no first plan, or `replan_s` is not positive, and `PathError` if the evader's path cannot be
-    followed.
+    `progress` is called with the fraction of the predicted time that has passed.
 
+    Raises
+    ------
+    ValueError
+        If the game has no capture and therefore no first plan, or `replan_s` is not positive.
+    PathError
+        If the evader's path cannot be followed.
+
+    Notes
+    -----
     Each plan starts Newton's method at the previous one: 2 ms and, for a steered evader, 2 ms of its flight. The last
     leg is simulated without observation. If Newton's method fails from the previous plan, the game is solved from
     scratch; the previous plan is kept if that would take much longer.

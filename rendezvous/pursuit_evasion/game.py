@@ -28,8 +28,12 @@ class Gravity:
 
     `planet_radius_m` is the least allowed distance from the centre; zero for no limit. `j2` is the second zonal
     harmonic, about the z axis, which refers to `equatorial_radius_m`; zero for a sphere. J2 is not in the slides:
-    without it gravity is that of their first equation, -mu r / |r|^3. The constructor raises `ValueError` if the
-    gravitational parameter is not positive, a radius negative, J2 not small, or without its radius.
+    without it gravity is that of their first equation, -mu r / |r|^3.
+
+    Raises
+    ------
+    ValueError
+        If the gravitational parameter is not positive, a radius negative, J2 not small, or without its radius.
     """
 
     parameter_m3_s2: float
@@ -58,9 +62,13 @@ class Player:
     specific impulse has a constant mass.
 
     r' = v, v' = g + (T/m) u, m' = -T/c (Wang's slides, "Modelling of the motion"), c the specific impulse times
-    standard gravity: the slides write the former for c. The constructor raises `ValueError` if position or velocity is
-    not finite, mass or specific impulse not positive, the dry mass negative or not below the mass, or the thrust
-    negative.
+    standard gravity: the slides write the former for c.
+
+    Raises
+    ------
+    ValueError
+        If position or velocity is not finite, mass or specific impulse not positive, the dry mass negative or not below
+        the mass, or the thrust negative.
     """
 
     position_m: Vector
@@ -100,9 +108,13 @@ class Game:
     `capture_radius_m` is the distance that counts as capture; zero for a point. `longest_s` is the longest duration
     considered; infinite for 15 revolutions of the pursuer.
 
-    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture radius is ours. Raise
-    `ValueError` if the pursuer has no thrust, an orbit is not an ellipse or intersects the planet, the distance at the
-    start is within the capture radius, or this radius or the longest duration is out of range.
+    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture radius is ours.
+
+    Raises
+    ------
+    ValueError
+        If the pursuer has no thrust, an orbit is not an ellipse or intersects the planet, the distance at the start is
+        within the capture radius, or this radius or the longest duration is out of range.
     """
 
     gravity: Gravity

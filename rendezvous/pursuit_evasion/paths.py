@@ -152,7 +152,10 @@ class History:
 def history(solution: Solution, count: int = 400) -> History:
     """Sample the capture or the fallback of a `solution` at `count` equally spaced times, from the start to the end.
 
-    Raise `ValueError` if the solution has neither.
+    Raises
+    ------
+    ValueError
+        If the solution has neither.
     """
     capture = solution.capture or solution.fallback
     if capture is None:

@@ -63,12 +63,22 @@ class DistanceCurve:
 class Capture:
     """A capture in which both players are extremal.
 
-    `position_m` is that of the evader. `direction` is nu, along which both players reach the greatest distance; with a
-    capture radius, the direction from the pursuer to the evader. It is that of lambda_rP at the end, which equals
-    -lambda_rE. `closing_speed_m_s` is the speed at which the distance falls. `curvature`, shape (2,), contains the
-    eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending; they are not from
-    the slides. `residual` is the error of the start states and of r_E - r_P = R nu, in units of length and speed: below
-    1e-9. The `extremal`, nondimensional, is an initial guess for similar games.
+    Parameters
+    ----------
+    position_m : ndarray, shape (3,)
+        Position of the evader at the capture time.
+    direction : ndarray, shape (3,)
+        nu, the direction along which both players reach the greatest distance; with a capture radius, the direction
+        from the pursuer to the evader. It is that of lambda_rP at the end, which equals -lambda_rE.
+    closing_speed_m_s : float
+        Speed at which the distance falls.
+    curvature : ndarray, shape (2,)
+        Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending; not from the
+        slides.
+    residual : float
+        Error of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
+    extremal : Node
+        The extremal, nondimensional; an initial guess for similar games.
     """
 
     time_s: float

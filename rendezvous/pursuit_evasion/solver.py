@@ -32,6 +32,8 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     `change_branch` searches for another branch at a fold; each search takes seconds. `all_directions` searches also at
     the capture for a branch that keeps the evader farther away.
 
+    Notes
+    -----
     The game is that of Wang's slides, after Shen and Casalino (2018), who shoot forward from a guess. At each duration
     the evader takes the branch with the greatest distance l; the capture is the first time at which l is the capture
     radius. Cost: 20 to 40 ms per revolution. A capture whose residual is not below 1e-9 is rejected: the verdict is

@@ -43,8 +43,10 @@ class Policy(Enum):
 class Script:
     """A sequence of policies, one for each of the starting times `begin_s`, which increase from 0.
 
-    The constructor raises `ValueError` if there is no policy, their number is not that of the times, or the times do
-    not increase from 0.
+    Raises
+    ------
+    ValueError
+        If there is no policy, their number is not that of the times, or the times do not increase from 0.
     """
 
     begin_s: tuple[float, ...]

@@ -39,8 +39,12 @@ def discretised(
     A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6, 3), is in m and m/s
     for a unit control, of acceleration `acceleration_m_s2`.
 
-    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other. Raise
-    `ValueError` if `periods` is less than 1.
+    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
+
+    Raises
+    ------
+    ValueError
+        If `periods` is less than 1.
     """
     if periods < 1:
         raise ValueError("there must be at least one period")
@@ -92,8 +96,12 @@ class NonlinearMotion:
         """Return the states at `times_s`, shape (k, s, 6), of motion under constant accelerations.
 
         Initial `states` have shape (k, 6), in m and m/s; `accelerations`, in the rotating axes, shape (k, 3), m/s^2;
-        `times_s`, shape (s,), rise and are not before `start_s`. Raise `ArithmeticError` if a path cannot be
-        integrated, for example because it passes too near the centre.
+        `times_s`, shape (s,), rise and are not before `start_s`.
+
+        Raises
+        ------
+        ArithmeticError
+            If a path cannot be integrated, for example because it passes too near the centre.
         """
         initial, push = np.atleast_2d(np.asarray(states, float)), np.atleast_2d(np.asarray(accelerations, float))
         times = np.asarray(times_s, dtype=float)

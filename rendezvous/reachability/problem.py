@@ -36,9 +36,6 @@ class InadmissibleStartError(ValueError):
 class ReachabilityProblem:
     """Minimise |x(T)| for x(t+1) = A(t) x(t) + B(t) u(t) from x(0), and find all minimising controls.
 
-    The constructor raises `ValueError` if shapes do not fit, a number is not finite, a bound is not positive, or there
-    is no period, and `InadmissibleStartError` if x(0) breaks a constraint.
-
     Parameters
     ----------
     transition : ndarray, shape (T, n, n)
@@ -63,6 +60,13 @@ class ReachabilityProblem:
         States within the periods, x = between[t, i] (x(t), u(t)), at which the constraints also apply.
     state_names : tuple of str
         Names of the states in messages.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, a number is not finite, a bound is not positive, or there is no period.
+    InadmissibleStartError
+        If x(0) breaks a constraint.
     """
 
     transition: Floats

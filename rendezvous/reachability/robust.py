@@ -24,11 +24,18 @@ class NoRobustPlanError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class FeedbackPlan:
-    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), for x(t + 1) = A x + B u + disturbance[t] w(t).
+    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), for a problem with a disturbance.
 
-    |w_k(t)| <= 1, and `disturbance`, shape (T, n, q), is in the units of the states. `nominal`, (T, m), are the
-    controls without disturbance and `gains`, (T, T, m, q), their changes by past disturbances, in units of the problem.
-    `lower` and `upper`, (T + 1, n), bound each state over all disturbances: the robust tube.
+    Parameters
+    ----------
+    disturbance : ndarray, shape (T, n, q)
+        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, in the units of the states.
+    nominal : ndarray, shape (T, m)
+        Controls without disturbance, in units of the problem.
+    gains : ndarray, shape (T, T, m, q)
+        Change of the controls by past disturbances, in units of the problem.
+    lower, upper : ndarray, shape (T + 1, n)
+        Bounds of each state over all disturbances: the robust tube.
     """
 
     problem: ReachabilityProblem
@@ -92,9 +99,14 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
 
     With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
     an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
-    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds. Raise
-    `NoRobustPlanError` if no plan satisfies the constraints, and `ValueError` if there are too many periods, or thrust
-    is in a ball.
+    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds.
+
+    Raises
+    ------
+    NoRobustPlanError
+        If no plan satisfies the constraints.
+    ValueError
+        If there are too many periods, or thrust is in a ball.
     """
     _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:

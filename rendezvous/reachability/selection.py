@@ -164,8 +164,12 @@ def _barrier(space: Lifted, point: Floats) -> tuple[float, Floats, Floats]:
 def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
     """Return all vertices of the set of `optimal` controls, shape (v, T, m).
 
-    Raise `TooManyVerticesError` if there are more than `most`, if the set has too many dimensions, or if thrust is in a
-    ball, and `UncertainHullError` if rounding decides which points are vertices.
+    Raises
+    ------
+    TooManyVerticesError
+        If there are more than `most`, if the set has too many dimensions, or if thrust is in a ball.
+    UncertainHullError
+        If rounding decides which points are vertices.
     """
     corners = []
     for part in optimal.blocks:
@@ -201,8 +205,12 @@ def samples(optimal: OptimalControls, count: int, generator: np.random.Generator
     """Draw `count` random members, at least 1, of the set of `optimal` controls, shape (count, T, m).
 
     Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
-    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step. Raise
-    `ValueError` if the count is less than 1.
+    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
+
+    Raises
+    ------
+    ValueError
+        If the count is less than 1.
     """
     if count < 1:
         raise ValueError(f"at least one sample must be drawn, not {count}")

@@ -136,8 +136,14 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
     """Compute the least terminal norm, all controls that attain it, and the forward sets and tube.
 
     No `route` selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
-    and the expected cost is within the `budget`; otherwise the lifted route. Raise `EmptyTubeError` if no control keeps
-    the constraints, and `TooLargeError` or `UncertainHullError` if `route` is the exact route and it is not possible.
+    and the expected cost is within the `budget`; otherwise the lifted route.
+
+    Raises
+    ------
+    EmptyTubeError
+        If no control keeps the constraints.
+    TooLargeError, UncertainHullError
+        If `route` is the exact route and it is not possible.
     """
     optimal = optimal_controls(problem)
     lifted: tuple[BlockSets, ...] = tuple(LiftedSets(optimum) for optimum in optimal.blocks)

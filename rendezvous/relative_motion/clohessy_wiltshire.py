@@ -23,8 +23,12 @@ class ClohessyWiltshire(LinearMotion):
     """Relative motion about a circular orbit, whose mean motion n is `rate_rad_s`.
 
     Barseghyan and Stepanyan (2008), (1.8), X[T, t] and (2.3) corrected. A transition takes about 0.1 microseconds, a
-    Gramian at most 1. The constructor raises `ValueError` if the rate is not positive, or the frame interleaves
-    positions and velocities.
+    Gramian at most 1.
+
+    Raises
+    ------
+    ValueError
+        If the rate is not positive, or the frame interleaves positions and velocities.
     """
 
     rate_rad_s: float

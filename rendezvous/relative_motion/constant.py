@@ -17,9 +17,12 @@ from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durat
 class ConstantMotion(LinearMotion):
     """x' = A x + (0, u)' with a constant `matrix` A, shape (6, 6), in the frame.
 
-    Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it. The
-    constructor raises `ValueError` if A has another shape or is not finite, or the frame interleaves positions and
-    velocities.
+    Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it.
+
+    Raises
+    ------
+    ValueError
+        If A has another shape or is not finite, or the frame interleaves positions and velocities.
     """
 
     matrix: Floats

@@ -19,8 +19,10 @@ _MOST_STEPS = 60
 class EllipticOrbit:
     """An elliptic reference orbit: mean motion n, eccentricity 0 <= e < 1, and true anomaly at t = 0.
 
-    The constructor raises `ValueError` if the mean motion is not positive, the eccentricity outside [0, 1), or the
-    anomaly not finite.
+    Raises
+    ------
+    ValueError
+        If the mean motion is not positive, the eccentricity outside [0, 1), or the anomaly not finite.
     """
 
     mean_motion_rad_s: float

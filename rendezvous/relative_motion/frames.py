@@ -33,7 +33,10 @@ class StateOrder(Enum):
 class Frame:
     """A right-handed rotating frame with its origin on the reference orbit; x, y and z are the directions of its axes.
 
-    The constructor raises `ValueError` if the axes are not right-handed.
+    Raises
+    ------
+    ValueError
+        If the axes are not right-handed.
     """
 
     name: str

@@ -30,8 +30,12 @@ class LinearMotion(ABC):
     """x' = A(t) x + B(t) u + w(t), x = (position, velocity) in a frame; by default B = (0, 1)' and w = 0.
 
     Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front. The
-    `frame` is that of states and controls. The constructor raises `ValueError` if the frame interleaves positions and
-    velocities.
+    `frame` is that of states and controls.
+
+    Raises
+    ------
+    ValueError
+        If the frame interleaves positions and velocities.
     """
 
     frame: Frame = HILL

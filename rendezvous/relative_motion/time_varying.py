@@ -33,10 +33,18 @@ class _Solution(Segment):
 class TimeVaryingMotion(LinearMotion):
     """x' = A(t) x + B(t) u + w(t).
 
-    `matrix_at`, `input_at` and `drift_at` return A, B and w, shapes (k, 6, 6), (k, 6, 3) and (k, 6), at k times, s.
-    Without `input_at` u is an acceleration, B = (0, 1)', and without `drift_at` w is zero. An actuator with the cost u'
-    R u has B = (0, 1)' R^(-1/2), and controls R^(1/2) u.
+    Parameters
+    ----------
+    matrix_at : callable
+        A of times of shape (k,), s: shape (k, 6, 6).
+    input_at : callable or None
+        B, shape (k, 6, 3); None is an acceleration, (0, 1)'. An actuator with the cost u' R u has B = (0, 1)' R^(-1/2),
+        and controls R^(1/2) u.
+    drift_at : callable or None
+        w, shape (k, 6); None is zero.
 
+    Notes
+    -----
     The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
     = Psi(t)' at the nodes gives the Gramian, the held control and the drift as sums of positive weights. Panels are
     doubled until two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
@@ -89,8 +97,12 @@ class TimeVaryingMotion(LinearMotion):
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
 
-        Panels are halved where A at their Gauss points turns by more than a radian over them. Raise `ValueError` if
-        A(t) is not finite, or there are more than 200 000 panels.
+        Panels are halved where A at their Gauss points turns by more than a radian over them.
+
+        Raises
+        ------
+        ValueError
+            If A(t) is not finite, or there are more than 200 000 panels.
         """
         starts, ends = np.array([start_s]), np.array([end_s])
         nodes = _gauss_collocation()[0]

@@ -22,9 +22,6 @@ PACKAGES = (
 RAISES_CHECKED = ("infoset", "guidance", "sim", "rendezvous")
 """Packages in which public functions document the exceptions that they raise."""
 
-SENTENCES_ONLY = ("rendezvous",)
-"""Packages in which public functions may name their exceptions in sentences, without a section Raises."""
-
 WITHOUT_UNITS = (
     *("infoset.ConvexPolygons", "infoset.polytope.", "infoset.Polytope.", "infoset.Zonotope"),
     "infoset.LinearObserver",  # geometry and systems in any unit
@@ -193,7 +190,7 @@ def test_what_is_raised_is_said(package: str) -> None:
     folder = Path(str(importlib.import_module(package).__file__)).parent
     modules = [each.relative_to(folder) for each in sorted(folder.rglob("*.py"))]
     assert modules
-    public = () if package in SENTENCES_ONLY else names_in_the_reference(package)
+    public = names_in_the_reference(package)
     silent = {
         str(each): found
         for each in modules
