@@ -67,8 +67,6 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
 
     None without a cut-off or times of impulses, or with fewer than two images before the last decision.
 
-    Notes
-    -----
     Two motions with the same images differ by at most 2 b along an axis at each image, with the error bound b, m. Let
     this difference be 2 b0 at the last image before the last decision, and 2 b0 - s u + nu u^2 at the time u before it:
     the disturbance nu accelerates the motions apart. It is at least -2 b at all images if s is at most

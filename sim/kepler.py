@@ -197,8 +197,6 @@ class KeplerMotion:
 def longest_substep_s(scenario: Scenario) -> float:
     """Return the length of substeps for which the position has an error of at most 1 mm at arrival, at least 0.5 s.
 
-    Notes
-    -----
     Velocity Verlet with substeps h neglects a' h^3/6 of the position in each substep, where a' is the derivative of the
     acceleration: h^2 T a'/6 over a flight of T, and T^2 h^2 a''/24 by later derivatives. With the distance r of the two
     bodies, which changes at the speed v, and the velocity w of both around the Sun at the distance R,
