@@ -133,15 +133,7 @@ def workspace(channels: int, events: int, slots: int) -> Workspace:
 
 
 class Replayed(NamedTuple):
-    """Part of a history that is replayed.
-
-    Parameters
-    ----------
-    events, elapsed : int
-        Number of events, and of the predictions among them.
-    sight : LastSight
-        The last sight after them.
-    """
+    """Part of a history that is replayed: its events, the predictions among them, and the last sight after them."""
 
     events: int
     elapsed: int
@@ -166,12 +158,11 @@ def replay(label: float, tape: Tape, errors: Floats | None, laws: Laws, channel:
 def continue_replay(
     done: Replayed, label: float, tape: Tape, errors: Floats | None, laws: Laws, channel: int, room: ReplayRoom
 ) -> tuple[int, Replayed]:
-    """Apply the events of a tape that are not done yet; return what `replay` does, and the events done. About 30 ns an
-    event.
+    """Apply the events of a tape that are not done yet; return what `replay` does, and the events done.
 
-    `errors` are the error bounds of each rate, rad/s; None without rates. It is not a field of the tape because the
-    compiler omits the code for rates only if an argument is None. The `room` receives the section, and the overlaps
-    with the bands of the measurements up to the one that makes it empty.
+    About 30 ns for each event. `errors` are the error bounds of each rate, rad/s; None without rates. It is not a field
+    of the tape because the compiler omits the code for rates only if an argument is None. The `room` receives the
+    section, and the overlaps with the bands of the measurements up to the one that makes it empty.
     """
     kinds, values, applies, events, nearest, farthest = tape
     right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
@@ -210,8 +201,7 @@ def continue_replay(
 
 @allocation_free
 def run(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom) -> tuple[int, float, int]:
-    """Replay a label along all axes; return the event at which it became empty, or ALIVE, the overlap there, m, and its
-    axis.
+    """Replay a label along all axes; return the event at which it became empty, or ALIVE, the overlap, m, and its axis.
 
     A label becomes empty with the first of its axes. If several become empty at one event, the least overlap counts.
     """

@@ -38,16 +38,9 @@ class CampaignNoise(Enum):
 
 @dataclass(frozen=True)
 class Chunk:
-    """Consecutive runs of one scenario.
+    """Consecutive runs of one scenario, whose noise is not used; a campaign has the cell 0.
 
-    Parameters
-    ----------
-    index, cell : int
-        Number of the chunk in the campaign, and of the scenario in a sweep; a campaign has the cell 0.
-    scenario : Scenario
-        Scenario; its noise is not used.
-    versions : tuple of pairs of str
-        Versions of the packages that must compute it.
+    `versions` are those of the packages that must compute it.
     """
 
     index: int

@@ -55,8 +55,8 @@ class Passage:
     ----------
     passed : ndarray of bool
         Whether the closest approach lies within the step. Elsewhere the distance is infinite and the others are zero.
-    least_distance_m, arrival_s : ndarray
-        Least distance, and the time from the beginning of the step to x = 0.
+    arrival_s : ndarray
+        Time from the beginning of the step to x = 0.
     lateral_m : ndarray, shape (B,), or (2, B) in space
         z, or (y, z), at the closest approach.
     """
@@ -68,22 +68,12 @@ class Passage:
 
 
 class KeplerMotion:
-    """Motion of the object relative to the spacecraft, both in the Sun's gravity.
+    """Motion of the object relative to the spacecraft, both in the Sun's gravity, or in free space without a `sun`.
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (B, 2), or (B, 3) in space
-        Relative (z, x) and (V_z, V_x) at t = 0; in space (y, z, x) and (V_y, V_z, V_x).
-    sun : Sun or None
-        None is free space.
-    substep_s : float
-        Greatest length of a substep, s.
-
-    Notes
-    -----
-    Velocity Verlet on the exact difference of the two accelerations, in substeps of at most 0.5 s: about 1e-8 m over
-    100 s here. The spacecraft's orbit is circular at t = 0, in the plane of the Sun and the x axis and toward +x; it
-    gives the position of the Sun. Impulses change it.
+    `position_m` and `velocity_m_s` are the relative (z, x) and (V_z, V_x) at t = 0, shape (B, 2); in space (y, z, x)
+    and (V_y, V_z, V_x), shape (B, 3). Velocity Verlet on the exact difference of the two accelerations, in substeps of
+    at most `substep_s`: with 0.5 s about 1e-8 m over 100 s here. The spacecraft's orbit is circular at t = 0, in the
+    plane of the Sun and the x axis and toward +x; it gives the position of the Sun. Impulses change it.
 
     References
     ----------
