@@ -18,9 +18,7 @@ _RATIO = Limits(above=2.0)
 
 @dataclass
 class PulseState:
-    """State of pulsed proportional navigation; `accumulated_m_s`, shape (B,), has the commands too small for an
-    impulse.
-    """
+    """State of proportional navigation: the estimator, and the commands that were too small for an impulse so far."""
 
     estimator: Estimator
     accumulated_m_s: Floats

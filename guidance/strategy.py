@@ -48,9 +48,7 @@ def _is_spatial(strategy: Strategy) -> bool:
 
 
 def checked_impulses(wanted: object, situation: Situation, tracking: Flags, strategy: object) -> Floats:
-    """Return the impulses of a strategy as an array; raise ValueError if they are not real and finite, or of another
-    shape.
-    """
+    """Return the impulses of a strategy as an array; raise ValueError for numbers that are not real or not finite."""
     values, shape = np.asarray(wanted), situation.last_impulse_m_s.shape
     real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
     if real and values.shape == shape and (np.isfinite(values) | ~tracking).all():

@@ -338,9 +338,7 @@ class ConvexPolygons(PolygonArrays):
         return one._measure(kernels.gap, *two._flat())[..., 0]
 
     def closest_point(self, point: ArrayLike) -> Floats:
-        """Return the point of the set nearest to a point, shape (2,) or (..., 2). O(n), rounded; a point inside is
-        itself.
-        """
+        """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside. O(n), rounded."""
         return self._known(self._measure(kernels.nearest, self._vectors(point, "point"))[..., :2], "closest point")
 
     def hausdorff_distance(self, other: ConvexPolygons) -> Floats:

@@ -61,9 +61,7 @@ class SetState:
     phi: GuaranteedMiss | None
 
     def refine(self, wanted: Flags, sections: int) -> None:
-        """Replace the sections of the wanted engagements by a grid of `sections` over their living labels, found by
-        replay.
-        """
+        """Replace the sections of the wanted engagements by a grid over their living labels, found by replay."""
         stack, history = self.stack, self.history
         stack.make_room_for_new(wanted, sections)
         spare = refine_all(

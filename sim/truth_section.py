@@ -28,9 +28,7 @@ LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 @dataclass(frozen=True)
 class _Look:
-    """True states of the flights that measure in a step, after a number of events; in space slopes have the shape (2,
-    B).
-    """
+    """True states of the flights that measure in a step, after some events; in space slopes have the shape (2, B)."""
 
     step: int
     events: int

@@ -104,9 +104,7 @@ class PolytopeArrays:
 
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
-        """Return {x: lower <= x <= upper}, flat across the axes along which `lower` and `upper`, shape (n,), are
-        equal. Exact.
-        """
+        """Return {x: lower <= x <= upper}, flat along the axes with equal `lower` and `upper`, shape (n,). Exact."""
         least, most = box_ends(lower, upper, "n")
         unit, wide = np.eye(len(least)), least < most
         corners = list(itertools.product(*(dict.fromkeys(pair) for pair in zip(least, most, strict=True))))
