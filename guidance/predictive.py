@@ -13,8 +13,6 @@ from guidance.situation import Situation
 from infoset.arrays import Floats
 from infoset.limits import Checked, Limits
 
-_SPACING = Limits(above=1.0)
-
 
 @dataclass
 class ManoeuvreState:
@@ -68,7 +66,7 @@ class Predictive(Checked):
     """
 
     estimator: EstimatorKind = KalmanBank
-    spacing: Annotated[float, _SPACING] = 1.5
+    spacing: Annotated[float, Limits(above=1.0)] = 1.5
 
     def start(self, batch: int) -> ManoeuvreState:
         """Start before the first manoeuvre."""

@@ -13,8 +13,6 @@ from guidance.situation import Situation
 from infoset.arrays import Floats
 from infoset.limits import Checked, Limits, NotNegative
 
-_RATIO = Limits(above=2.0)
-
 
 @dataclass
 class PulseState:
@@ -72,7 +70,7 @@ class ProportionalNavigation(Checked):
 
     estimator: EstimatorKind = KalmanBank
     is_augmented: bool = False
-    ratio: Annotated[float, _RATIO] = 3.0
+    ratio: Annotated[float, Limits(above=2.0)] = 3.0
     dead_band_m_s: NotNegative | None = None
 
     def start(self, batch: int) -> PulseState:

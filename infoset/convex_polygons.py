@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from infoset.polytope import Polytope
 
 
-_CAP = Limits(least=4, whole=True)
 _NAMES = ("empty set", "point", "segment", "triangle", "quadrangle", "pentagon", "hexagon")
 
 
@@ -236,7 +235,7 @@ class ConvexPolygons(PolygonArrays):
 
         O(n) for each side; new vertices are rounded.
         """
-        _CAP.need("cap", cap)
+        Limits(least=4, whole=True).need("cap", cap)
         return self._make(0, kernels.reduce_outward, np.int64(cap))
 
     # Measures ---------------------------------------------------------------------------------------------------------

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 
-_SIDES = Limits(least=3, whole=True)
 _ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
 """Depth of a reflex vertex, relative to the coordinates, that rounding explains."""
 
@@ -158,7 +157,7 @@ class PolygonArrays:
         An `outer` polygon contains the disc and exceeds it by the factor 1 / cos(pi / sides); an inner one is
         contained in it. Both to rounding: a few ulp. O(sides), at least three.
         """
-        _SIDES.need("sides", sides)
+        Limits(least=3, whole=True).need("sides", sides)
         middle, r = finite_values("centre", centre, "...", 2), radius_values(radius, "...")
         common_shape("centre and radius", middle.shape[:-1], r.shape)
         angles = (np.arange(sides) + (0.5 if outer else 0.0)) * (2.0 * math.pi / sides)
