@@ -63,12 +63,8 @@ COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
         (Pareto, "pareto.run", "pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures"),
         (Multipoint, "multipoint.run", "multipoint service-3 --order best --times best --out figures"),
     ],
-    "Set-membership estimation": [
-        (Observe, "observer.run", "observe vehicle --smooth --out results"),
-    ],
-    TOOLS: [
-        (Reproduce, "reproduced_numbers", "reproduce --paper pareto --json numbers.json"),
-    ],
+    "Set-membership estimation": [(Observe, "observer.run", "observe vehicle --smooth --out results")],
+    TOOLS: [(Reproduce, "reproduced_numbers", "reproduce --paper pareto --json numbers.json")],
 }
 """By panel of the help: options, module of the run in `experiments`, and example, whose first word is the name."""
 

@@ -113,8 +113,7 @@ class Campaign(Flight):
     guarantee: Annotated[
         bool,
         typer.Option(
-            "--guarantee/--no-guarantee",
-            help="Compute the bound Phi in the model guaranteed (doubles the run time).",
+            "--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed (doubles the run time)."
         ),
     ] = True
 
@@ -160,8 +159,7 @@ class Sweep(Flight):
     ] = None
     show: Shown = None
     guarantee: Annotated[
-        bool,
-        typer.Option("--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed."),
+        bool, typer.Option("--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed.")
     ] = False
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a sweep of more than a million runs.")] = False
 

@@ -21,10 +21,7 @@ SUMMARY = "summary.json"
 
 def run(options: Options) -> None:
     """Simulate the campaign, write its summary and print the tables."""
-    with (
-        campaign_errors(RESUME_HINT),
-        output_of(options) as written,
-    ):
+    with campaign_errors(RESUME_HINT), output_of(options) as written:
         need_arrow()
         scenario, model_notes = scenario_of(options)
         try:

@@ -26,10 +26,7 @@ MOST_RUNS_A_CELL = 2000
 
 def run(options: Options) -> None:
     """Simulate the sweep, write its table and figure, and print where the requirement is met."""
-    with (
-        campaign_errors(RESUME_HINT),
-        output_of(options) as written,
-    ):
+    with campaign_errors(RESUME_HINT), output_of(options) as written:
         need_arrow()
         scenario, notes = scenario_of(options)
         axes = sweep_axes(",".join(options.vary), scenario)

@@ -145,8 +145,7 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
         hidden = [level_name(quantile.level) for quantile in quantiles if not _is_shown(table, noise, quantile)]
         few = f"; too few runs for {', '.join(hidden)}" if hidden else ""
         axes.set_title(
-            f"({letter}) {noise} noise{few}",
-            pad=6.0 + (4.0 if quantity == table.required.quantity else 0.0),
+            f"({letter}) {noise} noise{few}", pad=6.0 + (4.0 if quantity == table.required.quantity else 0.0)
         )
         axes.set_ylabel(QUANTITY_NAMES[quantity])
     for unused in panels[len(quantities) :]:
@@ -192,12 +191,7 @@ def _limit_handles(table: SweepTable, noise: str, extent: Line2D | Patch) -> lis
 
 
 def _line_panel(
-    axes: Axes,
-    table: SweepTable,
-    noise: str,
-    quantity: str,
-    quantiles: Sequence[QuantileName],
-    levels: Sequence[float],
+    axes: Axes, table: SweepTable, noise: str, quantity: str, quantiles: Sequence[QuantileName], levels: Sequence[float]
 ) -> None:
     (axis,), required = table.axes, table.required
     colour = CURVE_LOOKS[1 if noise == "random" else 3]["color"]

@@ -74,12 +74,7 @@ class SweepReport:
                 "quantiles": FIXED,
             },
             "answers": [
-                {
-                    "noise": noise,
-                    "at": answer.at,
-                    "met": answer.met,
-                    "limits": [vars(limit) for limit in answer.limits],
-                }
+                {"noise": noise, "at": answer.at, "met": answer.met, "limits": [vars(limit) for limit in answer.limits]}
                 for noise in table.noises
                 for answer in answers(table, noise)
             ],

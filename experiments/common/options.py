@@ -65,8 +65,7 @@ Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace existing files, and write into a folder that is not empty.")
 ]
 Quiet = Annotated[
-    bool,
-    typer.Option("--quiet", "-q", callback=_silence_the_compile_notice, help="Print no progress and no tables."),
+    bool, typer.Option("--quiet", "-q", callback=_silence_the_compile_notice, help="Print no progress and no tables.")
 ]
 
 

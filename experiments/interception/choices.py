@@ -9,12 +9,7 @@ from typing import Any
 from experiments.common.errors import InputError
 from experiments.common.options import choice
 from experiments.interception.own_strategy import is_own_strategy, load_strategy
-from experiments.interception.scenario_file import (
-    default_initial_set,
-    load_scenario,
-    read_scenario,
-    scenario_to_toml,
-)
+from experiments.interception.scenario_file import default_initial_set, load_scenario, read_scenario, scenario_to_toml
 from guidance import Strategy, TieRule, strategy_names
 from guidance.registry import COMPARED
 from guidance.strategy import check_axes

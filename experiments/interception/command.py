@@ -52,8 +52,7 @@ StudyModel = Annotated[
     ),
 ]
 TieName = Annotated[
-    Literal["upper", "lower", "alternate", "random"] | None,
-    typer.Option("--tie", help="How game noise breaks ties."),
+    Literal["upper", "lower", "alternate", "random"] | None, typer.Option("--tie", help="How game noise breaks ties.")
 ]
 RangeMeter = Annotated[
     bool | None,

@@ -36,12 +36,7 @@ FORM = Form(
     begun_by="infoset scenarios new FILE",
     tables=ScenarioTables,
     checks=cross_problems,
-    written=(
-        "sun",
-        "range_sensor",
-        "angle_sensor.error_at_nominal_range_rad",
-        "angle_sensor.error_at_zero_range_rad",
-    ),
+    written=("sun", "range_sensor", "angle_sensor.error_at_nominal_range_rad", "angle_sensor.error_at_zero_range_rad"),
     schema=SCHEMA,
 )
 

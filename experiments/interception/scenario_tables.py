@@ -195,9 +195,7 @@ class ThrusterTable(Table, owner=Thruster):
         "last impulse, before the nominal arrival; without it: no cut-off", "2.0", default=None
     )
     impulses_s: Annotated[tuple[Decimal, ...], PlainValidator(Numbers(None, Number.of(POSITIVE)))] = key(
-        "impulses, before the nominal arrival; without it: at every step",
-        "[60.0, 20.0, 7.5]",
-        default=(),
+        "impulses, before the nominal arrival; without it: at every step", "[60.0, 20.0, 7.5]", default=()
     )
     delay_steps: Annotated[int, PlainValidator(Whole(MOST_STEPS, least=0))] = key(
         "number of steps from the decision to the impulse", "0", default=0
@@ -226,9 +224,7 @@ class InformationSetTable(Table, owner=SetModel):
         "if fewer remain: a new grid of 2 fewest_sections + 1 sections", "5", default=None
     )
     recovery: Recovery = key(
-        'after a set became empty: "widened" enlarges it, "none" ends guidance',
-        '"widened"',
-        default=Recovery.WIDENED,
+        'after a set became empty: "widened" enlarges it, "none" ends guidance', '"widened"', default=Recovery.WIDENED
     )
     disturbance_m_s2: Decimal = key("bound of the unknown acceleration along z, target included", "0.005")
     disturbance_y_m_s2: Decimal | None = _space_key("the same bound along y; without it: as along z", "0.005")
@@ -239,9 +235,7 @@ class NoiseTable(Table):
 
     kind: NoiseKind = key('"random", or "game": errors chosen against the guidance', '"random"')
     tie: TieRule = key(
-        'tie rule of game noise: "upper", "lower", "alternate" or "random"',
-        '"upper"',
-        default=TieRule.UPPER,
+        'tie rule of game noise: "upper", "lower", "alternate" or "random"', '"upper"', default=TieRule.UPPER
     )
 
 

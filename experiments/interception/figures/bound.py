@@ -97,12 +97,7 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     corridor = np.abs(direction) @ bounds * ranges
     seen = fine >= alike_until
     axes.fill_between(
-        fine[seen],
-        -corridor[seen],
-        corridor[seen],
-        facecolor=SET_FILL,
-        linewidth=0.0,
-        label="equal measurements",
+        fine[seen], -corridor[seen], corridor[seen], facecolor=SET_FILL, linewidth=0.0, label="equal measurements"
     )
     axes.plot(fine, corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
     axes.plot(fine, -corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")

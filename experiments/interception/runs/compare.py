@@ -79,11 +79,7 @@ def _b_plane(scenario: Scenario, compared: Sequence[Comparison], noise: NoiseKin
 
 
 def _simulate(
-    scenario: Scenario,
-    strategies: Mapping[str, Strategy | None],
-    runs: int,
-    seed: int,
-    reports: Mapping[str, Progress],
+    scenario: Scenario, strategies: Mapping[str, Strategy | None], runs: int, seed: int, reports: Mapping[str, Progress]
 ) -> list[Comparison]:
     wanted = flights(scenario, strategies)
     done = dict.fromkeys(wanted, 0.0)

@@ -29,13 +29,7 @@ from experiments.interception.figures.b_plane import B_PLANE, cloud, draw_b_plan
 from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.distributions import draw_distributions
 from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
-from experiments.interception.runs.shared import (
-    allowance,
-    bound_name,
-    certificate,
-    simulate_in_threads,
-    summary_head,
-)
+from experiments.interception.runs.shared import allowance, bound_name, certificate, simulate_in_threads, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import QUANTILES, SetCounts, game_note, hit_text, set_counts, set_warnings
 from guidance import NoiseKind

@@ -26,10 +26,7 @@ Progress = Callable[[float], None]
 
 
 def simulate_in_threads(
-    jobs: Sequence[tuple[Scenario, Strategy | None, Progress]],
-    runs: int,
-    seed: int,
-    courses: Sequence[Courses] = (),
+    jobs: Sequence[tuple[Scenario, Strategy | None, Progress]], runs: int, seed: int, courses: Sequence[Courses] = ()
 ) -> list[Results]:
     """Simulate scenarios in parallel, one thread per core; the kernels release the interpreter lock.
 
