@@ -242,18 +242,8 @@ def _cloud(axes: Axes, start: Floats, miss: Floats, colour: str) -> bool:
     """Draw the runs, and their median and 90 % quantile if they are enough; return whether these are drawn."""
     step = -(-miss.size // MOST_POINTS)
     size = min(2.2, (MOST_POINTS / miss.size) ** 0.25) if step == 1 else 1.0
-    axes.plot(
-        start[::step],
-        miss[::step],
-        linestyle="",
-        marker=".",
-        markersize=2.5 * size,
-        markeredgewidth=0.0,
-        color=colour,
-        alpha=0.4 * size,
-        zorder=2.0,
-        rasterized=True,
-    )
+    look: dict[str, Any] = {"color": colour, "alpha": 0.4 * size, "markersize": 2.5 * size, "markeredgewidth": 0.0}
+    axes.plot(start[::step], miss[::step], ".", zorder=2.0, rasterized=True, **look)
     least, greatest = float(start.min()), float(start.max())
     bins = min(_BINS, miss.size // RUNS_A_BIN)
     if bins < 2 or greatest <= least:

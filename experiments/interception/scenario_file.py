@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
+from experiments.common.display_units import split_unit
 from experiments.common.errors import InputError, shown
 from experiments.common.toml_file import load_tables, read_tables
 from experiments.common.toml_form import Form, keys_of, template
@@ -19,7 +20,7 @@ from experiments.common.toml_values import si_name, si_values, value_text
 from experiments.interception.scenario_checks import cross_problems
 from experiments.interception.scenario_tables import LATER_KEYS, OPTIONAL_SENSORS, SCHEMA, SPACE_KEYS, ScenarioTables
 from guidance.thruster import Thruster
-from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
+from infoset.model import InitialSet, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor
 from sim.scenario import Body, Scenario, Sun, Target
 from sim.storage.codec import scenario_hash as scenario_hash  # noqa: PLC0414 (users import it from here)
@@ -74,35 +75,29 @@ def read_scenario(text: str, source: str, values: Mapping[str, str] | None = Non
 def scenario_warnings(scenario: Scenario) -> list[str]:
     """Return warnings about values of a scenario that are allowed but probably not intended, one line each."""
     lines = []
-    uncertainty, dispersion = scenario.set_model.bounds, scenario.dispersion
-    keys = [*scenario.set_model.axes, "x"]
-    for key, unit in [(key, "km") for key in keys] + [(f"v{key}", "km/s") for key in keys]:
-        field = f"{key}_m" if unit == "km" else f"{key}_m_s"
-        name = f"{key}_km" if unit == "km" else f"{key}_km_s"
-        known: Interval = getattr(uncertainty, field)
-        true: Interval = getattr(dispersion, field)
+    model, thruster, target = scenario.set_model, scenario.thruster, scenario.target
+    uncertainty, dispersion, speed = model.bounds, scenario.dispersion, model.closing_speed_m_s
+    axes = [*model.axes, "x"]
+    for name in [f"{axis}_km" for axis in axes] + [f"v{axis}_km_s" for axis in axes]:
+        known, true = getattr(uncertainty, si_name(name)), getattr(dispersion, si_name(name))
+        _, unit = split_unit(name)
         for excess, side in ((known[0] - true[0], "below"), (true[1] - known[1], "above")):
             if excess > 0:
                 lines.append(
                     f"dispersion.{name} reaches {excess / 1000:.6g} {unit} {side} uncertainty.{name}: "
                     "the true state may start outside the uncertainty on board, and the set may lose it"
                 )
-    speed = scenario.set_model.closing_speed_m_s
-    least, greatest = -uncertainty.vx_m_s[1], -uncertainty.vx_m_s[0]
-    outside = max(least - speed, speed - greatest)
+    outside = max(-uncertainty.vx_m_s[1] - speed, speed + uncertainty.vx_m_s[0])
     if outside > 0:
         lines.append(
             f"nominal.closing_speed_km_s is {outside / 1000:.6g} km/s outside uncertainty.vx_km_s: "
             "the on-board model uses a speed that is known to be wrong"
         )
-    ranges = (uncertainty.x_m[0] / FAR, uncertainty.x_m[1] * FAR)
-    if not ranges[0] <= scenario.nominal_range_m <= ranges[1]:
+    if not uncertainty.x_m[0] / FAR <= scenario.nominal_range_m <= uncertainty.x_m[1] * FAR:
         lines.append(
             f"nominal.range_km is {scenario.nominal_range_m / 1000:.6g} km, far outside uncertainty.x_km: "
             "the error bound of the angle sensor is defined at this range; check its unit"
         )
-    thruster = scenario.thruster
-    target, model = scenario.target, scenario.set_model
     steepest = max(
         max(box.offset_m for box in (uncertainty, dispersion)) / min(uncertainty.x_m[0], dispersion.x_m[0]),
         max(box.lateral_speed_m_s for box in (uncertainty, dispersion)) / speed,
@@ -114,19 +109,17 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
             "write model = guaranteed"
         )
     for axis in model.axes if target is not None and model.is_guaranteed else ():
-        (key, acceleration), (bound_key, bound) = (
-            _along(axis, target, "acceleration"),
-            _along(axis, model, "disturbance"),
-        )
+        key, acceleration = _along(axis, target, "acceleration")
+        bound_key, bound = _along(axis, model, "disturbance")
         line = (
             f"target.{key}, {acceleration:g}, exceeds information_set.{bound_key}, {bound:g}: "
             "the guaranteed model does not allow for it and may lose the true state"
         )
         if acceleration > bound and line not in lines:
             lines.append(line)
-    sensor, still = model.angle_sensor, (0.0, 0.0)
+    sensor = model.angle_sensor
     exact = sensor.error_at_nominal_range_y_rad == sensor.error_at_zero_range_y_rad == 0.0
-    if exact and not uncertainty.y_m == uncertainty.vy_m_s == still:
+    if exact and not uncertainty.y_m == uncertainty.vy_m_s == (0.0, 0.0):
         lines.append(
             "angle_sensor.error_at_nominal_range_y_rad and error_at_zero_range_y_rad are 0, and uncertainty.y_km and "
             "vy_km_s are not both [0, 0]: a measurement leaves a single range, and the set may become empty; write "
@@ -168,8 +161,8 @@ def _timing_warnings(scenario: Scenario) -> list[str]:
             "the start: no image is taken"
         ]
     all_steps = range(0, int(arrival_s / model.step_s) + 1, model.steps_in(sensor.period_s))
-    if not any(sensor.measures_at(arrival_s - step * model.step_s) for step in all_steps):
-        before_s = (arrival_s - step * model.step_s for step in all_steps)
+    before_s = [arrival_s - step * model.step_s for step in all_steps]
+    if not any(map(sensor.measures_at, before_s)):
         nearest_s = min(before_s, key=lambda time_s: abs(time_s - sensor.last_image_s))
         return [
             f"angle_sensor.first_image_s is {sensor.first_image_s or 0.0:g} s and last_image_s {sensor.last_image_s:g} "

@@ -137,20 +137,11 @@ def name_marks(axes: Axes, scenario: Scenario) -> None:
         share = (high - np.log(time)) / (high - low)
         side = "left" if abs(share - taken) < 0.05 else "right"
         taken = share
-        axes.annotate(
-            f"{name}, {duration_text(time)}",
-            (time, 0.97),
-            xycoords=axes.get_xaxis_transform(),
-            xytext=(-1.5 if side == "right" else 1.5, 0.0),
-            textcoords="offset points",
-            rotation=90.0,
-            fontsize=6.5,
-            color=INK,
-            path_effects=[withStroke(linewidth=2.0, foreground="white")],
-            ha=side,
-            va="top",
-            zorder=5.0,
-        )
+        place: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points"}
+        place |= {"xytext": (-1.5 if side == "right" else 1.5, 0.0), "rotation": 90.0, "ha": side, "va": "top"}
+        look: dict[str, Any] = {"fontsize": 6.5, "color": INK, "zorder": 5.0}
+        halo = [withStroke(linewidth=2.0, foreground="white")]
+        axes.annotate(f"{name}, {duration_text(time)}", (time, 0.97), path_effects=halo, **place, **look)
 
 
 def _draw_possible(axes: Axes, record: Record) -> None:

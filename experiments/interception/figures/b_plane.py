@@ -193,16 +193,8 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     axes.plot(0.0, 0.0, marker="+", color=INK, markersize=7.0, markeredgewidth=1.1, linestyle="none", zorder=4.0)
     beyond = int((np.abs(each.across_m) > half).any(axis=1).sum())
     if beyond:
-        axes.annotate(
-            f"beyond the axes: {beyond} of {count}",
-            (0.97, 0.03),
-            xycoords="axes fraction",
-            ha="right",
-            va="bottom",
-            fontsize=7.0,
-            path_effects=halo,
-            zorder=5.0,
-        )
+        look = {"xycoords": "axes fraction", "ha": "right", "va": "bottom", "path_effects": halo, "zorder": 5.0}
+        axes.annotate(f"beyond the axes: {beyond} of {count}", (0.97, 0.03), fontsize=7.0, **look)
     axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
     for one in (axes.xaxis, axes.yaxis):
         one.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
@@ -216,20 +208,6 @@ def draw_discs(axes: Axes, half: float, radius_m: float | None, guaranteed_m: fl
         axes.add_patch(Circle((0.0, 0.0), radius_m, fill=False, zorder=3.2, label="_radius", **RADIUS_LOOK))
     if guaranteed_m is not None and guaranteed_m <= half:
         axes.add_patch(Circle((0.0, 0.0), guaranteed_m, fill=False, zorder=3.1, label="_guarantee", **GUARANTEE_LOOK))
-
-
-def disc_handles(radius_m: float | None, guaranteed: Sequence[bool], half: float, of: str) -> list[Line2D | Patch]:
-    """Return the entries of the legend for the discs; `guaranteed` says which guaranteed misses are within the axes."""
-    handles: list[Line2D | Patch] = []
-    if guaranteed:
-        where = "" if all(guaranteed) else ", if within the axes" if any(guaranteed) else ": beyond the axes"
-        handles.append(Line2D([], [], label=f"circle: guaranteed miss Φ, {of}{where}", **GUARANTEE_LOOK))
-    if radius_m is not None:
-        where = "a smaller miss is a hit" if radius_m <= half else "beyond the axes"
-        look = {key: RADIUS_LOOK[key] for key in ("linestyle", "linewidth")}
-        label = f"body radius, {radius_m:g} m: {where}"
-        handles.append(Patch(facecolor=BODY_FILL, edgecolor=RADIUS_LOOK["color"], label=label, **look))
-    return handles
 
 
 def _handles(clouds: Sequence[Cloud], radius_m: float | None, halves: Sequence[float]) -> list[Line2D | Patch]:
@@ -252,4 +230,13 @@ def _handles(clouds: Sequence[Cloud], radius_m: float | None, halves: Sequence[f
     within = [
         each.guaranteed_m <= half for each, half in zip(clouds, halves, strict=True) if each.guaranteed_m is not None
     ]
-    return handles + disc_handles(radius_m, within, max(halves), "greatest of the runs")
+    if within:
+        where = "" if all(within) else ", if within the axes" if any(within) else ": beyond the axes"
+        label = f"circle: guaranteed miss Φ, greatest of the runs{where}"
+        handles.append(Line2D([], [], label=label, **GUARANTEE_LOOK))
+    if radius_m is not None:
+        where = "a smaller miss is a hit" if radius_m <= max(halves) else "beyond the axes"
+        look = RADIUS_LOOK | {"facecolor": BODY_FILL, "edgecolor": RADIUS_LOOK["color"]}
+        del look["color"]
+        handles.append(Patch(label=f"body radius, {radius_m:g} m: {where}", **look))
+    return handles

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import chain
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -50,14 +51,12 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
         rows = place_axes(figure, 2, 2, margins_mm=(left, 4.0, 20.0, 7.0), gaps_mm=(6.0, 19.0))
         _draw_row(rows[0], compared, names, lambda each: each.miss_m, logarithmic=True)
         _draw_row(rows[1], compared, names, lambda each: each.impulse_m_s, logarithmic=False)
-        for row, label in zip(rows, ("miss, m", "impulse spent, m/s"), strict=True):
-            for axes in row:
-                axes.set_xlabel(label)
-        for axes, letter in zip((*rows[0], *rows[1]), "abcd", strict=True):
-            axes.set_title(f"({letter}) {_NOISES['abcd'.index(letter) % 2][1]}")
-        handles = _handles(len(compared[0].miss_m))
+        titles = [title for _, title in _NOISES]
+        labels = ["miss, m"] * 2 + ["impulse spent, m/s"] * 2
+        for axes, letter, title, label in zip(chain(*rows), "abcd", titles * 2, labels, strict=True):
+            axes.set(title=f"({letter}) {title}", xlabel=label)
         (radius, _) = [draw_radius(axes, radius_m) for axes in rows[0]]
-        handles += radius
+        handles = _handles(len(compared[0].miss_m)) + radius
         figure.legend(handles=handles, loc="lower center", ncols=5 if radius_m is None else 3, columnspacing=1.6)
     return figure
 

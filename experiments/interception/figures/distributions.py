@@ -28,7 +28,8 @@ _INSIDE = 0.05, 0.95
 
 MOST_POINTS = 2000
 """Most points of a curve; more would only make the file larger."""
-_NUMBER_BOX = {"boxstyle": "circle,pad=0.18", "facecolor": "white", "linewidth": 0.8}
+_NUMBER_LOOK: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "fontweight": "bold", "zorder": 5}
+_NUMBER_BOX: dict[str, Any] = {"boxstyle": "circle,pad=0.18", "facecolor": "white", "linewidth": 0.8}
 _DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
 RADIUS_LOOK: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
 """Line of the radius of the body."""
@@ -158,17 +159,9 @@ def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tup
 
 def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: str, label: str = "_band") -> None:
     """Draw the two thin edges of a confidence band at and after each of the rising values, away from 0 and 1."""
+    look: dict[str, Any] = {"color": colour, "linewidth": 0.5, "alpha": 0.75, "zorder": 2.0, "label": label}
     for edge, empty in ((lower, 0.0), (upper, 1.0)):
-        axes.plot(
-            values,
-            np.where(edge == empty, np.nan, edge),
-            drawstyle="steps-post",
-            color=colour,
-            linewidth=0.5,
-            alpha=0.75,
-            zorder=2.0,
-            label=label,
-        )
+        axes.plot(values, np.where(edge == empty, np.nan, edge), drawstyle="steps-post", **look)
 
 
 def _draw_panel(
@@ -243,24 +236,13 @@ def _number(axes: Axes, curves: Sequence[Sample], samples: Sequence[Floats]) -> 
         room -= 1e-3 * np.abs(track[:, 1] - 0.5)
         spot = track[room.argmax()]
         placed.append(spot)
-        axes.text(
-            float(spot[0]),
-            (float(spot[1]) + 0.02) / 1.04,
-            str(curve.number),
-            transform=axes.transAxes,
-            ha="center",
-            va="center",
-            fontsize=8.0,
-            fontweight="bold",
-            color=curve.look["color"],
-            bbox={
-                "boxstyle": "circle,pad=0.18",
-                "facecolor": "white",
-                "edgecolor": curve.look["color"],
-                "linewidth": 0.8,
-            },
-            zorder=5,
-        )
+        colour = curve.look["color"]
+        look = _NUMBER_LOOK | {
+            "transform": axes.transAxes,
+            "color": colour,
+            "bbox": _NUMBER_BOX | {"edgecolor": colour},
+        }
+        axes.text(float(spot[0]), (float(spot[1]) + 0.02) / 1.04, str(curve.number), **look)
 
 
 def _gaps(points: Floats, others: Floats) -> Floats:

@@ -217,16 +217,14 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, span_m_s: float) -> No
     for limit in (-greatest, greatest):
         axes.axhline(limit, color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
     wide = width_mm(axes) > _NARROW_MM
+    text = f"{'greatest impulse' if wide else 'limit'} ±{greatest:g} m/s"
+    place: dict[str, Any] = {"xytext": (0.0, 2.5), "textcoords": "offset points", "ha": "right", "va": "bottom"}
     axes.annotate(
-        f"{'greatest impulse' if wide else 'limit'} ±{greatest:g} m/s"
-        + (", beyond the axis" if wide and greatest > span_m_s else ""),
+        text + (", beyond the axis" if wide and greatest > span_m_s else ""),
         (0.985, min(greatest, 1.05 * span_m_s)),
         xycoords=axes.get_yaxis_transform(),
-        xytext=(0.0, 2.5),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
         path_effects=[withStroke(linewidth=2.0, foreground="white")],
+        **place,
     )
     if record.scenario.is_spatial:
         moduli = np.array([step.impulse_m_s for step in record.steps])
@@ -311,23 +309,13 @@ def _note_exit(axes: Axes, values: Floats, trace: Trace, scale: float, unit: str
 
     def hidden(corner: tuple[float, bool]) -> int:
         right, top = corner
-        inside = (
-            (across <= right)
-            & (across >= right - note_width)
-            & ((up > 1.0 - note_height) if top else (up < note_height))
-        )
-        return int(inside.sum())
+        at_end = (up > 1.0 - note_height) if top else (up < note_height)
+        return int(((across <= right) & (across >= right - note_width) & at_end).sum())
 
     right, top = min(corners, key=hidden)
-    axes.annotate(
-        text,
-        (right, 0.94 if top else 0.06),
-        xycoords="axes fraction",
-        fontsize=8.0 if space == " " else 6.5,
-        ha="right",
-        va="top" if top else "bottom",
-        bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
-    )
+    box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+    look: dict[str, Any] = {"fontsize": 8.0 if space == " " else 6.5, "ha": "right", "va": "top" if top else "bottom"}
+    axes.annotate(text, (right, 0.94 if top else 0.06), xycoords="axes fraction", bbox=box, **look)
 
 
 def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], traces: Sequence[Trace], clock: Clock) -> None:
