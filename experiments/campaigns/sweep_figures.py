@@ -36,8 +36,7 @@ from experiments.common.figure_style import (
     IMPULSE,
     INK,
     LIMIT,
-    new_figure,
-    place_axes,
+    figure_grid,
     separate_labels,
     style,
     width_mm,
@@ -136,9 +135,9 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
     levels = sorted({quantile.level for quantile in shown}, reverse=True)
     rows = -(-len(quantities) // 2)
     columns = min(2, len(quantities))
-    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 24.0 + 47.0, width_mm=_COLUMN_MM * columns)
-    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 36.0, 11.0), gaps_mm=(18.0, 24.0))
-    panels = list(itertools.chain(*grid))
+    sizes: dict[str, Any] = {"width_mm": _COLUMN_MM * columns, "count": len(quantities)}
+    height_mm = rows * _PANEL_MM + (rows - 1) * 24.0 + 47.0
+    figure, panels = figure_grid(height_mm, rows, columns, (17.0, 4.0, 36.0, 11.0), (18.0, 24.0), **sizes)
     for axes, quantity, letter in zip(panels, quantities, _LETTERS, strict=False):
         quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
         _line_panel(axes, table, noise, quantity, quantiles, levels)
@@ -148,8 +147,6 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
             f"({letter}) {noise} noise{few}", pad=6.0 + (4.0 if quantity == table.required.quantity else 0.0)
         )
         axes.set_ylabel(QUANTITY_NAMES[quantity])
-    for unused in panels[len(quantities) :]:
-        unused.remove()
     drawn = {quantile.level for quantile in shown if _is_shown(table, noise, quantile)}
     handles: list[Any] = [
         Line2D([], [], color=INK, linestyle=_look(levels, level), marker="o", markersize=3, label=level_name(level))
@@ -261,19 +258,16 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
     up = table.axes[1]
     letters = max(len(_tick_text(up, value)) for value in up.values)
     left_mm = max(17.0, _LINE_MM * (_axis_label(up, "y").count("\n") + 1) + _LETTER_MM * letters + 3.0)
-    size_mm = rows * _PANEL_MM + (rows - 1) * 21.0 + 35.0, columns * (_COLUMN_MM - 17.0 + left_mm)
-    figure = new_figure(*size_mm)
-    margins_mm = (left_mm, 17.0, 27.0, 8.0)
-    grid = place_axes(figure, rows, columns, margins_mm=margins_mm, gaps_mm=(19.0 + left_mm, 21.0))
-    first, *others = (axes for row in grid for axes in row)
+    sizes: dict[str, Any] = {"width_mm": columns * (_COLUMN_MM - 17.0 + left_mm), "count": 1 + len(quantiles)}
+    margins_mm, gaps_mm = (left_mm, 17.0, 27.0, 8.0), (19.0 + left_mm, 21.0)
+    height_mm = rows * _PANEL_MM + (rows - 1) * 21.0 + 35.0
+    figure, (first, *others) = figure_grid(height_mm, rows, columns, margins_mm, gaps_mm, **sizes)
     _decision_panel(first, table, noise)
     first.set_title(f"(a) {requirement_words(required)}; {noise} noise")
     for quantile, axes, letter in zip(quantiles, others, _LETTERS[1:], strict=False):
         _map_panel(figure, axes, table, noise, quantile)
         name, unit = QUANTITY_NAMES[quantile.quantity].split(", ")
         axes.set_title(f"({letter}) {name}, {level_name(quantile.level)}, {unit}; {noise} noise")
-    for unused in others[len(quantiles) :]:
-        unused.remove()
     handles: list[Any] = [
         *_decision_patches(table, noise),
         *_limit_handles(table, noise, Line2D([], [], color=IMPULSE, linewidth=1.5, label="range of the limit")),

@@ -6,7 +6,7 @@ import contextlib
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 import matplotlib as mpl
@@ -139,11 +139,16 @@ def figure_grid(
     columns: int,
     margins_mm: tuple[float, float, float, float],
     gaps_mm: tuple[float, float],
+    *,
+    width_mm: float = WIDTH_MM,
+    count: int | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Return a new figure with a grid of axes, row by row; the parameters are those of `place_axes`."""
-    figure = new_figure(height_mm)
-    grid = place_axes(figure, rows, columns, margins_mm=margins_mm, gaps_mm=gaps_mm)
-    return figure, [axes for row in grid for axes in row]
+    """Return a new figure with a grid of axes as of `place_axes`, row by row, of which only the first `count` stay."""
+    figure = new_figure(height_mm, width_mm)
+    panels = [*chain(*place_axes(figure, rows, columns, margins_mm=margins_mm, gaps_mm=gaps_mm))]
+    for unused in panels[count:] if count is not None else ():
+        unused.remove()
+    return figure, panels[:count]
 
 
 def separate_labels(axes: Axes, gap_points: float = 2.0) -> None:

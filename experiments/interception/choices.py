@@ -18,8 +18,6 @@ from infoset.model import MOST_SECTIONS
 from sim import Scenario
 from sim.scenario import strategy_name
 
-MODEL_KEY = "information_set.model"
-
 
 def scenario_with(options: Any) -> Scenario:
     """Read the scenario of a command and replace what its options set; None keeps the value of the scenario.
@@ -75,7 +73,7 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
     resumed, its model is the default.
     """
     scenario = scenario_with(options)
-    chosen = any(text.partition("=")[0].strip() == MODEL_KEY for text in options.settings or ())
+    chosen = any(text.partition("=")[0].strip() == "information_set.model" for text in options.settings or ())
     of_file, default = scenario.set_model.kind.value, resumed or Model.GUARANTEED
     if chosen or options.model is not None or default.value == of_file:
         return scenario, []

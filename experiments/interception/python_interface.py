@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import sim
 from experiments.common.errors import InputError
-from experiments.common.figure_style import INK, SET_EDGE, new_figure, place_axes, style
+from experiments.common.figure_style import INK, SET_EDGE, figure_grid, style
 from experiments.common.output import to_csv, to_json, write_file
 from experiments.interception.figures.distributions import draw_band
 from experiments.interception.figures.process import draw_process
@@ -85,12 +85,9 @@ def plot(results: Results | Record | Sequence[Record]) -> Figure:
     if not isinstance(results, Results):
         return draw_process([results] if isinstance(results, Record) else results)
     with style():
-        figure = new_figure(height_mm=75.0)
-        ((left, right),) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 12.0, 7.0), gaps_mm=(9.0, 0.0))
-        for axes, label, sample in (
-            (left, "miss, m", results.miss_m),
-            (right, "impulse spent, m/s", results.impulse_m_s),
-        ):
+        figure, (left, right) = figure_grid(75.0, 1, 2, (14.0, 4.0, 12.0, 7.0), (9.0, 0.0))
+        panels = ((left, "miss, m", results.miss_m), (right, "impulse spent, m/s", results.impulse_m_s))
+        for axes, label, sample in panels:
             found = empirical_distribution(sample)
             draw_band(axes, found.values, found.lower, found.upper, SET_EDGE)
             axes.plot(found.values, found.probability, drawstyle="steps-post", color=INK)

@@ -217,13 +217,15 @@ def scenario_to_toml(scenario: Scenario) -> str:
             f"it has {scenario.nominal_range_m!r} m; a scenario file has one, nominal.range_km"
         )
     start = vars(scenario.dispersion).items()
+    parts = {table: getattr(scenario, table) for table in ("sun", *OPTIONAL_SENSORS, "target", "body")}
+    optional = {table: part and vars(part) for table, part in parts.items()}
     tables: dict[str, dict[str, object] | None] = {
-        "sun": _values(scenario.sun),
+        "sun": optional.pop("sun"),
         "nominal": {"range_m": scenario.nominal_range_m, "closing_speed_m_s": model.closing_speed_m_s},
         "uncertainty": vars(model.bounds),
         "dispersion": {name: pair[0] if pair and pair[0] == pair[1] else pair for name, pair in start},
         "angle_sensor": vars(sensor) | _error_keys(sensor),
-        **{table: _values(getattr(scenario, table)) for table in (*OPTIONAL_SENSORS, "target", "body")},
+        **optional,
         "thruster": vars(scenario.thruster),
         "guidance": {**vars(model), "strategy": scenario.strategy},
         "information_set": {**vars(model), "model": model.kind},
@@ -249,10 +251,6 @@ def _error_keys(sensor: AngleSensor) -> dict[str, object]:
     """Return the keys of the error law of an angle sensor; those of the other law are None."""
     line = dict.fromkeys(("error_at_nominal_range_rad", "error_at_zero_range_rad"))
     return {"pixel_error_rad": sensor.pixel_error_rad, **line} if sensor.is_camera else {"pixel_error_rad": None}
-
-
-def _values(part: object | None) -> dict[str, object] | None:
-    return None if part is None else vars(part)
 
 
 def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:

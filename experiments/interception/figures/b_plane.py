@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Ellipse, Patch
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 
-from experiments.common.figure_style import INK, SET_EDGE, TRUTH, WIDTH_MM, new_figure, place_axes, plain, style
+from experiments.common.figure_style import INK, SET_EDGE, TRUTH, WIDTH_MM, figure_grid, plain, style
 from experiments.common.screen import number
 from experiments.interception.figures.distributions import RADIUS_LOOK, axis_limit
 from guidance import NoiseKind
@@ -130,16 +130,11 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     handles = _handles(clouds, radius_m, halves)
     legend_columns = min(2, columns)
     bottom = 16.0 + 4.5 * -(-len(handles) // legend_columns)
-    figure = new_figure(
-        height_mm=bottom + top + rows * side + (rows - 1) * between,
-        width_mm=_LEFT_MM + _RIGHT_MM + columns * side + (columns - 1) * gap,
-    )
-    margins = (_LEFT_MM, _RIGHT_MM, bottom, top)
-    grid = place_axes(figure, rows, columns, margins_mm=margins, gaps_mm=(gap, between))
-    places = [axes for row in grid for axes in row]
-    for unused in places[len(clouds) :]:
-        unused.remove()
-    for index, (axes, each, half) in enumerate(zip(places, clouds, halves, strict=False)):
+    height_mm = bottom + top + rows * side + (rows - 1) * between
+    width_mm = _LEFT_MM + _RIGHT_MM + columns * side + (columns - 1) * gap
+    margins, gaps = (_LEFT_MM, _RIGHT_MM, bottom, top), (gap, between)
+    figure, panels = figure_grid(height_mm, rows, columns, margins, gaps, width_mm=width_mm, count=len(clouds))
+    for index, (axes, each, half) in enumerate(zip(panels, clouds, halves, strict=True)):
         quantiles = _draw_cloud(axes, each, half, radius_m)
         if guaranteed:
             bound = "no guarantee" if each.guaranteed_m is None else f"greatest Φ: {number(each.guaranteed_m)} m"

@@ -9,12 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from experiments.common.figure_style import INK, LIMIT, SET_EDGE, SET_FILL, new_figure, place_axes, style
+from experiments.common.figure_style import INK, LIMIT, SET_EDGE, SET_FILL, figure_grid, style
 from infoset.arrays import Floats
 from sim import Scenario
 from sim.bound import LowerBound
 
-_HEIGHT_MM = 66.0
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#7f2704", "linestyle": "-", "marker": "o"},
     {"color": "#08306b", "linestyle": "-", "marker": "s"},
@@ -31,8 +30,7 @@ def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
     the direction of their difference at x = 0.
     """
     with style():
-        figure = new_figure(height_mm=_HEIGHT_MM + 19.0)
-        ((left, right),) = place_axes(figure, 1, 2, margins_mm=(13.0, 4.0, 12.0, 7.0), gaps_mm=(14.0, 0.0))
+        figure, (left, right) = figure_grid(85.0, 1, 2, (13.0, 4.0, 12.0, 7.0), (14.0, 0.0))
         _draw_labels(left, lower)
         _draw_pair(right, scenario, lower)
     return figure

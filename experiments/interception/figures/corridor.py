@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from experiments.common.figure_style import IMPULSE, SET_EDGE, SET_FILL, TRUTH, new_figure, place_axes, style
+from experiments.common.figure_style import IMPULSE, SET_EDGE, SET_FILL, TRUTH, figure_grid, style
 from experiments.interception.course import Courses, marks
 from experiments.interception.curves import Curve
 from experiments.interception.figures.approach import MARK_LOOK, count_down_pair
@@ -43,11 +43,9 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
     rows = -(-len(curves) // 2)
     tall = _POSSIBLE_MM + _GAP_MM + _IMPULSES_MM
     with style():
-        figure = new_figure(height_mm=rows * tall + (rows - 1) * _BETWEEN_MM + 37.0)
-        grid = place_axes(
-            figure, rows, min(2, len(curves)), margins_mm=(17.0, 5.0, 28.0, 9.0), gaps_mm=(17.0, _BETWEEN_MM)
-        )
-        panels = [axes for row in grid for axes in row]
+        height_mm, gaps_mm = rows * tall + (rows - 1) * _BETWEEN_MM + 37.0, (17.0, _BETWEEN_MM)
+        margins_mm, columns = (17.0, 5.0, 28.0, 9.0), min(2, len(curves))
+        figure, panels = figure_grid(height_mm, rows, columns, margins_mm, gaps_mm, count=len(curves))
         pairs = []
         for axes, curve, course, letter in zip(panels, curves, courses, "abcd", strict=False):
             left, foot, width, height = axes.get_position().bounds
@@ -61,8 +59,6 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
             axes.set_ylabel("possible miss, m")
             below.set_ylabel("impulse, m/s")
             pairs.append((axes, below))
-        for unused in panels[len(curves) :]:
-            unused.remove()
         for level in zip(*pairs, strict=True):
             limits = np.array([axes.get_ylim() for axes in level])
             for axes in level:

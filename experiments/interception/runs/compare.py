@@ -33,8 +33,7 @@ from sim import Scenario
 
 FIGURE = "figure-comparison"
 TIES = "for each run, the worst of the four tie rules"
-COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit")
-COLUMNS_IN_SPACE = (*COLUMNS, "miss_y_m", "miss_z_m")
+COLUMNS = ("run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit")
 
 
 def run(options: Compare) -> None:
@@ -61,9 +60,8 @@ def run(options: Compare) -> None:
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(result), "--json")
         if written.wants("--csv"):
-            written.save(
-                "results.csv", to_csv(COLUMNS_IN_SPACE if scenario.is_spatial else COLUMNS, _rows(compared)), "--csv"
-            )
+            columns = (*COLUMNS, "miss_y_m", "miss_z_m") if scenario.is_spatial else COLUMNS
+            written.save("results.csv", _csv(compared, columns), "--csv")
         if options.out is not None:
             drawings = {FIGURE: lambda: draw_comparison(compared, scenario.radius_m)}
             drawings |= {name: partial(_b_plane, scenario, compared, noise) for noise, name in b_planes.items()}
@@ -117,25 +115,14 @@ def _summary(comparison: Comparison) -> dict[str, object]:
     }
 
 
-def _rows(compared: Sequence[Comparison]) -> list[list[Cell]]:
-    return [
-        [
-            comparison.strategy,
-            comparison.noise.value,
-            None if tie is None else tie.value,
-            int(results.runs[i]),
-            float(results.miss_m[i]),
-            float(results.impulse_m_s[i]),
-            results.outcomes[i].value,
-            bool(results.truth_kept[i]),
-            bool(results.set_emptied[i]),
-            results.hit.tolist()[i],
-            *(miss for miss in results.lateral_miss[i].tolist() if miss is not None),
-        ]
-        for comparison in compared
-        for tie, results in comparison.results.items()
-        for i in range(len(results))
-    ]
+def _csv(compared: Sequence[Comparison], names: Sequence[str]) -> str:
+    rows: list[list[Cell]] = []
+    for comparison in compared:
+        for tie, results in comparison.results.items():
+            columns = results.to_dict()
+            head = [comparison.strategy, comparison.noise.value, None if tie is None else tie.value]
+            rows += [[*head, *values] for values in zip(*(columns[name] for name in names), strict=True)]
+    return to_csv(("strategy", "noise", "tie", *names), rows)
 
 
 def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]:
