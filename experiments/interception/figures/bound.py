@@ -62,13 +62,8 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
         axes.plot(middles, most, label=name, markersize=3.0, **look)
     pair = lower.pair
     axes.plot(pair.label_m / 1e3, pair.bound_m, marker="*", markersize=9.0, color=INK, linestyle="none", zorder=5)
-    axes.annotate(
-        f"{pair.bound_m:.1f} m",
-        (pair.label_m / 1e3, pair.bound_m),
-        xytext=(7.0, 3.0),
-        textcoords="offset points",
-        color=INK,
-    )
+    place: dict[str, Any] = {"xytext": (7.0, 3.0), "textcoords": "offset points"}
+    axes.annotate(f"{pair.bound_m:.1f} m", (pair.label_m / 1e3, pair.bound_m), color=INK, **place)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.5 * (high - low))  # space for the legend
     axes.set_title("(a) bound for all strategies")
@@ -112,15 +107,8 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     axes.plot([], [], color=INK, linewidth=0.8, linestyle=":", label="with the largest correction")
     axes.axvline(alike_until, ymax=0.72, color=LIMIT, linewidth=0.8, linestyle="--")
     top = float(max(half[-1], corridor[-1])) * 1.12
-    axes.text(
-        alike_until,
-        -0.93 * top,
-        "  measurements\n  equal until here",
-        color=LIMIT,
-        ha="left",
-        va="bottom",
-        fontsize=7.0,
-    )
+    place: dict[str, Any] = {"ha": "left", "va": "bottom", "fontsize": 7.0}
+    axes.text(alike_until, -0.93 * top, "  measurements\n  equal until here", color=LIMIT, **place)
     _bracket(axes, shown, float(half[-1]), pair.correction_m)
     axes.set_xlim(shown, -0.3 * shown)
     axes.set_ylim(-top, top)

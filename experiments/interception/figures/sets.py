@@ -159,21 +159,9 @@ def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
     return [sections[index] for index in chosen]
 
 
-_TRUTH_LOOK: dict[str, Any] = {
-    "marker": "x",
-    "color": INK,
-    "markersize": 7.0,
-    "markeredgewidth": 1.6,
-    "linestyle": "none",
-}
-_MEASUREMENT_LOOK: dict[str, Any] = {
-    "marker": "s",
-    "markerfacecolor": "white",
-    "markeredgecolor": INK,
-    "markersize": 5.5,
-    "markeredgewidth": 1.3,
-    "linestyle": "none",
-}
+_TRUTH_LOOK: dict[str, Any] = {"marker": "x", "color": INK, "markersize": 7.0, "mew": 1.6, "linestyle": "none"}
+_MEASUREMENT_LOOK: dict[str, Any] = {"marker": "s", "mfc": "white", "mec": INK, "ms": 5.5, "mew": 1.3, "ls": "none"}
+_ARROW = {"arrowstyle": "-", "linewidth": 0.6, "shrinkA": 1.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
 
 
 def draw_plane(axes: Axes, plane: Plane) -> None:
@@ -235,22 +223,9 @@ def _label(axes: Axes, chosen: Sequence[Section], outlines: Sequence[Floats]) ->
     start = right - (_LABEL_MM + _extra_mm(chosen)) / width_mm(axes) * (right - left)
     anchors = min(anchors, anchors[::-1], key=lambda order: _crossings(order, heights, start))
     for (x, y, index), height in zip(anchors, heights, strict=True):
-        axes.annotate(
-            _range_text(chosen[index]),
-            (x, y),
-            xytext=(start, height),
-            ha="left",
-            va="center",
-            zorder=4.5,
-            arrowprops={
-                "arrowstyle": "-",
-                "color": _colour(index, len(outlines)),
-                "linewidth": 0.6,
-                "shrinkA": 1.0,
-                "shrinkB": 0.0,
-                "relpos": (0.0, 0.5),
-            },
-        )
+        look: dict[str, Any] = {"xytext": (start, height), "ha": "left", "va": "center", "zorder": 4.5}
+        arrow = _ARROW | {"color": _colour(index, len(outlines))}
+        axes.annotate(_range_text(chosen[index]), (x, y), arrowprops=arrow, **look)
 
 
 def _range_text(section: Section) -> str:
