@@ -143,7 +143,7 @@ def figure_grid(
     width_mm: float = WIDTH_MM,
     count: int | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Return a new figure with a grid of axes as of `place_axes`, row by row, of which only the first `count` stay."""
+    """Return a new figure and the axes of `place_axes`, row by row; with `count`, only the first ones."""
     figure = new_figure(height_mm, width_mm)
     panels = [*chain(*place_axes(figure, rows, columns, margins_mm=margins_mm, gaps_mm=gaps_mm))]
     for unused in panels[count:] if count is not None else ():
