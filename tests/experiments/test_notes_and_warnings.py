@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -107,9 +108,9 @@ def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command
 
 
 def test_every_output_with_game_noise_names_its_tie_rule(infoset: Command) -> None:
-    _, out, _ = infoset("experiment", "haiv-2013", "--runs", "2")
+    _, out, _ = infoset("experiment", "haiv-2013", "--runs", "2", "--json", "out.json")
     assert "game noise with the tie rule upper" in out.splitlines()[0]
-    assert "is one adversary" in infoset.json("experiment", "haiv-2013", "--runs", "2")["notes"][0]
+    assert "is one adversary" in json.loads(Path("out.json").read_text())["notes"][0]
     _, out, _ = infoset("compare", "haiv-2013", "--runs", "2", "--strategies", "patient")
     assert "game noise: for each run, the worst of the four tie rules" in out.splitlines()[0]
     assert "is one adversary" in out

@@ -28,7 +28,7 @@ from hypothesis import strategies as st
 from numba import types
 
 from infoset import chain_steps, chains, location, replays, whole_chains
-from infoset.arrays import Floats
+from infoset.arrays import Floats, Integers
 from infoset.chains import CAPACITY, FIRST_RING, TAKEN
 
 Exact = tuple[Fraction, Fraction]
@@ -76,9 +76,26 @@ MISS: Exact = (Fraction(0), Fraction(1))
 AXES: list[Exact] = [(Fraction(x), Fraction(y)) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))]
 
 
+def rounded(points: Sequence[Exact]) -> Floats:
+    return np.array([(float(v), float(m)) for v, m in points])
+
+
+def may_reach(points: Floats, normal: Exact, height: Fraction | None = None) -> Integers:
+    """Return the points that may lie above a height, by default above all others: the rest do not, despite rounding."""
+    components = rounded([normal])[0]
+    heights, sizes = points @ components, np.abs(points) @ np.abs(components)
+    level = heights.max() if height is None else float(height)
+    return np.flatnonzero(heights >= level - 1e-14 * (sizes.max() + abs(level)))
+
+
+def highest(points: Sequence[Exact], about: Floats, normal: Exact) -> Fraction:
+    """Return the greatest height; `about` are the points, rounded."""
+    return max(along(normal, points[i]) for i in may_reach(about, normal))
+
+
 def reaches(polygon: Sequence[Exact], normal: Exact) -> tuple[Fraction, Fraction]:
-    heights = [along(normal, point) for point in polygon]
-    return min(heights), max(heights)
+    about = rounded(polygon)
+    return -highest(polygon, about, (-normal[0], -normal[1])), highest(polygon, about, normal)
 
 
 def clip(polygon: Sequence[Exact], normal: Exact, lower: Fraction, upper: Fraction) -> list[Exact]:
@@ -113,12 +130,13 @@ def outside_by(points: Sequence[Exact], polygon: Sequence[Exact], box: Exact) ->
     if not polygon:
         return points[0] if points else None
     sides = [(b[1] - a[1], a[0] - b[0]) for a, b in zip(polygon, [*polygon[1:], polygon[0]], strict=True) if a != b]
+    about, about_points = rounded(polygon), rounded(points)
     for normal in sides + AXES:
-        reach = max(along(normal, point) for point in polygon)
+        reach = highest(polygon, about, normal)
         reach += abs(normal[0]) * box[0] + abs(normal[1]) * box[1]
-        for point in points:
-            if along(normal, point) > reach:
-                return point
+        for i in may_reach(about_points, normal, reach):
+            if along(normal, points[i]) > reach:
+                return points[i]
     return None
 
 
