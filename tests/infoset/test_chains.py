@@ -326,9 +326,10 @@ class Life:
         if not self.narrow:
             # Thinner than rounding: which vertex is the higher or the more to the right is anybody's guess.
             return
+        tolerance = self.tolerance
         for chain, sign in ((right, 1), (left, -1)):
             rises = [sign * along(normal, point) for point in chain]
-            assert all(after >= before - self.tolerance for before, after in pairwise(rises))
+            assert all(after >= before - tolerance for before, after in pairwise(rises))
         self.check_extremes(right, left)
 
     def check_extremes(self, right: list[Exact], left: list[Exact]) -> None:
