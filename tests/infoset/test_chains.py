@@ -28,7 +28,7 @@ from hypothesis import strategies as st
 from numba import types
 
 from infoset import chain_steps, chains, location, replays, whole_chains
-from infoset.arrays import Floats, Integers
+from infoset.arrays import Floats
 from infoset.chains import CAPACITY, FIRST_RING, TAKEN
 
 Exact = tuple[Fraction, Fraction]
@@ -80,12 +80,13 @@ def rounded(points: Sequence[Exact]) -> Floats:
     return np.array([(float(v), float(m)) for v, m in points])
 
 
-def may_reach(points: Floats, normal: Exact, height: Fraction | None = None) -> Integers:
+def may_reach(points: Floats, normal: Exact, height: Fraction | None = None) -> list[int]:
     """Return the points that may lie above a height, by default above all others: the rest do not, despite rounding."""
     components = rounded([normal])[0]
     heights, sizes = points @ components, np.abs(points) @ np.abs(components)
     level = heights.max() if height is None else float(height)
-    return np.flatnonzero(heights >= level - 1e-14 * (sizes.max() + abs(level)))
+    indices: list[int] = np.flatnonzero(heights >= level - 1e-14 * (sizes.max() + abs(level))).tolist()
+    return indices
 
 
 def highest(points: Sequence[Exact], about: Floats, normal: Exact) -> Fraction:
