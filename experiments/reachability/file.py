@@ -198,9 +198,11 @@ def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str
         return _rendezvous(tables)
     except InadmissibleStartError as error:
         violated = "; ".join(f"{name} by {excess:.6g}" for name, excess in error.broken)
+        keys = ["velocity_m_s" if name.startswith("v") else "position_m" for name, _ in error.broken]
         raise InputError(
-            f"{os.fspath(name_or_path)}: initial: the state violates constraints: {violated}; move it "
-            "inside, raise [bounds], or let the cone and keep_in hold from a later period (from_period)"
+            f"{os.fspath(name_or_path)}: initial.{' and '.join(dict.fromkeys(keys))}: the state violates constraints: "
+            f"{violated}; move it inside, raise [bounds], or let the cone and keep_in hold from a later period "
+            "(from_period)"
         ) from None
     except (ValueError, ArithmeticError) as error:
         raise InputError(f"{os.fspath(name_or_path)}: {error}; check the numbers and their units") from None
