@@ -31,7 +31,7 @@ def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points:
         v, m = read(longer, rings, i)
         count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
     most = REDUCED - min(in_right, in_left)
-    count, done = polygon_hull.drop_inner_edges(points, count, most, points[CAPACITY + 2 :].reshape(-1))
+    count, done = polygon_hull.drop_inner_edges(points, count, most, points[CAPACITY + 2 :, 0])
     if not done:
         count = box_around(points, count, sign, tau)
     for i in range(count):
@@ -45,18 +45,14 @@ def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points:
 @allocation_free
 def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
     """Replace a chain by three sides of a box: from its ends along the level to the outermost vertex."""
-    out = 0.0
-    for end in (0, count - 1):
-        for i in range(count):
-            along = sign * (points[i, 0] - points[end, 0])
-            out = max(out, along)
-    last_v, last_m = points[count - 1, 0], points[count - 1, 1]
-    points[1, 0] = points[0, 0] + sign * out
-    points[1, 1] = points[0, 1] + sign * out * tau
-    points[2, 0] = last_v + sign * out
-    points[2, 1] = last_m + sign * out * tau
-    points[3, 0] = last_v
-    points[3, 1] = last_m
+    first_v, first_m, last_v, last_m = points[0, 0], points[0, 1], points[count - 1, 0], points[count - 1, 1]
+    outermost = sign * first_v
+    for i in range(count):
+        outermost = max(outermost, sign * points[i, 0])
+    out = sign * (outermost - min(sign * first_v, sign * last_v))
+    points[1, 0], points[1, 1] = first_v + out, first_m + out * tau
+    points[2, 0], points[2, 1] = last_v + out, last_m + out * tau
+    points[3, 0], points[3, 1] = last_v, last_m
     return 4
 
 
