@@ -166,6 +166,5 @@ def _usage_message(error: Any) -> str:
 
 
 def _ended(message: str, code: int) -> typer.Exit:
-    """Print a message on stderr and return the exit."""
     typer.echo(on_a_screen(message), err=True)
     return typer.Exit(code)

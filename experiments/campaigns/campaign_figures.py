@@ -184,7 +184,6 @@ def _ranks(values: Floats) -> Floats:
 
 
 def _convergence_legend(figure: Figure, drawn: set[float], banded: set[float]) -> None:
-    """Draw the legend: the drawn quantiles, with their drawn intervals, and the levels that are not drawn."""
     handles: list[Any] = []
     labels = []
     for index, level in enumerate(CONVERGING):

@@ -165,7 +165,6 @@ def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
 
 
 def _clouds(folder: CampaignFolder) -> list[Cloud]:
-    """Return the misses across the approach of each noise with rows."""
     miss_m = folder.numbers("miss_m").data
     across_m = np.column_stack([folder.numbers(name).data for name in ("miss_y_m", "miss_z_m")])
     bounds_m = folder.numbers("guaranteed_miss_m").filled(np.inf)

@@ -169,7 +169,6 @@ def _is_shown(table: SweepTable, noise: str, quantile: QuantileName) -> bool:
 
 
 def _decision_patches(table: SweepTable, noise: str) -> list[Patch]:
-    """Return the colours of the decisions that are drawn."""
     verdicts = (table.verdict(cell, noise) for cell in range(len(table.cells)))
     drawn = {verdict.decision for verdict in verdicts if verdict is not None}
     return [
@@ -495,7 +494,6 @@ def _power(axis: Axis) -> int:
 
 
 def _look(levels: Sequence[float], level: float) -> Any:
-    """Return the line style of one of several quantiles."""
     return _DASHES[min(levels.index(level), len(_DASHES) - 1)]
 
 

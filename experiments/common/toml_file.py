@@ -211,7 +211,6 @@ def _with_end(pair: object, end: str, value: object, key: str) -> list[object]:
 
 
 def _text_of_file(form: Form[Tables], path: str) -> str:
-    """Read a file of the user."""
     content = read_input(
         Path(path),
         f"{form.noun} file",
@@ -270,7 +269,6 @@ def _written(path: KeyPath) -> str:
 
 
 def _problem(form: Form[Tables], details: Any) -> Problem:
-    """Return the problem of an error of pydantic."""
     path = tuple(str(part) for part in details["loc"])
     if details["type"] == "missing":
         return Problem(path, MISSING, _remedy_of_missing(form.tables, path))
@@ -303,7 +301,6 @@ def _remedy_of_missing(tables: type[BaseModel], path: KeyPath) -> str:
 
 
 def _unknown(form: Form[Tables], path: KeyPath, value: object) -> tuple[str, str]:
-    """Return the text and the remedy for an unknown key or table."""
     name, home = path[-1], path[:-1]
     known_tables = tables_of(form.tables)
     homes = [heading(form.tables, other) for other in known_tables if name in keys_of(form.tables, (other,))]

@@ -204,7 +204,6 @@ def record_path(option: str, path: Path) -> Path:
 
 
 def _to_arrays(record: Record) -> Arrays:
-    """Put the steps of a record into flat arrays."""
     steps = record.steps
     sections = [section for step in steps for section in step.sections]
     along_y = {}
@@ -349,7 +348,6 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record
 
 
 def _check(arrays: Arrays) -> None:
-    """Refuse arrays that do not fit together."""
     steps, sections = len(arrays["time_s"]), len(arrays["section_label_m"])
     sizes = {"steps": steps, "steps + 1": steps + 1, "sections": sections, "sections + 1": sections + 1}
     for name, values in arrays.items():
@@ -437,7 +435,6 @@ def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:
 
 
 def _polygons(arrays: Arrays) -> list[ConvexPolygons]:
-    """Return the sections of one axis."""
     vertices = arrays["vertex_v_m_s_z_m"]
     return [
         ConvexPolygons.unchecked(vertices[first:last].copy(), np.asarray(last - first))
@@ -446,7 +443,6 @@ def _polygons(arrays: Arrays) -> list[ConvexPolygons]:
 
 
 def _axis_steps(arrays: Arrays) -> list[AxisStep]:
-    """Return the steps of one axis."""
     by_sensor = [_known(arrays, f"{sensor.name}_measured", f"measured_{sensor.quantity}") for sensor in SENSORS]
     columns = (
         [

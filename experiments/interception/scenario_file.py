@@ -254,7 +254,6 @@ def _error_keys(sensor: AngleSensor) -> dict[str, object]:
 
 
 def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
-    """Change units and create the dataclasses of the simulator."""
     try:
         return _composed(tables)
     except ValueError as error:
@@ -304,5 +303,4 @@ def _angle_sensor(values: dict[str, Any], nominal_range_m: float) -> AngleSensor
 
 
 def _fitted(owner: type[Part], table: BaseModel | None) -> Part | None:
-    """Return the dataclass of an optional table."""
     return None if table is None else owner(**si_values(table))

@@ -107,7 +107,6 @@ def _plane(step: StepRecord, name: str, columns: int, braille: bool) -> tuple[li
 
 
 def _bars(record: Record, step: StepRecord, columns: int) -> list[str]:
-    """Return the predicted-miss interval of each axis, on lines of one scale."""
     if step.predicted_miss_m is None:
         return ["the set is empty".center(columns)]
     known = [axis.predicted_miss_m for each in record.steps for axis in each.axes.values()]

@@ -113,7 +113,6 @@ def _few_colours(file: Path) -> bytes:
 
 
 def _draw_planes(row: Sequence[Axes], planes: Sequence[Plane], clock: Clock) -> None:
-    """Draw the sets of one time."""
     for axes in row:
         axes.clear()
     level_planes(row, planes)

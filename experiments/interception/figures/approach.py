@@ -221,7 +221,6 @@ def _draw_b_plane(axes: Axes, record: Record) -> None:
 
 
 def _handles(records: Sequence[Record]) -> list[Line2D | Patch]:
-    """Return the entries of the legend for what is drawn."""
     levels: dict[str, float] = {}
     for record in records:
         levels |= _levels(record)

@@ -69,7 +69,6 @@ def _draw_row(
     *,
     logarithmic: bool,
 ) -> None:
-    """Draw one quantity with both noises, on one scale."""
     everything = np.concatenate([value(each) for each in compared])
     left, right = _ends(everything, [value(each) for each in compared], logarithmic=logarithmic)
     for axes, (noise, _) in zip(row, _NOISES, strict=True):

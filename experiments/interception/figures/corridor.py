@@ -108,12 +108,10 @@ def _draw_impulses(axes: Axes, course: Courses) -> None:
 
 
 def _shown_impulses(course: Courses) -> list[tuple[float, dict[str, Any]]]:
-    """Return the levels of impulses for which there are enough runs, with their lines."""
     return [(level, look) for level, look in _IMPULSES if shows(len(course.impulse_m_s), level)]
 
 
 def _handles(curves: Sequence[Curve], course: Courses) -> list[Line2D | Patch]:
-    """Return the entries of the legend for what is drawn."""
     handles: list[Line2D | Patch] = [
         Line2D([], [], label="possible miss: median", **_MEDIAN),
         Line2D([], [], label="possible miss: greatest", **_GREATEST),

@@ -177,7 +177,6 @@ def _angle_errors(trace: Trace) -> tuple[Integers, Floats, Floats]:
 
 
 def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
-    """Draw the errors of the measured angles and their bound."""
     steps, errors, bounds = _angle_errors(trace)
     times = clock.at(trace[0])[steps]
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
@@ -199,7 +198,6 @@ def _level_angle_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
 
 
 def _level_moduli(row: Sequence[Axes], moduli: Floats) -> None:
-    """Give logarithmic axes the same limits, without the smallest values."""
     known = moduli[moduli > 0.0] if moduli.any() else np.ones(1)
     for axes in row:
         axes.set_yscale("log")
@@ -368,7 +366,6 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], traces: Sequence[Tra
 
 
 def _course(trace: Trace, field: str) -> Floats:
-    """Return a field of all steps along an axis."""
     record, axis = trace
     return np.array([getattr(step.axes[axis], field) for step in record.steps])
 

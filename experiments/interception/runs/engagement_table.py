@@ -32,40 +32,30 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     """Yield the results of engagements side by side, with the paper's for its scenario, for the screen."""
     bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
     lateral = any(record.scenario.is_spatial for record in records)
-    columns = [
-        [
-            *("", "miss, m", *(("miss along y, m", "miss along z, m") if lateral else ()), "impulse, m/s"),
-            *(f"{' / '.join(bounds)}, m", "outcome"),
-            "true state inside the set\nat every step",
-            "smallest distance from the true\nstate to the set's boundary, m",
-            *("miss within the bound Phi", "steps", "seed, run", "strategy"),
-        ]
-    ]
+    columns: list[tuple[str, dict[str, str]]] = []
     for record in records:
-        result = record.result
+        result = {name: values[0] for name, values in record.result.to_dict().items()}
         meter = " + range meter" if record.scenario.range_sensor is not None else ""
-        columns.append(
-            [
-                f"{record.noise_name}{meter}",
-                number(float(result.miss_m[0])),
-                *(number(miss) for miss in result.lateral_miss[0].tolist() if lateral),
-                number(float(result.impulse_m_s[0])),
-                number(result.guaranteed_miss_m.tolist()[0]),
-                _outcome(record),
-                _yes(result.truth_kept.tolist()[0]),
-                number(result.truth_margin_m.tolist()[0]),
-                _yes(result.phi_held.tolist()[0]),
-                str(len(record.steps)),
-                f"{record.seed}, {record.run}",
-                record.strategy,
-            ]
-        )
+        values = {
+            "miss, m": number(result["miss_m"]),
+            **{f"miss along {axis}, m": number(result.get(f"miss_{axis}_m")) for axis in ("y", "z") if lateral},
+            "impulse, m/s": number(result["impulse_m_s"]),
+            f"{' / '.join(bounds)}, m": number(result["guaranteed_miss_m"]),
+            "outcome": _outcome(record),
+            "true state inside the set\nat every step": _yes(result["truth_kept"]),
+            "smallest distance from the true\nstate to the set's boundary, m": number(result["truth_margin_m"]),
+            "miss within the bound Phi": _yes(result["phi_held"]),
+            "steps": str(len(record.steps)),
+            "seed, run": f"{record.seed}, {record.run}",
+            "strategy": record.strategy,
+        }
+        columns.append((f"{record.noise_name}{meter}", values))
         paper = PRINTED_SINGLE_RUN.get(record.noise_name)
         if record.scenario.name == SINGLE and record.scenario.range_sensor is None and paper is not None:
-            columns.append(["paper", number(paper[0]), *[""] * 2 * lateral, number(paper[1]), *[""] * 8])
-    table = number_table(*(title for title, *_ in columns))
-    for row in list(zip(*columns, strict=True))[1:]:
-        table.add_row(*row)
+            columns.append(("paper", {"miss, m": number(paper[0]), "impulse, m/s": number(paper[1])}))
+    table = number_table("", *(title for title, _ in columns))
+    for name in columns[0][1]:
+        table.add_row(name, *(values.get(name, "") for _, values in columns))
     yield " | ".join(dict.fromkeys(record.scenario.name for record in records))
     yield table
     yield from filter(None, map(_both_failures, records))

@@ -93,7 +93,6 @@ def run(options: Experiment) -> None:
 
 
 def _b_plane(scenario: Scenario, curves: Sequence[Curve], noise: NoiseKind) -> Figure:
-    """Draw the misses across the approach of the curves with one noise."""
     clouds = [
         cloud(f"{noise.value} noise, {'with' if curve.range_meter else 'no'} range meter", [curve.results])
         for curve in curves
