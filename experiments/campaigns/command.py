@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from experiments.common.options import Json, Out, Overwrite, Quiet, Seed, Settings
+from experiments.common.options import FileOptions, Json, Overwrite, Quiet, Seed, Settings
 from experiments.interception.command import MOST_RUNS, RangeMeter, ScenarioName, StrategyName, StudyModel, TieName
 
 MOST_WORKERS = 1024
@@ -164,8 +164,8 @@ class Sweep(Flight):
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a sweep of more than a million runs.")] = False
 
 
-@dataclass(frozen=True, kw_only=True)
-class Report:
+@dataclass(frozen=True)
+class Report(FileOptions):
     """Report on a campaign or a sweep, complete or not, from its stored files.
 
     For a campaign: quantiles with 95 % confidence intervals, outcomes of the runs, correlation of the miss with the
@@ -178,7 +178,3 @@ class Report:
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep.")]
     require: Required = None
     show: Shown = None
-    out: Out = None
-    json: Json = None
-    overwrite: Overwrite = False
-    quiet: Quiet = False

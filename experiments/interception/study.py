@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from infoset import Model
 from infoset.arrays import Flags
-from sim import HitEstimate, Scenario
+from sim import HitEstimate, Results, Scenario
 
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 """Levels of the quantiles in tables and JSON, by name."""
@@ -74,6 +76,13 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
         f"hit (miss at most {scenario.body.radius_m:g} m): {hits.hits} of {hits.runs} runs ({percent(hits.probability)}"
         f"), 95 % CI {percent(hits.lower)} to {percent(hits.upper)}"
     )
+
+
+def greatest_guarantee_m(results: Results) -> float | None:
+    """Return the greatest guaranteed miss of runs, m; None if a run has no guarantee."""
+    bounds = results.guaranteed_miss_m
+    known = results.guarantees and not np.ma.getmaskarray(bounds).any()
+    return float(bounds.max()) if known else None
 
 
 def percent(share: float) -> str:

@@ -18,6 +18,7 @@ from experiments.interception.curves import Curve
 from experiments.interception.figures.approach import MARK_LOOK, count_down_pair
 from experiments.interception.figures.b_plane import GUARANTEE_LOOK
 from experiments.interception.figures.distributions import RADIUS_LOOK
+from experiments.interception.study import greatest_guarantee_m
 from sim.statistics import shows
 
 _POSSIBLE_MM, _IMPULSES_MM, _GAP_MM, _BETWEEN_MM = 46.0, 19.0, 3.0, 21.0
@@ -78,18 +79,11 @@ def _draw_possible(axes: Axes, curve: Curve, course: Courses) -> None:
             axes.fill_between(times, low, high, color=SET_FILL, linewidth=0.0)
         axes.plot(times, median, **_MEDIAN)
         axes.plot(times, greatest, **_GREATEST)
-    for value, look in ((_greatest_guaranteed_m(curve), GUARANTEE_LOOK), (course.scenario.radius_m, RADIUS_LOOK)):
+    for value, look in ((greatest_guarantee_m(curve.results), GUARANTEE_LOOK), (course.scenario.radius_m, RADIUS_LOOK)):
         if value:
             axes.axhline(value, **look)
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _greatest_guaranteed_m(curve: Curve) -> float | None:
-    """Return the greatest guaranteed miss of the runs, m; None if a run has no guarantee."""
-    bounds = curve.results.guaranteed_miss_m
-    known = curve.results.guarantees and not np.ma.getmaskarray(bounds).any()
-    return float(bounds.max()) if known else None
 
 
 def _draw_impulses(axes: Axes, course: Courses) -> None:
@@ -120,7 +114,7 @@ def _handles(curves: Sequence[Curve], course: Courses) -> list[Line2D | Patch]:
         handles.insert(1, Patch(facecolor=SET_FILL, label="possible miss: 10 to 90 %"))
     for level, look in _shown_impulses(course):
         handles.append(Line2D([], [], label=f"impulse: {'median' if level == 0.5 else '90 %'}", **look))
-    if any(_greatest_guaranteed_m(curve) for curve in curves):
+    if any(greatest_guarantee_m(curve.results) for curve in curves):
         handles.append(Line2D([], [], label="greatest guaranteed miss Φ", **GUARANTEE_LOOK))
     if course.scenario.radius_m is not None:
         handles.append(Line2D([], [], label=f"body radius, {course.scenario.radius_m:g} m", **RADIUS_LOOK))

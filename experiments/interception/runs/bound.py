@@ -27,8 +27,9 @@ from experiments.interception.command import Bound
 from experiments.interception.figures.bound import draw_bound
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, need_finite, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.study import greatest_guarantee_m
 from guidance import Strategy
-from sim import Outcome, Record, Results, Scenario
+from sim import Record, Results, Scenario
 from sim.bound import BoundError, LowerBound, TruthPair, lower_bound, pair_at
 from sim.pair import PairFlight, fly_pair
 from sim.results import join
@@ -56,27 +57,15 @@ class WorstOfStrategy:
         return max(float(flight.results.miss_m.max()) for _, flight in self.flights)
 
     @property
-    def miss_m(self) -> float:
-        """Greatest miss, m."""
-        return float(self.results.miss_m.max())
-
-    @property
     def set_kept_m(self) -> float | None:
         """Greatest miss of the engagements whose set never became empty, m; None if there is none."""
         results = self.results
         return max(results.miss_m[~results.set_emptied].tolist(), default=None)
 
     @property
-    def outcome(self) -> Outcome:
-        """Outcome of the engagement with the greatest miss."""
-        return self.results.outcomes[int(self.results.miss_m.argmax())]
-
-    @property
     def guaranteed_m(self) -> float | None:
         """Greatest guaranteed miss of all simulations, m; None if the model has no guarantee."""
-        guaranteed = self.results.guaranteed_miss_m
-        known = self.results.guarantees and not np.ma.getmaskarray(guaranteed).any()
-        return float(guaranteed.max()) if known else None
+        return greatest_guarantee_m(self.results)
 
     def over(self, lower: LowerBound) -> float | None:
         """Return the greatest miss with the set never empty, divided by the bound; None if one of them is missing."""
@@ -171,11 +160,11 @@ def _summary(
         "strategies": [
             {
                 "name": strategy.name,
-                "worst_found_m": strategy.miss_m,
+                "worst_found_m": float(strategy.results.miss_m.max()),
                 "worst_found_set_kept_m": strategy.set_kept_m,
                 "guaranteed_m": strategy.guaranteed_m,
                 "worst_over_bound": strategy.over(lower),
-                "outcome": strategy.outcome.value,
+                "outcome": strategy.results.outcomes[int(strategy.results.miss_m.argmax())].value,
                 "worst_of_pairs_m": strategy.pairs_m,
                 **strategy.searched.misses(),
                 "flights": [
