@@ -104,7 +104,7 @@ class Estimate:
         rows = real_values("matrix", matrix)
         if rows.ndim != 2 or rows.shape[1] != self.states:
             raise ValueError(f"matrix must have the shape (m, {self.states}): got {rows.shape}")
-        ends = [np.stack([self.sets.support(sign * row) for row in rows], axis=-1) for sign in (-1.0, 1.0)]
+        ends = [np.array([self.sets.support(sign * row) for row in rows]).T for sign in (-1.0, 1.0)]
         lower, upper = (np.where(np.isinf(end), np.nan, end) for end in ends)
         return self._runs(0.0 - lower), self._runs(upper)
 

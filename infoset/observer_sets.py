@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import observer_steps, polygon_batches
+from infoset import observer_steps
 from infoset.arrays import Flags, Floats, Integers
 from infoset.convex_polygons import ConvexPolygons
 from infoset.polytope import Polytope
@@ -110,9 +110,7 @@ class Polygons:
 
     def support(self, direction: Floats) -> Floats:
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
-        values = np.empty((len(self.counts), 3))
-        polygon_batches.support(self.vertices, self.counts, values, np.tile(direction, (len(values), 1)))
-        return values[:, 0]
+        return observer_steps.support_all(self.vertices, self.counts, direction)
 
     def chebyshev_centres(self, states: int) -> Floats:
         """Return the centres of largest discs, shape (B, 2); NaN for the empty set."""

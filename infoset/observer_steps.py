@@ -292,3 +292,14 @@ def cut_to_preimage(
             if count == 0:
                 break
         made[b] = count
+
+
+@compiled
+def support_all(vertices: Floats, counts: Integers, direction: Floats) -> Floats:
+    """Return the greatest height of each polygon along a direction; -inf for the empty set."""
+    heights = np.full(counts.size, -np.inf)
+    for b in range(counts.size):
+        if counts[b] > 0:
+            top = polygon.support_index(vertices[b], counts[b], direction[0], direction[1])
+            heights[b] = polygon.height(vertices[b], top, direction[0], direction[1])
+    return heights
