@@ -280,18 +280,17 @@ class _Pursuit:
         drift = spell * float(np.linalg.norm(self._pursuer.start[3:] - self._evader.start[3:]))
         if not last and min(distance(0.0), distance(spell)) - self._radius > _WIDE * drift:
             return None
+        if self._radius == 0.0 and not last:
+            return None
         times = np.linspace(0.0, spell, _LOOKS)
+        values = np.array([distance(time) for time in times])
         if self._radius > 0.0:
-            values = np.array([distance(time) for time in times])
             inside = np.flatnonzero(values <= self._radius)
             if not len(inside):
                 return None
             first = int(inside[0])
             at = brentq(lambda time: distance(time) - self._radius, times[first - 1], times[first]) if first else 0.0
             return self._flight(Ended.CAPTURED, self._time + at, distance(at))
-        if not last:
-            return None
-        values = np.array([distance(time) for time in times])
         near = int(np.argmin(values))
         low, high = times[max(0, near - 1)], times[min(_LOOKS - 1, near + 1)]
         at = float(minimize_scalar(distance, bounds=(low, high), method="bounded", options={"xatol": 1e-12}).x)

@@ -138,16 +138,15 @@ class Meter:
         growth = (count / last_count) ** power
         expected_s = perf_counter() - self._began_s + growth * last_s
         expected_mb = 1e-6 * growth * facets * (8.0 * count + 4.0 * growth * facets)
-        if expected_s > self.budget.seconds:
-            raise TooLargeError(
-                f"with a hull of {count} points in R^{size} the exact sets are expected to take {expected_s:.3g} s, "
-                f"more than the limit of {self.budget.seconds:g} s"
-            )
-        if expected_mb > self.budget.megabytes:
-            raise TooLargeError(
-                f"a hull of {count} points in R^{size} is expected to take {expected_mb:.3g} MB, more than the limit "
-                f"of {self.budget.megabytes:g} MB"
-            )
+        for expected, most, unit in (
+            (expected_s, self.budget.seconds, "s"),
+            (expected_mb, self.budget.megabytes, "MB"),
+        ):
+            if expected > most:
+                raise TooLargeError(
+                    f"with a hull of {count} points in R^{size} the exact sets are expected to take {expected:.3g} "
+                    f"{unit}, more than the limit of {most:g} {unit}"
+                )
 
 
 class ExactSets:
