@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
 from enum import Enum
+from typing import Any
 
 Progress = Callable[[float], None]
 
@@ -148,19 +149,19 @@ class Reference:
         ours: float | None,
         *,
         corrected: str | None = None,
-        unexplained: bool = False,
         beyond: float = 0.0,
-        note: str = "",
+        **known: Any,
     ) -> PublishedNumber:
         """Return a number whose tolerance is the rounding of the last digit of `printed`, or of `corrected`.
 
-        `beyond` is added to the tolerance, for the rounding of the inputs of the computation.
+        `beyond` is added to the tolerance, for the rounding of the inputs of the computation; `known` are further
+        fields of `PublishedNumber`.
         """
         band = Band.of_digits(printed, self.units, beyond)
         right = None if corrected is None else Band.of_digits(corrected, self.units, beyond)
         found = None if ours is None else float(ours)
-        number = PublishedNumber(self.paper, source, name, printed, found, band, right, corrected, unexplained, note)
-        return replace(number, origin=self.origin)
+        known |= {"right": right, "corrected": corrected, "origin": self.origin}
+        return PublishedNumber(self.paper, source, name, printed, found, band, **known)
 
     def numbers(self, source: str, printed: Mapping[str, str], ours: Iterable[float | None]) -> list[PublishedNumber]:
         """Return the numbers of a table, printed ones by name."""

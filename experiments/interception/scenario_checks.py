@@ -46,7 +46,8 @@ def cross_problems(known: Known) -> Iterator[Problem]:
     yield from _error_keys(known)
     hint = "exchange them: both are times before the nominal arrival"
     yield from _not_less(known, "angle_sensor", "first_image_s", "last_image_s", hint)
-    yield from _impulses(known)
+    hint = "raise it, or lower the least impulse"
+    yield from _not_less(known, "thruster", "greatest_impulse_m_s", "least_impulse_m_s", hint)
     yield from _schedule(known)
     yield from _periods(known)
     hint = "raise it, or lower fewest_sections"
@@ -198,17 +199,6 @@ def _schedule(known: Known) -> Iterator[Problem]:
             "write times before the nominal arrival, the earliest first, after the start and before the cut-off"
             if key == "impulses_s"
             else "write a time before the nominal arrival that is less than the flight and leaves an impulse possible",
-        )
-
-
-def _impulses(known: Known) -> Iterator[Problem]:
-    least = known.number("thruster", "least_impulse_m_s")
-    greatest = known.number("thruster", "greatest_impulse_m_s")
-    if least is not None and greatest is not None and least > greatest:
-        yield Problem(
-            ("thruster", "least_impulse_m_s"),
-            f"must not exceed thruster.greatest_impulse_m_s, {shown(greatest)}, found {shown(least)}",
-            "lower it, or raise the greatest impulse",
         )
 
 

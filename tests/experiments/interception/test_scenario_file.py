@@ -294,7 +294,7 @@ BAD_VALUES = [
     ("range_sensor", "relative_error", "-0.05", ["greater than 0"]),
     ("thruster", "budget_m_s", "-1.0", ["at least 0"]),
     ("thruster", "least_impulse_m_s", "-0.25", ["at least 0"]),
-    ("thruster", "least_impulse_m_s", "8.0", ["greatest_impulse_m_s, 7.5", "found 8.0", "lower it"]),
+    ("thruster", "greatest_impulse_m_s", "0.2", ["least_impulse_m_s, 0.25", "found 0.2", "raise it"]),
     ("thruster", "greatest_impulse_m_s", "0.0", ["greater than 0"]),
     ("guidance", "step_s", "0.0", ["greater than 0", "for example step_s = 0.5"]),
     ("guidance", "step_s", "-0.5", ["greater than 0"]),
@@ -437,7 +437,7 @@ def test_all_problems_are_told_at_once_in_the_order_of_the_file() -> None:
     paths = [line.split(": ")[1] for line in lines[1:]]
     assert paths == [
         "uncertainty.z_km",
-        "thruster.least_impulse_m_s",
+        "thruster.greatest_impulse_m_s",
         "guidance.step_s",
         "information_set.sectons",
         "noise.kind",
