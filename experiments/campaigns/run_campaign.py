@@ -9,7 +9,7 @@ from rich.table import Table
 from experiments.campaigns.command import Campaign as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, campaign_errors, duration, fly, scenario_of
 from experiments.campaigns.samples import game_notes, heading, sample_json, samples, samples_table, stop_notes
-from experiments.common.errors import InputError
+from experiments.common.errors import input_errors
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import Part, show
 from experiments.interception.choices import own_strategy
@@ -24,10 +24,8 @@ def run(options: Options) -> None:
     with campaign_errors(RESUME_HINT), output_of(options) as written:
         need_arrow()
         scenario, model_notes = scenario_of(options)
-        try:
+        with input_errors("--until"):
             rule = None if options.until is None else StoppingRule.parse(options.until)
-        except ValueError as error:
-            raise InputError(f"--until: {error}") from None
         campaign = Campaign(
             scenario,
             options.runs,

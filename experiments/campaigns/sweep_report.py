@@ -22,7 +22,7 @@ from experiments.campaigns.sweep_table import (
     value_text,
     values_text,
 )
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, input_errors
 from experiments.common.output import Output, hit_key
 from experiments.common.screen import Part, number, number_table
 from experiments.interception.study import SetCounts, set_warnings
@@ -250,15 +250,11 @@ def quantile_options(
     require: str | None, show: str | None, default: str
 ) -> tuple[AnyRequirement, tuple[QuantileName, ...]]:
     """Read the values of --require and --show; a required quantile is always the first of those shown."""
-    try:
+    with input_errors("--require"):
         required = parse_requirement(default if require is None else require)
-    except ValueError as error:
-        raise InputError(f"--require: {error}") from None
-    try:
-        default_shown = SHOWN if isinstance(required, Requirement) else SHOWN_WITH_HITS
+    default_shown = SHOWN if isinstance(required, Requirement) else SHOWN_WITH_HITS
+    with input_errors("--show"):
         chosen = default_shown if show is None else tuple(QuantileName.parse(text) for text in show.split(","))
-    except ValueError as error:
-        raise InputError(f"--show: {error}") from None
     if len(chosen) > MOST_SHOWN:
         raise InputError(f"--show: at most {MOST_SHOWN} quantiles can be drawn, found {len(chosen)}; leave some out")
     first = (required.quantile,) if isinstance(required, Requirement) else ()

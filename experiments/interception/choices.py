@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, input_errors
 from experiments.common.options import choice
 from experiments.interception.own_strategy import is_own_strategy, load_strategy
 from experiments.interception.scenario_file import default_initial_set, load_scenario, read_scenario, scenario_to_toml
@@ -95,10 +95,8 @@ def own_strategy(text: str | None, scenario: Scenario, option: str = "--strategy
     if text is None or not is_own_strategy(text):
         return None
     own = load_strategy(text, option)
-    try:
+    with input_errors(f"{option}: {text}"):
         check_axes(own, scenario.set_model.axes)
-    except ValueError as error:
-        raise InputError(f"{option}: {text}: {error}") from None
     return own
 
 

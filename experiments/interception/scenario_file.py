@@ -216,6 +216,8 @@ def scenario_to_toml(scenario: Scenario) -> str:
             f"scenario {shown(scenario.name)}: its angle sensor has the nominal range {sensor.nominal_range_m!r} m and "
             f"it has {scenario.nominal_range_m!r} m; a scenario file has one, nominal.range_km"
         )
+    line = ("error_at_nominal_range_rad", "error_at_zero_range_rad")
+    other_law = line if sensor.is_camera else ("pixel_error_rad",)
     start = vars(scenario.dispersion).items()
     parts = {table: getattr(scenario, table) for table in ("sun", *OPTIONAL_SENSORS, "target", "body")}
     optional = {table: part and vars(part) for table, part in parts.items()}
@@ -224,7 +226,7 @@ def scenario_to_toml(scenario: Scenario) -> str:
         "nominal": {"range_m": scenario.nominal_range_m, "closing_speed_m_s": model.closing_speed_m_s},
         "uncertainty": vars(model.bounds),
         "dispersion": {name: pair[0] if pair and pair[0] == pair[1] else pair for name, pair in start},
-        "angle_sensor": vars(sensor) | _error_keys(sensor),
+        "angle_sensor": {**vars(sensor), "pixel_error_rad": sensor.pixel_error_rad, **dict.fromkeys(other_law)},
         **optional,
         "thruster": vars(scenario.thruster),
         "guidance": {**vars(model), "strategy": scenario.strategy},
@@ -245,12 +247,6 @@ def scenario_to_toml(scenario: Scenario) -> str:
                 and ((table, key) not in LATER_KEYS or value != keys_of(ScenarioTables, (table,))[key].default)
             ]
     return "\n".join(lines) + "\n"
-
-
-def _error_keys(sensor: AngleSensor) -> dict[str, object]:
-    """Return the keys of the error law of an angle sensor; those of the other law are None."""
-    line = dict.fromkeys(("error_at_nominal_range_rad", "error_at_zero_range_rad"))
-    return {"pixel_error_rad": sensor.pixel_error_rad, **line} if sensor.is_camera else {"pixel_error_rad": None}
 
 
 def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
