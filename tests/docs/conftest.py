@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.experiments.conftest import font_type_of_pdfs  # noqa: F401
+from tests.experiments.conftest import pdfs_with_type_3_fonts  # noqa: F401
 
 ROOT = Path(__file__).resolve().parents[2]
 _BLOCK = re.compile(

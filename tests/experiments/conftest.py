@@ -10,17 +10,19 @@ import pytest
 from experiments.common import figure_style
 from tests.experiments.command_line import Command
 
+FONT_TYPE = figure_style._STYLE["pdf.fonttype"]
+
 
 @pytest.fixture(scope="session", autouse=True)
-def font_type_of_pdfs() -> Iterator[int]:
-    """Write PDF files with Type 3 fonts; return the type of the project's style, whose fonts take ten times as long.
+def pdfs_with_type_3_fonts() -> Iterator[None]:
+    """Write PDF files with Type 3 fonts, which take a tenth of the time of the style's.
 
-    `common/test_figure_style.py` tests the fonts of the style.
+    `common/test_figure_style.py` tests those of the style, of the type `FONT_TYPE`. The tests of other folders import
+    this fixture.
     """
     with pytest.MonkeyPatch.context() as patch:
-        type_of_the_style = figure_style._STYLE["pdf.fonttype"]
         patch.setitem(figure_style._STYLE, "pdf.fonttype", 3)
-        yield type_of_the_style
+        yield
 
 
 @pytest.fixture

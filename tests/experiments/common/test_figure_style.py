@@ -9,6 +9,7 @@ import pytest
 
 from experiments.common import figure_style
 from experiments.common.figure_style import figure_bytes, figure_grid, place_labels, style
+from tests.experiments.conftest import FONT_TYPE
 
 
 @pytest.mark.parametrize("centred", [False, True])
@@ -42,8 +43,8 @@ def test_labels_of_nested_outlines_do_not_touch_and_stay_inside_the_axes(centred
     figure.clear()
 
 
-def test_pdfs_have_truetype_fonts(font_type_of_pdfs: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(figure_style._STYLE, "pdf.fonttype", font_type_of_pdfs)
+def test_pdfs_have_truetype_fonts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(figure_style._STYLE, "pdf.fonttype", FONT_TYPE)
     with style():
         figure, (axes,) = figure_grid(40.0, 1, 1, (10.0, 5.0, 10.0, 5.0), (0.0, 0.0))
         axes.set_xlabel("ν² of $\\Phi_0$, −1 to 1 µm")
