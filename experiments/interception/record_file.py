@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from experiments.common.errors import InputError, shown
+from experiments.common.errors import InputError, on_a_screen, shown
 from experiments.common.file_kinds import ZIP, read_input, use_of_file
 from experiments.common.output import library_version, write_file
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
@@ -192,7 +192,11 @@ def load_record(path: str | os.PathLike[str]) -> Record:
         return _to_record(header, arrays, str(file))
     except Exception as error:  # the readers of archives, arrays and JSON fail in many ways on a hostile file
         use = None if content.startswith(ZIP) else use_of_file(file)
-        reason = f"its header has no key {error}" if isinstance(error, KeyError) else str(error)[:LONGEST_REASON]
+        reason = (
+            f"its header has no key {error}"
+            if isinstance(error, KeyError)
+            else on_a_screen(str(error)[:LONGEST_REASON])
+        )
         raise InputError(f"{file}: {use or f'is not a readable record: {reason}; {REMEDY}'}") from error
 
 
@@ -291,7 +295,8 @@ def _unpack(content: bytes) -> Arrays:
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
         for name in sorted(members.keys() - MEMBERS.keys()) + sorted(_REQUIRED - members.keys()):
-            raise ValueError(f"it has {'a member' if name in members else 'no'} {name}.npy: another program wrote it")
+            what = f"a member {shown(name)}" if name in members else f"no {name}.npy"
+            raise ValueError(f"it has {what}: another program wrote it")
         if any(member.compress_type != zipfile.ZIP_STORED for member in members.values()):
             raise ValueError("it is compressed; records are not")
         if sum(member.file_size for member in archive.infolist()) > len(content):
