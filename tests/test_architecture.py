@@ -10,10 +10,12 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -120,3 +122,10 @@ Returns
 int
 """
     assert without_text(docstring) == ["second : int", "last : int"]
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """Imports for type checkers and imports inside functions count too."""
+    graph = grimp.build_graph("infoset", "guidance", "sim", "rendezvous", "experiments", cache_dir=None)
+    imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    TopologicalSorter(imports).prepare()  # raises CycleError, which names the circle

@@ -156,16 +156,16 @@ class PolytopeArrays:
     @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Self:
         """Return a convex shapely Point, LineString or Polygon as a set of R^2; see `ConvexPolygons.from_shapely`."""
-        from infoset.convex_polygons import ConvexPolygons
+        from infoset.polygon_arrays import PolygonArrays
 
-        vertices = ConvexPolygons.from_shapely(geometry).polygon()
+        vertices = PolygonArrays.from_shapely(geometry).polygon()
         return cls.from_vertices(vertices) if len(vertices) else cls.empty(2)
 
     def to_shapely(self) -> BaseGeometry:
         """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
-        from infoset.convex_polygons import ConvexPolygons
+        from infoset.polygon_arrays import PolygonArrays
 
-        return ConvexPolygons.from_points(self._of_plane().vertices).to_shapely()
+        return PolygonArrays.from_points(self._of_plane().vertices).to_shapely()
 
     def _stretched(self, scale: Floats) -> Self:
         """Return the set whose coordinates are those of this one times a scale, shape (n,)."""
