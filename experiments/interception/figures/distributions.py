@@ -89,8 +89,10 @@ def draw_samples(samples: Sequence[Sample], radius_m: float | None = None) -> Fi
         if sample.guaranteed_miss_m.size:
             handles.append(Line2D([], [], **sample.look | _DOTTED))
             labels.append(sample.guaranteed_name)
-    handles.append(tuple(Line2D([], [], color=sample.look["color"], linewidth=0.7) for sample in samples))
-    labels.append("thin lines: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
+    # The legend fills its first column first: the band ends that column, so that each column has half of the curves.
+    at = len(handles) if len(handles) % 2 else len(handles) // 2
+    handles.insert(at, tuple(Line2D([], [], color=sample.look["color"], linewidth=0.7) for sample in samples))
+    labels.insert(at, "thin lines: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
     for line in draw_radius(left, radius_m):
         handles.append(line)
         labels.append(str(line.get_label()))
