@@ -74,7 +74,13 @@ _LETTERS = "abcdefghijklmnopqrstuvwxyz"
 _MOST_TICKS = 8
 _HEAD_ROOM = 1.06
 """Factor by which an axis is extended, so that the arrow above the topmost point is visible."""
-_DIAMOND: dict[str, Any] = {"marker": "D", "markersize": 4.0, "color": IMPULSE, "mec": "white", "mew": 0.6}
+_DIAMOND: dict[str, Any] = {
+    "marker": "D",
+    "markersize": 4.0,
+    "color": IMPULSE,
+    "markeredgecolor": "white",
+    "markeredgewidth": 0.6,
+}
 _LINE: dict[str, Any] = {"color": INK, "linewidth": 1.3}
 _CLOSED_FORM: dict[str, Any] = {"color": "#2f6b3a", "linewidth": 1.3, "linestyle": (0, (5, 1.5))}
 """Lines on which the estimate and the closed form equal the bound."""

@@ -165,7 +165,7 @@ def separate_labels(axes: Axes, gap_points: float = 2.0) -> None:
         boxes = {}
         for tick in one.get_major_ticks():
             label = tick.label1 if tick.label1.get_visible() else tick.label2
-            if low <= tick.get_loc() <= high and label.get_text():
+            if low <= tick.get_loc() <= high and label.get_visible() and label.get_text():
                 boxes[float(tick.get_loc())] = label.get_window_extent()
         kept = _apart(list(boxes), boxes, end, gap)
         if len(kept) < len(boxes) and one.get_scale() == "log":

@@ -20,7 +20,8 @@ _FLAT = np.cos(np.radians(4.0))
 class Track:
     """A path: points in SI of shape (n, 3) at the times of the page, and the index of its line style and mark.
 
-    A path that ends earlier has fewer points. `choice` is the index of the choice that it belongs to; None is all.
+    A path that ends earlier has fewer points. `choice` is the index of the choice with which it is shown; None shows it
+    with every choice.
     """
 
     name: str

@@ -97,7 +97,7 @@ _OFFSETS = {
     "vertex_offsets": ("vertex_v_m_s_z_m", 1),
     "vertex_y_offsets": ("vertex_v_m_s_y_m", 1),
 }
-"""By member of offsets: the member whose rows they divide, and the least number of rows of a part."""
+"""By member of offsets: the member whose rows they divide, and the least number of rows between two offsets."""
 _RESULT: dict[str, list[Column]] = {}
 """Columns of the result in the header by key; the two components of a start have one key."""
 for _column in columns_of(Results):

@@ -16,7 +16,7 @@ QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 
 @dataclass(frozen=True)
 class SetCounts:
-    """Numbers of runs: all, with the true state inside the set at every step, with an empty set, and with a failure.
+    """Numbers of runs: all, with the true state inside the set at every step, with an empty set, and with a failed set.
 
     A set has failed if it became empty or lost the true state.
     """

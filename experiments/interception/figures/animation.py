@@ -116,8 +116,9 @@ def _draw_planes(row: Sequence[Axes], planes: Sequence[Plane], clock: Clock) -> 
     for axes in row:
         axes.clear()
     level_planes(row, planes)
+    in_space = any(plane.record.scenario.is_spatial for plane in planes)
     for axes, plane in zip(row, planes, strict=True):
         draw_plane(axes, plane)
         time_s = plane.step.time_s
         time = clock.text(plane.record, time_s) if clock.counts_down else f"t = {time_s:.1f} s"
-        label_plane(axes, plane, "", time, axes is row[0])
+        label_plane(axes, plane, "", time, in_space, axes is row[0])

@@ -53,7 +53,13 @@ _TICK_LETTER_MM, _TICK_GAP_MM = 1.4, 1.5
 MARK_LOOK: dict[str, Any] = {"color": LIMIT, "linewidth": 0.8, "linestyle": (0, (1.5, 1.5))}
 _CENTRED_LOOK: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
 _TRUE_LOOK: dict[str, Any] = {"color": INK, "linewidth": 0.9}
-_END_LOOK: dict[str, Any] = {"color": INK, "marker": "x", "markersize": 6.0, "mew": 1.4, "linestyle": "none"}
+_END_LOOK: dict[str, Any] = {
+    "color": INK,
+    "marker": "x",
+    "markersize": 6.0,
+    "markeredgewidth": 1.4,
+    "linestyle": "none",
+}
 _LOGARITHMIC_FROM = 10.0
 """Ratio of the greatest and the least impulse above which their axis is logarithmic."""
 _LEAST_SHOWN = 1e-3

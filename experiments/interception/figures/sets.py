@@ -80,7 +80,8 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             for axes, plane in zip(row, planes, strict=True):
                 _shade_allowed(axes, plane)
                 draw_plane(axes, plane)
-                label_plane(axes, plane, next(letters), clock.text(plane.record, plane.step.time_s), axes is row[0])
+                time = clock.text(plane.record, plane.step.time_s)
+                label_plane(axes, plane, next(letters), time, in_space, axes is row[0])
         measured = any("angle" in plane.along.measured for planes in rows for plane in planes)
         handles: list[Line2D | Patch] = [
             Line2D([], [], label=TRUTH_MARK, **_TRUTH_LOOK),
@@ -159,8 +160,21 @@ def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
     return [sections[index] for index in chosen]
 
 
-_TRUTH_LOOK: dict[str, Any] = {"marker": "x", "color": INK, "markersize": 7.0, "mew": 1.6, "linestyle": "none"}
-_MEASUREMENT_LOOK: dict[str, Any] = {"marker": "s", "mfc": "white", "mec": INK, "ms": 5.5, "mew": 1.3, "ls": "none"}
+_TRUTH_LOOK: dict[str, Any] = {
+    "marker": "x",
+    "color": INK,
+    "markersize": 7.0,
+    "markeredgewidth": 1.6,
+    "linestyle": "none",
+}
+_MEASUREMENT_LOOK: dict[str, Any] = {
+    "marker": "s",
+    "markerfacecolor": "white",
+    "markeredgecolor": INK,
+    "markersize": 5.5,
+    "markeredgewidth": 1.3,
+    "linestyle": "none",
+}
 _ARROW = {"arrowstyle": "-", "linewidth": 0.6, "shrinkA": 1.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
 
 
@@ -179,9 +193,8 @@ def draw_plane(axes: Axes, plane: Plane) -> None:
         axes.text(0.5, 0.94, "no section is left", transform=axes.transAxes, ha="center", va="top")
 
 
-def label_plane(axes: Axes, plane: Plane, letter: str, time: str, is_first: bool) -> None:
-    """Write title and labels; in a plane, only the first axes of a row have labels on the left."""
-    in_space = plane.record.scenario.is_spatial
+def label_plane(axes: Axes, plane: Plane, letter: str, time: str, in_space: bool, is_first: bool) -> None:
+    """Write title and labels; only the first axes of a row have labels on the left, unless a record is in space."""
     along = f" along {plane.axis}" if in_space else ""
     title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
     axes.set_title(f"{letter}{title}, {time}")

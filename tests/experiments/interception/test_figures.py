@@ -24,6 +24,7 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, TieRule
 from infoset import ConvexPolygons
 from sim import Record, Results, StepRecord, band_half_width, fly_one, simulate
+from tests.experiments.campaigns.figure_room import need_room
 
 UNITS = (", m", ", s", ", m/s", ", mrad", ", µrad/s", "(share of runs)")
 RUNS = 6
@@ -240,6 +241,16 @@ def test_distributions_draw_the_band_of_the_half_width(curves: list[Curve]) -> N
         assert {text.get_text() for text in axes.texts} == {"1", "2", "3", "4"}
     (legend,) = figure.legends
     assert "95 % confidence band" in " ".join(text.get_text() for text in legend.get_texts())
+
+
+def test_both_panels_of_the_distributions_have_the_same_ticks(curves: list[Curve]) -> None:
+    figure = draw_distributions(curves)
+    need_room(figure)
+    for axes in figure.axes:
+        ticks = [tick for tick in axes.get_yticks() if -0.01 < tick < 1.01]
+        np.testing.assert_allclose(ticks, [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], atol=1e-12)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert [name[0] for name in names if name[0].isdigit()] == [str(curve.number) for curve in curves]
 
 
 def test_the_radius_of_the_body_is_a_line_with_a_label(curves: list[Curve]) -> None:

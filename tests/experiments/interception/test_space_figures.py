@@ -426,3 +426,12 @@ def test_sections_that_coincide_are_two_and_small_angles_are_in_microradians() -
     low, high = (1e3 * limit for limit in axes.get_ylim())
     ticks = [float(tick.get_text().replace("\N{MINUS SIGN}", "-")) for tick in axes.get_yticklabels()]
     assert sum(low <= tick <= high for tick in ticks) >= 2
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_beside_a_record_in_space_one_of_a_plane_has_labels_on_all_its_axes(records: list[Record], order: int) -> None:
+    planar = fly_one(load_scenario("asteroid-1997"), seed=1)
+    figure = draw_sets([records[0], planar][::order])
+    assert all(axes.yaxis.label.get_visible() and " along " in axes.get_ylabel() for axes in figure.axes)
+    assert all(axes.yaxis.get_tick_params()["labelleft"] for axes in figure.axes)
+    assert all("\nalong " in axes.get_title() for axes in figure.axes)
