@@ -207,8 +207,7 @@ class Campaign:
         if workers is not None and workers < 1:
             raise ValueError(f"need at least one worker: got {workers}")
         with CampaignWriter.begin(Path(self.folder), self.manifest(), resume=resume, beside=beside) as folder:
-            damaged = tuple(folder.damaged)
-            folder.discard_damaged()
+            damaged = folder.discard_damaged()
             self._fly_missing(folder, executor, workers, progress)
         return CampaignResult(folder, damaged)
 

@@ -37,7 +37,7 @@ class CampaignFolder:
     """The stored runs of a campaign or a sweep; `damaged` lists shards that were left out.
 
     A shard is named after its chunk and the CRC-32 of its bytes, and is renamed into place once it is complete: the
-    folder needs no list of its shards.
+    folder needs no list of its shards. When a shard is first read, all its values are checked.
     """
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
@@ -45,6 +45,7 @@ class CampaignFolder:
         self.manifest = manifest
         self.damaged: list[Damage] = []
         self._files: dict[int, Path] = {}
+        self._checked: set[int] = set()
         self._tables = need_arrow()
         self._scan()
 
@@ -160,15 +161,25 @@ class CampaignFolder:
         )
 
     def _read(self, index: int, columns: Sequence[str] | None) -> Any:
-        """Return some columns of a shard, None being all."""
-        file = self._files[index]
+        """Return some columns of a shard, None being all; raise DamagedError if it has changed."""
         try:
-            return self._tables.read(file, columns, with_cell=bool(self.manifest.axes))
+            return self._valid(index, columns)
         except (OSError, ValueError) as error:
             raise DamagedError(
-                f"{file}: the shard has changed or is missing: {str(error)[:200]}; delete it, and simulate its runs "
-                "again with --resume"
+                f"{self._files[index]}: the shard has changed or is missing: {str(error)[:200]}; delete it, and "
+                "simulate its runs again with --resume"
             ) from None
+
+    def _valid(self, index: int, columns: Sequence[str] | None) -> Any:
+        """Return some columns of a shard, None being all; the first reading checks the values of all columns."""
+        file, with_cell = self._files[index], bool(self.manifest.axes)
+        if index in self._checked:
+            return self._tables.read(file, columns, with_cell=with_cell)
+        table = self._tables.read(file, None, with_cell=with_cell)
+        cell, runs = self.manifest.runs_of(index)
+        self._tables.need_valid(table, runs, cell)
+        self._checked.add(index)
+        return table if columns is None else table.select(list(columns))
 
     def _size(self, index: int) -> int:
         return len(self.manifest.runs_of(index)[1])
@@ -210,13 +221,18 @@ class CampaignFolder:
         try:
             if index >= self.manifest.chunks:
                 return "is not a chunk of this campaign"
+            if not file.is_file():
+                return "is not an ordinary file"
+            rows, size = self._size(index), file.stat().st_size
+            if size > self._tables.BYTES_BESIDE_ROWS + self._tables.MOST_BYTES_A_ROW * rows:
+                return f"has {size} bytes, more than any shard of {rows} rows"
             content = file.read_bytes()
         except OSError as error:
             return f"cannot be read: {error.strerror}"
         if zlib.crc32(content) != checksum:
             return f"is truncated or changed: the checksum of its {len(content)} bytes differs from the one in its name"
         wanted = {"campaign": self.manifest.identity, "chunk": str(index)}
-        fault: str | None = self._tables.fault(content, wanted, self._size(index), with_cell=bool(self.manifest.axes))
+        fault: str | None = self._tables.fault(content, wanted, rows, with_cell=bool(self.manifest.axes))
         return fault
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from sim.chunk import Chunk
 from sim.results import Results
-from sim.storage.campaign_folder import SHARDS, CampaignFolder, need_arrow
+from sim.storage.campaign_folder import SHARDS, CampaignFolder, Damage, need_arrow
 from sim.storage.files import (
     LOCK,
     ManifestError,
@@ -78,12 +78,19 @@ class CampaignWriter(CampaignFolder):
         write_whole(file, content)
         self._files[chunk.index] = file
 
-    def discard_damaged(self) -> None:
-        """Delete the damaged shards, so that their chunks are simulated again."""
-        for damage in self.damaged:
+    def discard_damaged(self) -> tuple[Damage, ...]:
+        """Delete and return the damaged shards, so that their chunks are simulated again; check all values for it."""
+        for index, file in sorted(self._files.items()):
+            try:
+                self._valid(index, None)
+            except (OSError, ValueError) as error:
+                del self._files[index]
+                self.damaged.append(Damage(file, str(error)[:200]))
+        damaged, self.damaged = tuple(self.damaged), []
+        for damage in damaged:
             with reporting(damage.file):
                 damage.file.unlink(missing_ok=True)
-        self.damaged = []
+        return damaged
 
     def stop_cells(self, runs: tuple[int, ...]) -> None:
         """Store the number of runs of each cell of a finished sweep whose cells a requirement stopped."""

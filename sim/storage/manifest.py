@@ -20,6 +20,7 @@ from sim.storage.files import ManifestError, reporting, write_whole
 FORMAT = "infoset-campaign"
 SCHEMA = 1
 MANIFEST = "manifest.json"
+LARGEST_BYTES = 10_000_000
 MOST_DIFFERENCES = 20
 MOST_CELLS = 10_000
 MOST_RUNS_A_SHARD = 1_000_000
@@ -231,8 +232,8 @@ def read_manifest(folder: Path) -> Manifest:
             f"{folder}: contains no campaign and no sweep (no file {MANIFEST}); name a folder of infoset campaign or "
             "infoset sweep"
         )
-    with reporting(file):
-        content = file.read_bytes()
+    with reporting(file), file.open("rb") as stream:
+        content = stream.read(LARGEST_BYTES + 1)
     try:
         return _parsed(content)
     except (ValueError, RecursionError) as error:
@@ -240,6 +241,8 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def _parsed(content: bytes) -> Manifest:
+    if len(content) > LARGEST_BYTES:
+        raise ValueError(f"is over {LARGEST_BYTES // 1_000_000} MB")
     value = json.loads(content)
     if not isinstance(value, dict) or value.get("format") != FORMAT:
         raise ValueError(f"format: must be {FORMAT}")

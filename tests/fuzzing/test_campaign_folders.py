@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +16,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sim.storage import CampaignFolder, ManifestError, StorageError, read_manifest
-from sim.storage.manifest import MANIFEST, checksum
+from experiments.cli import main
+from experiments.interception.scenario_file import scenario_to_toml
+from sim import Scenario, Sweep
+from sim.storage import Axis, CampaignFolder, ManifestError, StorageError, read_manifest
+from sim.storage.manifest import LARGEST_BYTES, MANIFEST, checksum
 
 from .measured import Measured, measured
 from .mutations import mutated_bytes
@@ -162,6 +167,111 @@ def test_billions_of_rows_are_refused_in_a_second_and_200_mb(folder: Path) -> No
     many_rows(folder, 334)
     (found,) = measured("campaign", folder)
     check_refused(found, "has 1400897536 rows instead of 1000000")
+
+
+def with_first(name: str, first: Iterable[object]) -> Callable[[Any, Path], None]:
+    """Return a function that writes a table with other values in the first rows of a column."""
+
+    def write(table: Any, file: Path) -> None:
+        values = [*first]
+        values += table.column(name).to_pylist()[len(values) :]
+        pq.write_table(with_column(table, name, pa.array(values, type=table.schema.field(name).type)), file)
+
+    return write
+
+
+INVALID: Mapping[str, tuple[str, Iterable[object], str]] = {
+    "a miss that is not a number": ("miss_m", [float("nan")], "miss_m contains a value that is not a finite number"),
+    "an infinite start": ("x_km", [float("inf")], "x_km contains a value that is not a finite number"),
+    "a great miss": ("miss_m", [1e308], "miss_m must be finite, at most 1e+60 in size: got 1e+308"),
+    "a negative miss": ("miss_m", [-1.0], "miss_m must be at least 0: got -1"),
+    "a negative impulse": ("impulse_m_s", [-1e-3], "impulse_m_s must be at least 0: got -0.001"),
+    "a negative guarantee": ("guaranteed_miss_m", [-5.0], "guaranteed_miss_m must be at least 0: got -5"),
+    "a far start": ("x_km", [1.0, -1e300], "x_km must be finite, at most 1e+60 in size: got -1e+300"),
+    "a great margin": ("truth_margin_m", [-1e200], "truth_margin_m must be finite, at most 1e+60 in size"),
+    "an outcome of another version": ("outcome", ["won"], "outcome contains an unknown text"),
+    "a control character": ("outcome", ["\x1b[31m"], "outcome contains an unknown text"),
+    "an unknown noise": ("noise", ["loud"], "noise contains an unknown text"),
+    "an unknown tie": ("tie", ["x" * 40], "tie contains an unknown text"),
+    "repeated runs": ("run", [12, 12], "run is 12 in row 1, must be 13"),
+    "shifted runs": ("run", range(13, 13 + ROWS), "run is 13 in row 0, must be 12"),
+    "negative runs": ("run", [-1], "run is -1 in row 0, must be 12"),
+    "runs in another order": ("run", [13, 12], "run is 13 in row 0, must be 12"),
+}
+
+
+@pytest.mark.parametrize("case", INVALID)
+def test_invalid_values_under_a_valid_checksum(
+    case: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`infoset report` prints one message; `infoset campaign --resume` simulates the runs again."""
+    name, values, reason = INVALID[case]
+    whole = CampaignFolder.read(folder).table()
+    replaced(folder, with_first(name, values))
+    shard = shard_of(folder)
+    with pytest.raises(StorageError, match="the shard has changed"):
+        CampaignFolder.read(folder).table(["hit"])
+    monkeypatch.setenv("COLUMNS", "1000")
+
+    def infoset(*arguments: object) -> tuple[object, str, str]:
+        with pytest.raises(SystemExit) as left:
+            main([str(argument) for argument in arguments])
+        return left.value.code, *capsys.readouterr()
+
+    message = f"error: {shard}: the shard has changed or is missing: {reason}"
+    for options in ((), ("--out", tmp_path / "out")):
+        code, out, err = infoset("report", folder, *options)
+        assert (code, out) == (2, "")
+        assert err.splitlines()[-1].startswith(message)
+        assert err.endswith("; delete it, and simulate its runs again with --resume\n")
+        assert "Traceback" not in err
+    manifest = read_manifest(folder)
+    (tmp_path / "same.toml").write_text(scenario_to_toml(manifest.scenario))
+    sizes = ("--runs", manifest.runs, "--chunk", manifest.chunk)
+    draws = ("--seed", manifest.seed, "--noise", manifest.noise.value)
+    code, _, err = infoset("campaign", tmp_path / "same.toml", *sizes, *draws, "--out", folder, "--resume")
+    assert (code, f"{shard}: {reason}" in err) == (0, True), err
+    assert CampaignFolder.read(folder).table().equals(whole)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "reason"),
+    [
+        ("cell", [0], "cell is 0 in row 0, must be 1"),
+        ("miss_m", [1e308], "miss_m must be finite"),
+        ("run", [1, 1], "run is 1 in row 0, must be 0"),
+    ],
+)
+def test_invalid_values_in_a_sweep(
+    name: str, values: list[float], reason: str, brief: Scenario, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    budgets = (100.0, 200.0)
+    cells = tuple(replace(brief, thruster=replace(brief.thruster, budget_m_s=budget)) for budget in budgets)
+    Sweep(brief, (Axis("thruster.budget_m_s", budgets),), cells, 3, tmp_path / "sweep").run()
+    replaced(tmp_path / "sweep", with_first(name, values))
+    with pytest.raises(SystemExit) as left:
+        main(["report", str(tmp_path / "sweep")])
+    err = capsys.readouterr().err.replace("\n", " ")
+    assert left.value.code == 2
+    assert reason in err
+    assert "simulate its runs again with --resume" in err
+    assert err.count("error: ") == 1
+
+
+def test_a_shard_that_is_no_file_is_not_waited_for(folder: Path) -> None:
+    os.mkfifo(folder / "shards" / "chunk-0000001-00000000.parquet")
+    (damage,) = CampaignFolder.read(folder).damaged
+    assert damage.reason == "is not an ordinary file"
+
+
+def test_large_files_are_not_read(folder: Path) -> None:
+    os.truncate(shard_of(folder), 10**9)  # the file is sparse, and takes no space on the disk
+    (damage,) = CampaignFolder.read(folder).damaged
+    assert damage.reason == f"has 1000000000 bytes, more than any shard of {ROWS} rows"
+    with (folder / MANIFEST).open("a") as stream:
+        stream.write(" " * LARGEST_BYTES)
+    with pytest.raises(ManifestError, match="is over 10 MB"):
+        read_manifest(folder)
 
 
 @pytest.mark.parametrize("index", [2, 7, 10**9])
