@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
@@ -83,6 +84,7 @@ def by_reference(record: T) -> T:
     return record
 
 
+@cache
 def record_of(fields: type) -> np.dtype[Any]:
     """Return the type of array elements with the fields of a class; kernels take the address of such a record."""
     kinds = {float: np.float64, int: np.int64, bool: np.bool_}
