@@ -102,33 +102,46 @@ def use_of_file(path: Path) -> str | None:
     """Return what a file is, and the command that takes it; None if it is not recognized."""
     try:
         with path.open("rb") as file:
-            content = file.read(LARGEST_FILE_BYTES + 1)
-        if content.startswith(ZIP):
-            return "this may be a record; use infoset replay FILE"
-        if len(content) > LARGEST_FILE_BYTES or max(map(len, content.split(b"\n"))) > LONGEST_LINE:
-            return None
+            return use_of_content(file.read(LARGEST_FILE_BYTES + 1))
+    except (OSError, ValueError):
+        return None
+
+
+def use_of_content(content: bytes) -> str | None:
+    """Return what a file of this content is, and the command that takes it; None if it is not recognized."""
+    if content.startswith(ZIP):
+        return "this may be a record; use infoset replay FILE"
+    if len(content) > LARGEST_FILE_BYTES or max(map(len, content.split(b"\n"))) > LONGEST_LINE:
+        return None
+    try:
         kind = kind_of(tomllib.loads(content.decode("utf-8-sig")))
-    except (OSError, ValueError, RecursionError):
+    except (ValueError, RecursionError):
         return None
     return None if kind is None else taken_by(kind)
 
 
-def read_input(file: Path, noun: str, most_bytes: int, remedy: str) -> bytes:
-    """Return the content of a file of the user; `InputError` if it cannot be read or is larger than any such file."""
+def read_input(file: Path, noun: str, most_bytes: int, remedy: str, *, only_ordinary: bool = False) -> bytes:
+    """Return the content of a file of the user, at most `most_bytes`; raise `InputError` if it cannot be read.
+
+    The file may be a pipe or a device unless `only_ordinary`.
+    """
     try:
-        size = file.stat().st_size
         if file.is_dir():
             raise InputError(f"{file}: {use_of_folder(file, noun)}")
-        if not file.is_file():
+        if only_ordinary and file.exists() and not file.is_file():
             raise InputError(f"{file}: is not an ordinary file; {remedy}")
-        if size > most_bytes:
-            raise InputError(f"{file}: has {size} bytes, more than any {noun} ({most_bytes}); {remedy}")
-        return file.read_bytes()
+        with file.open("rb") as stream:
+            content = stream.read(most_bytes + 1)
     except FileNotFoundError:
         raise InputError(f"{file}: there is no such file; {remedy}") from None
+    except PermissionError:
+        raise InputError(f"{file}: cannot be read: Permission denied; check its permissions") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{file}: cannot be read: {reason}; check its name and permissions") from None
+        raise InputError(f"{shown(str(file))}: cannot be read: {reason}; check the path") from None
+    if len(content) > most_bytes:
+        raise InputError(f"{file}: has more than {most_bytes} bytes, more than any {noun}; {remedy}")
+    return content
 
 
 def use_of_folder(path: Path, wanted: str) -> str:

@@ -25,7 +25,7 @@ from experiments.common.file_kinds import (
     kind_of,
     read_input,
     taken_by,
-    use_of_file,
+    use_of_content,
 )
 from experiments.common.toml_form import (
     ENDS,
@@ -218,7 +218,7 @@ def _text_of_file(form: Form[Tables], path: str) -> str:
         f"check the path, or see `{form.listed_by}` for the built-in names",
     )
     if content.startswith(ZIP):
-        raise InputError(f"{path}: {use_of_file(Path(path))}")
+        raise InputError(f"{path}: {use_of_content(content)}")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -229,18 +229,29 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Items:
-    """An array of `least` to `most` values, each checked by `item`; `noun` names them in messages."""
+    """An array of `least` to `most` values, each checked by `item`.
+
+    In messages, `noun` names the values, and `numbered` a wrong value by its number.
+    """
 
     item: Callable[[object], Any]
     noun: str
     most: int
     least: int = 1
+    numbered: str = "number {} of the array"
 
     def __call__(self, value: object) -> tuple[Any, ...]:
         """Check and return them."""
         if not isinstance(value, list) or not self.least <= len(value) <= self.most:
             raise wrong(f"must be an array of {self.least} to {self.most} {self.noun}")
-        return tuple(self.item(item) for item in value)
+        return tuple(self._checked(number, item) for number, item in enumerate(value, start=1))
+
+    def _checked(self, number: int, item: object) -> Any:
+        try:
+            return self.item(item)
+        except PydanticCustomError as error:
+            context = error.context or {}
+            raise wrong(f"{self.numbered.format(number)} {context['problem']}", context["remedy"]) from None
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ space has further members, those of the y axis; the members that a record in a p
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
@@ -14,7 +15,7 @@ import math
 import os
 import warnings
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, make_dataclass
 from enum import Enum
 from itertools import pairwise
@@ -25,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from experiments.common.errors import InputError, on_a_screen, shown
-from experiments.common.file_kinds import ZIP, read_input, use_of_file
+from experiments.common.errors import InputError, input_errors, on_a_screen, shown
+from experiments.common.file_kinds import ZIP, read_input, use_of_content
 from experiments.common.output import library_version, write_file
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from infoset import ConvexPolygons, Section
@@ -41,7 +42,7 @@ FORMAT = "infoset-record"
 SCHEMA = 2
 LARGEST_FILE_BYTES = 1 << 30
 LARGEST_HEADER_BYTES = 1_000_000
-LONGEST_NAME, LONGEST_REASON = 200, 1000
+LONGEST_NAME, LONGEST_LIBRARY_REASON, LONGEST_REASON = 200, 200, 1000
 REMEDY = "make a record with `infoset engage --record FILE.npz`"
 
 Arrays = dict[str, NDArray[Any]]
@@ -183,21 +184,31 @@ def load_record(path: str | os.PathLike[str]) -> Record:
         If the file is not a record, or has changed since it was written.
     """
     file = Path(path)
-    content = read_input(file, "record", LARGEST_FILE_BYTES, REMEDY)
+    content = read_input(file, "record", LARGEST_FILE_BYTES, REMEDY, only_ordinary=True)
     try:
         arrays = _unpack(content)
         header = _read_header(arrays.pop("header"))
         if header.get("sha256") != _checksum(header, arrays):
             raise ValueError("its contents are not what was written (the checksum differs): the file is damaged")
-        return _to_record(header, arrays, str(file))
-    except Exception as error:  # the readers of archives, arrays and JSON fail in many ways on a hostile file
-        use = None if content.startswith(ZIP) else use_of_file(file)
-        reason = (
-            f"its header has no key {error}"
-            if isinstance(error, KeyError)
-            else on_a_screen(str(error)[:LONGEST_REASON])
-        )
-        raise InputError(f"{file}: {use or f'is not a readable record: {reason}; {REMEDY}'}") from error
+        return _to_record(header, arrays)
+    except RecursionError:
+        reason = "its header is nested too deeply"
+    except (ValueError, InputError) as error:
+        reason = on_a_screen(str(error)[:LONGEST_REASON])
+    use = None if content.startswith(ZIP) else use_of_content(content)
+    raise InputError(f"{file}: {use or f'is not a readable record: {reason}; {REMEDY}'}")
+
+
+@contextlib.contextmanager
+def _library_errors(problem: str, *also: type[Exception]) -> Iterator[None]:
+    """Turn any error of a library that reads a hostile file into a `ValueError`; `MemoryError` only if in `also`."""
+    try:
+        yield
+    except Exception as error:
+        if isinstance(error, MemoryError) and not isinstance(error, also):
+            raise
+        reason = " ".join(str(error).split())[:LONGEST_LIBRARY_REASON] or type(error).__name__
+        raise ValueError(f"{problem} ({reason})") from None
 
 
 def record_path(option: str, path: Path) -> Path:
@@ -292,39 +303,54 @@ def _unpack(content: bytes) -> Arrays:
     """Read the members of an archive, none of which can be larger than the file."""
     if content.count(_LISTED_MEMBER) > 2 * len(MEMBERS):  # numbers may look like one, too
         raise ValueError("it has more members than any record")
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        members = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
-        for name in sorted(members.keys() - MEMBERS.keys()) + sorted(_REQUIRED - members.keys()):
-            what = f"a member {shown(name)}" if name in members else f"no {name}.npy"
-            raise ValueError(f"it has {what}: another program wrote it")
-        if any(member.compress_type != zipfile.ZIP_STORED for member in members.values()):
-            raise ValueError("it is compressed; records are not")
-        if sum(member.file_size for member in archive.infolist()) > len(content):
-            raise ValueError("its declared contents are larger than the file")
-        return {name: _read_array(archive.read(member), name) for name, member in members.items()}
+    incomplete = "it is not a complete .npz archive"
+    with _library_errors(incomplete):
+        archive = zipfile.ZipFile(io.BytesIO(content))
+    members = archive.infolist()
+    names = [member.filename for member in members]
+    unknown = set(names) - {f"{name}.npy" for name in MEMBERS}
+    for name in sorted(unknown) + sorted({f"{name}.npy" for name in _REQUIRED} - set(names)):
+        difference = f"a member {shown(name)}" if name in unknown else f"no {name}"
+        raise ValueError(f"it has {difference}: another program wrote it")
+    if len(names) != len(set(names)):
+        raise ValueError("it has a member twice")
+    if any(member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1 for member in members):
+        raise ValueError("it is compressed or encrypted; records are neither")
+    if sum(member.file_size for member in members) > len(content):
+        raise ValueError("its declared contents are larger than the file")
+    arrays = {}
+    for filename in names:
+        with _library_errors(incomplete):
+            array = archive.read(filename)
+        arrays[filename.removesuffix(".npy")] = _read_array(array, filename.removesuffix(".npy"))
+    return arrays
 
 
 def _read_array(content: bytes, name: str) -> NDArray[Any]:
     """Read an array, whose header must not claim more than its content."""
     member, stream = MEMBERS[name], io.BytesIO(content)
-    with warnings.catch_warnings():
+    # Python's parser raises MemoryError for a header, at most 64 kB, that is nested too deeply.
+    with _library_errors(f"{name}.npy is damaged", MemoryError), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the parser, about headers that are refused below
         np.lib.format.read_magic(stream)
         shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
-    size = len(content) - stream.tell()
-    fits = dtype == np.dtype(member.kind) and not fortran and shape == (*shape[:1], *member.columns)
-    if not fits or size != dtype.itemsize * math.prod(shape):
-        wanted = ", ".join(map(str, ("n", *member.columns)))
-        raise ValueError(
-            f"{name}.npy holds {size} bytes of {dtype} of shape {shape}, not {member.kind} of shape ({wanted})"
-        )
-    return np.frombuffer(content[stream.tell() :], dtype=dtype).reshape(shape)
+    data = content[stream.tell() :]
+    fits = dtype == np.dtype(member.kind) and not fortran
+    if not fits or len(shape) != 1 + len(member.columns) or shape[1:] != member.columns:
+        wanted = str(("n", *member.columns)).replace("'", "")
+        raise ValueError(f"{name}.npy holds {dtype} of shape {shape}, not {member.kind} of shape {wanted}")
+    if len(data) != dtype.itemsize * math.prod(shape):
+        raise ValueError(f"{name}.npy holds {len(data)} bytes, not those of {dtype} of shape {shape}")
+    if member.kind == FLAG and data.strip(b"\0\1"):
+        raise ValueError(f"{name}.npy holds flags other than 0 and 1")
+    return np.frombuffer(data, dtype=dtype).reshape(shape)
 
 
 def _read_header(header: NDArray[Any]) -> dict[str, Any]:
     if header.size > LARGEST_HEADER_BYTES:
         raise ValueError("its header is too long")
-    values = json.loads(header.tobytes().decode())
+    with _library_errors("its header is not JSON"):
+        values = json.loads(header.tobytes().decode())
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise ValueError(f"its header has no format {FORMAT}: another program wrote it")
     if values.get("schema") != SCHEMA or isinstance(values["schema"], bool):
@@ -332,12 +358,17 @@ def _read_header(header: NDArray[Any]) -> dict[str, Any]:
     return values
 
 
-def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record:
+def _to_record(header: Mapping[str, Any], arrays: Arrays) -> Record:
     known = dict(header)
-    toml, *_ = [known.pop(key) for key in ("scenario", "format", "schema", "version", "sha256")]
-    scenario = read_scenario(toml, f"{source}: the scenario in it")
-    columns = known.pop("result")
-    engagement = from_json(_Engagement, {"noise": None, **known})
+    for key in ("version", "scenario", "result"):
+        if key not in known:
+            raise ValueError(f"its header has no key {key}")
+    toml, columns, *_ = [known.pop(key) for key in ("scenario", "result", "format", "schema", "version", "sha256")]
+    if not isinstance(toml, str):
+        raise ValueError(f"its header is wrong: scenario: must be text, found {shown(toml)}")
+    scenario = read_scenario(toml, "the scenario in it")
+    with input_errors("its header is wrong"):
+        engagement = from_json(_Engagement, {"noise": None, **known})
     result = _result_from_json(columns, engagement.run, scenario)
     of_y = {along_y for along_z, along_y in OF_Y.items() if scenario.is_spatial and along_z in arrays}
     for name in sorted(of_y ^ (set(OF_Y.values()) & set(arrays))):
@@ -363,8 +394,8 @@ def _check(arrays: Arrays) -> None:
             raise ValueError(f"{name} holds a number that is not finite, or more than {LARGEST:g} in size")
     if steps == 0:
         raise ValueError("it has no step")
-    if (np.diff(arrays["time_s"], prepend=-SMALLEST) <= 0.0).any():
-        raise ValueError("time_s does not rise")
+    if arrays["time_s"][0] < 0.0 or (np.diff(arrays["time_s"]) <= 0.0).any():
+        raise ValueError("time_s does not rise from a time of at least 0")
     for name, (indexed, least) in _OFFSETS.items():
         if name not in arrays:
             continue

@@ -41,7 +41,7 @@ class Rows:
     def __call__(self, value: object) -> tuple[Row, ...]:
         """Check and return them."""
         numbers = Items(NUMBER, "numbers", self.longest, least=0 if self.gaps else 1)
-        rows = Items(numbers, "rows, each an array of numbers", self.most)(value)
+        rows = Items(numbers, "rows, each an array of numbers", self.most, numbered="row {}:")(value)
         if len({len(row) for row in rows if row}) > 1:
             raise wrong("must have rows of one length")
         return rows
@@ -55,7 +55,9 @@ Widths = Annotated[Row, PlainValidator(Items(Number(least=ZERO), "numbers", MOST
 Series = Annotated[tuple[Row, ...], PlainValidator(Rows(MOST_STEPS, MOST_OUTPUTS, gaps=True))]
 Inputs = Annotated[tuple[Row, ...], PlainValidator(Rows(MOST_STEPS, MOST_OUTPUTS))]
 Steps = Annotated[tuple[int, ...], PlainValidator(Items(Whole(MOST_STEPS - 1, least=0), "steps", MOST_STEPS, least=0))]
-Names = Annotated[tuple[str, ...], PlainValidator(Items(Line(40, empty=False), "texts", MOST_STATES))]
+Names = Annotated[
+    tuple[str, ...], PlainValidator(Items(Line(40, empty=False), "texts", MOST_STATES, numbered="text {} of the array"))
+]
 
 
 class SystemTable(Table):
@@ -139,10 +141,13 @@ def _checks(known: Known) -> Iterator[Problem]:
     if n is None:
         return
     rows = {name: known.value("system", name) for name in ("A", "B", "C")}
-    for name, value in rows.items():
-        if name != "C" and isinstance(value, list) and len(value) != n:
+    for name in ("A", "B"):
+        value = rows[name]
+        if isinstance(value, list) and len(value) != n:
             text = f"has {len(value)} rows, and A has {n} columns"
             yield Problem(("system", name), text, f"write {n} rows, one a state")
+            if name == "A":  # the number of states is unknown
+                return
     sizes = [(("system", name), n) for name in ("C", "offset", "states")]
     sizes += [((table, name), n) for table in ("initial", "disturbance") for form in _FORMS for name in form]
     if isinstance(rows["C"], list):

@@ -62,7 +62,9 @@ STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 OpenAngle = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), below=Decimal(90)))]
 Bound = Annotated[tuple[Decimal, ...], PlainValidator(Numbers(3, POSITIVE, one_for_all=True))]
 FromPeriod = Annotated[int, PlainValidator(Whole(MOST_PERIODS, least=0))]
-Normals = Annotated[Rows, PlainValidator(Items(Numbers(3, NUMBER), "arrays of 3 numbers", MOST_HALFSPACES))]
+Normals = Annotated[
+    Rows, PlainValidator(Items(Numbers(3, NUMBER), "arrays of 3 numbers", MOST_HALFSPACES, numbered="row {}:"))
+]
 Offsets = Annotated[tuple[Decimal, ...], PlainValidator(Items(NUMBER, "numbers", MOST_HALFSPACES))]
 
 

@@ -7,7 +7,7 @@ import json
 import math
 import random
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -220,16 +220,16 @@ def test_what_is_no_file(tmp_path: Path) -> None:
 
 
 def test_an_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(_: Path) -> bytes:  # chmod does not stop root
+    def refuse(*_: object) -> bytes:  # chmod does not stop root
         raise PermissionError(13, "Permission denied")
 
     (tmp_path / "x.npz").write_bytes(b"")
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(InputError, match="cannot be read: Permission denied"):
         load_record(tmp_path / "x.npz")
 
 
-def test_a_file_too_large_is_not_even_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(record_file, "LARGEST_FILE_BYTES", 10)
     (tmp_path / "x.npz").write_bytes(b"x" * 11)
     with pytest.raises(InputError, match="more than any record"):
@@ -351,8 +351,8 @@ def shorter(name: str) -> Callable[[Arrays], None]:
         (header(schema=[1]), "has the schema"),
         (header(format="other"), "has no format infoset-record"),
         (lambda arrays: arrays.update(json=[1]), "has no format infoset-record"),
-        (lambda arrays: arrays["json"].pop("seed"), "seed: Field required"),
-        (lambda arrays: arrays["json"].pop("version"), "has no key 'version'"),
+        (lambda arrays: arrays["json"].pop("seed"), "its header is wrong: seed: Field required"),
+        (lambda arrays: arrays["json"].pop("version"), "its header has no key version"),
         (header(more=1), "more: "),
         (header(seed=-1), "seed: "),
         (header(seed=True), "seed: "),
@@ -365,6 +365,7 @@ def shorter(name: str) -> Callable[[Arrays], None]:
         (header(inconsistency={"step": 1, "label_m": 1e300}), "not at a step"),
         (header(inconsistency={"step": 1}), "inconsistency.label_m: "),
         (header(strategy="\ud800"), "control characters"),
+        (header(scenario=5), "its header is wrong: scenario: must be text, found 5;"),
         (header(scenario="schema = 1"), "the scenario in it"),
         (header(scenario="\ud800"), "the scenario in it"),
         (header(scenario="x = ["), "is not valid TOML"),
@@ -397,6 +398,8 @@ def shorter(name: str) -> Callable[[Arrays], None]:
         (result(truth_margin_m=-1e300), "wrong result"),
         (result(position_m=[1e300, 1.0]), "wrong result"),
         (put("time_s", 3, 0.0), "time_s does not rise"),
+        (put("time_s", 0, -1e-120), "time_s does not rise from a time of at least 0"),
+        (lambda arrays: arrays.update(time_s=np.float64(1.0)), "holds float64 of shape (), not <f8 of shape (n,);"),
         (put("section_offsets", 0, 1), "section_offsets does not run"),
         (put("section_offsets", 5, -1), "section_offsets does not run"),
         (put("section_offsets", 5, 2**63 - 1), "section_offsets does not run"),
@@ -407,9 +410,9 @@ def shorter(name: str) -> Callable[[Arrays], None]:
         (shorter("impulse_m_s"), "impulse_m_s has"),
         (shorter("vertex_offsets"), "vertex_offsets has"),
         (shorter("vertex_v_m_s_z_m"), "vertex_offsets does not run"),
-        (cast("time_s", "<f4"), "bytes of float32"),
-        (cast("time_s", ">f8"), "bytes of >f8"),
-        (cast("section_offsets", "<i4"), "bytes of int32"),
+        (cast("time_s", "<f4"), "holds float32 of shape"),
+        (cast("time_s", ">f8"), "holds >f8 of shape"),
+        (cast("section_offsets", "<i4"), "holds int32 of shape (7,), not <i8 of shape (n,);"),
         (lambda arrays: arrays.update(predicted_miss_m=np.zeros((6, 3))), "shape"),
         (lambda arrays: arrays.update(predicted_miss_m=np.asfortranarray(arrays["predicted_miss_m"])), "shape"),
         (lambda arrays: arrays.update({name: values[:0] for name, values in arrays.items() if name != "json"}), "rows"),
@@ -444,7 +447,7 @@ def test_what_does_not_fit_together(
         (shorter("vertex_v_m_s_y_m"), "vertex_y_offsets does not run"),
         (shorter("vertex_y_offsets"), "vertex_y_offsets has"),
         (shorter("impulse_y_m_s"), "impulse_y_m_s has 5 rows, not 6"),
-        (cast("impulse_y_m_s", "<f4"), "bytes of float32"),
+        (cast("impulse_y_m_s", "<f4"), "holds float32 of shape"),
         (lambda arrays: arrays.update(predicted_miss_y_m=np.zeros((6, 3))), "shape"),
     ],
 )
@@ -479,12 +482,95 @@ def test_a_compressed_archive_is_not_unpacked(content: bytes, tmp_path: Path) ->
     assert "compressed" in refused(remade(content, lambda _: None, compression=zipfile.ZIP_DEFLATED), tmp_path)
 
 
-def test_an_array_that_claims_more_than_it_holds(content: bytes, tmp_path: Path) -> None:
-    head = b"{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999,), }"
-    text = head.ljust(117) + b"\n"
+def with_members(content: bytes, members: Mapping[str, bytes]) -> bytes:
+    """The record with other bytes of members, or with further members."""
     out = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as archive, zipfile.ZipFile(out, "w") as changed:
         for name in archive.namelist():
-            member = archive.read(name)
-            changed.writestr(name, b"\x93NUMPY\x01\x00\x76\x00" + text if name == "time_s.npy" else member)
-    assert "time_s.npy holds 0 bytes" in refused(out.getvalue(), tmp_path)
+            changed.writestr(name, members.get(name, archive.read(name)))
+        for name in members.keys() - set(archive.namelist()):
+            changed.writestr(name, members[name])
+    return out.getvalue()
+
+
+def array_bytes(head: bytes, data: bytes = b"") -> bytes:
+    return b"\x93NUMPY\x01\x00" + (len(head) + 1).to_bytes(2, "little") + head + b"\n" + data
+
+
+@pytest.mark.parametrize(
+    ("name", "member", "part"),
+    [
+        ("time_s.npy", array_bytes(b"{'descr': '<f8', 'fortran_order': False, 'shape': (10**9,), }"), "is damaged"),
+        (
+            "time_s.npy",
+            array_bytes(b"{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999,), }"),
+            "time_s.npy holds 0 bytes",
+        ),
+        ("time_s.npy", b"", "record: time_s.npy is damaged (EOF: reading magic string, expected 8 bytes got 0);"),
+        ("time_s.npy", array_bytes(b"-" * 9000 + b"1"), "record: time_s.npy is damaged (MemoryError);"),
+        (
+            "truth_margin_known.npy",
+            array_bytes(b"{'descr': '|b1', 'fortran_order': False, 'shape': (6,), }", b"\0\1\2\0\1\1"),
+            "truth_margin_known.npy holds flags other than 0 and 1;",
+        ),
+        ("time_s", b"", 'it has a member "time_s": another program wrote it'),
+        (
+            "header.npy",
+            array_bytes(b"{'descr': '|u1', 'fortran_order': False, 'shape': (1,), }", b"{"),
+            "is not JSON (",
+        ),
+    ],
+)
+def test_a_damaged_member(name: str, member: bytes, part: str, content: bytes, tmp_path: Path) -> None:
+    message = refused(with_members(content, {name: member}), tmp_path)
+    assert part in message
+    assert len(message) < len(str(tmp_path)) + 400
+
+
+def test_a_member_twice(content: bytes, tmp_path: Path) -> None:
+    out = io.BytesIO(content)
+    with zipfile.ZipFile(out, "a") as archive, pytest.warns(UserWarning, match="Duplicate name"):
+        archive.writestr("time_s.npy", archive.read("time_s.npy"))
+    assert "it has a member twice;" in refused(out.getvalue(), tmp_path)
+
+
+def test_no_archive_has_a_reason(tmp_path: Path) -> None:
+    assert "record: it is not a complete .npz archive (File is not a zip file);" in refused(b"PK\x03\x04", tmp_path)
+
+
+@pytest.mark.parametrize("error", [EOFError(), AssertionError(), OSError("a\nb" + "c" * 500)])
+def test_an_error_of_the_reader_of_archives_has_a_short_reason(
+    error: Exception, content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> bytes:
+        raise error
+
+    monkeypatch.setattr(zipfile.ZipFile, "read", fail)
+    reason = ("a b" + "c" * 197) if isinstance(error, OSError) else type(error).__name__
+    assert f"record: it is not a complete .npz archive ({reason});" in refused(content, tmp_path)
+
+
+@pytest.mark.parametrize("error", [MemoryError, KeyError, AttributeError])
+@pytest.mark.parametrize("stage", ["_checksum", "_to_record"])
+def test_errors_of_the_program_are_not_errors_of_the_file(
+    stage: str, error: type[Exception], content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise error("steps")
+
+    monkeypatch.setattr(record_file, stage, fail)
+    (tmp_path / "x.npz").write_bytes(content)
+    with pytest.raises(error):
+        load_record(tmp_path / "x.npz")
+
+
+def test_too_little_memory_for_the_archive_is_not_an_error_of_the_file(
+    content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(zipfile.ZipFile, "read", fail)
+    (tmp_path / "x.npz").write_bytes(content)
+    with pytest.raises(MemoryError):
+        load_record(tmp_path / "x.npz")

@@ -165,6 +165,28 @@ def test_wrong_problems_are_refused(text: str, parts: list[str], infoset: Comman
     assert [part for part in parts if part not in err] == []
 
 
+@pytest.mark.parametrize(
+    ("setting", "problem"),
+    [
+        ("system.A=[[1,'a'],[0,1]]", "system.A: row 1: number 2 of the array must be a number, found"),
+        ("system.A=[[1,2],3]", "system.A: row 2: must be an array of 1 to 6 numbers, found"),
+        ("system.A=[[1,2],[3]]", "system.A: must have rows of one length, found"),
+        ("system.A=[[1,2,3],[3,4,5]]", "system.A: has 2 rows, and A has 3 columns;"),
+        ("system.A=[[1,2]]", "system.A: has 1 rows, and A has 2 columns;"),
+        ("system.offset=[1,'a']", "system.offset: number 2 of the array must be a number, found"),
+        ("system.states=['a','']", "system.states: text 2 of the array must not be empty, found"),
+        ("initial.lower=[1,true]", "initial.lower: number 2 of the array must be a number, found"),
+        ("noise.half_width=[-1]", "noise.half_width: number 1 of the array must be at least 0, found"),
+        ("noise.half_width=['1']", 'number 1 of the array must be a number, found ["1"]; write it without quotes'),
+        ("simulation.missing=[3,1.5]", "simulation.missing: number 2 of the array must be a whole number, found"),
+    ],
+)
+def test_a_wrong_element_is_named_in_one_line(setting: str, problem: str, infoset: Command) -> None:
+    err = infoset.refused("observe", "vehicle", "--set", setting)
+    assert problem in err
+    assert err.count("\n") == 1
+
+
 def test_a_contradiction_is_reported(infoset: Command) -> None:
     Path("odd.toml").write_text(changed("[-0.1292621672249405]", "[-1.5]", "observer-2005"))
     code, out, _ = infoset("observe", "odd.toml", "--out", "o", "--html", "page.html", "--smooth")

@@ -263,6 +263,13 @@ SQUARE = "[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0],
         (edited("rendezvous-2021") + CONE, ["cone.axis", "no direction"]),
         (edited("rendezvous-2021") + CONE.replace("[0.0, 0.0, 0.0]", "[1.0, 0.0, 0.0]"), ["initial", "face", "cone"]),
         (
+            edited("rendezvous-2021") + "[[keep_in]]\nnormals = [[1, 0, 0], [0, 'a', 0]]\noffsets_m = [1, nan]\n",
+            [
+                "keep_in #1.normals: row 2: number 2 of the array must be a number, found",
+                "keep_in #1.offsets_m: number 2 of the array must be a finite number, found",
+            ],
+        ),
+        (
             edited("rendezvous-2021") + f"[[keep_in]]\nnormals = {SQUARE}]\noffsets_m = [1.0, 1.0, 1.0, 1.0, 1.0]\n",
             ["keep_in #1", "unbounded along (1, "],
         ),
