@@ -256,17 +256,18 @@ class Items:
 
 @dataclass(frozen=True)
 class Whole:
-    """A whole number from `least` to `most`."""
+    """A whole number from `least` to `most`; the message about a greater one gives the `remedy`."""
 
     most: int
     least: int = 1
+    remedy: str = ""
 
     def __call__(self, value: object) -> int:
         """Check and return it."""
         if isinstance(value, bool) or not isinstance(value, int):
             raise wrong("must be a whole number")
         if not self.least <= value <= self.most:
-            raise wrong(f"must be from {self.least} to {self.most}")
+            raise wrong(f"must be from {self.least} to {self.most}", self.remedy if value > self.most else "")
         return value
 
 

@@ -137,7 +137,7 @@ class ReachabilityTables(ProblemTables):
     thrust: ThrustShape = key(
         '"box" (each component is bounded) or "ball" (the norm is bounded)', '"box"', default=ThrustShape.BOX
     )
-    checks_between_periods: Annotated[int, PlainValidator(Whole(MOST_CHECKS, least=0))] = key(
+    checks_between_periods: Annotated[int, PlainValidator(Whole(MOST_CHECKS, 0, "shorten period_s instead"))] = key(
         "number of instants within a period at which the constraints also hold", "0", default=0
     )
     orbit: OrbitTable = key("the orbit of the passive craft", "")
@@ -200,11 +200,9 @@ def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str
         return _rendezvous(tables)
     except InadmissibleStartError as error:
         violated = "; ".join(f"{name} by {excess:.6g}" for name, excess in error.broken)
-        keys = ["velocity_m_s" if name.startswith("v") else "position_m" for name, _ in error.broken]
         raise InputError(
-            f"{os.fspath(name_or_path)}: initial.{' and '.join(dict.fromkeys(keys))}: the state violates constraints: "
-            f"{violated}; move it inside, raise [bounds], or let the cone and keep_in hold from a later period "
-            "(from_period)"
+            f"{os.fspath(name_or_path)}: initial.position_m: the state violates constraints: {violated}; move it "
+            "inside, or let them hold from a later period (from_period)"
         ) from None
     except (ValueError, ArithmeticError) as error:
         raise InputError(f"{os.fspath(name_or_path)}: {error}; check the numbers and their units") from None
@@ -212,6 +210,16 @@ def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str
 
 def _checks(known: Known) -> Iterator[Problem]:
     """Check the values against each other."""
+    for name in ("position_m", "velocity_m_s"):
+        values, bounds = known.value("initial", name), known.value("bounds", name)
+        limits = bounds if isinstance(bounds, list) else [bounds] * 3
+        for axis, value, limit in zip("xyz", values if isinstance(values, list) else (), limits, strict=False):
+            if limit is not None and abs(Decimal(value)) > Decimal(limit):
+                yield Problem(
+                    ("initial", name),
+                    f"{axis} is outside its bound, {limit}: found {value}",
+                    f"move it inside, or raise bounds.{name}",
+                )
     control = known.value("bounds", "control")
     if known.value("thrust") == "ball" and isinstance(control, list) and len({Decimal(value) for value in control}) > 1:
         yield Problem(("bounds", "control"), "must be one number for thrust in a ball", "write the radius of the ball")

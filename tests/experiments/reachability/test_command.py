@@ -252,7 +252,23 @@ SQUARE = "[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0],
         (edited("approach-cone", semi_major_axis_km="1e-6"), ["period_s", "revolutions"]),
         (
             edited("rendezvous-2021", position_m="[3200.0, -2540.0, 2120.0]"),
-            ["initial.position_m", "x by 200", "raise [bounds]"],
+            [
+                "mine.toml: initial.position_m: x is outside its bound, 3000.0: found 3200.0; move it inside, or raise "
+                "bounds.position_m"
+            ],
+        ),
+        (
+            edited("rendezvous-2021", velocity_m_s="[-3.0, -8.0, 3.0]", eccentricity="1.0", periods="0"),
+            [
+                "initial.velocity_m_s: y is outside its bound, 7.5: found -8.0; move it inside, or raise "
+                "bounds.velocity_m_s",
+                "orbit.eccentricity",
+                "periods: must be from 1 to 256",
+            ],
+        ),
+        (
+            "checks_between_periods = 99\n" + edited("rendezvous-2021"),
+            ["checks_between_periods: must be from 0 to 10, found 99; shorten period_s instead"],
         ),
         (edited("rendezvous-2021", velocity_m_s="[-3.0, 2.0]"), ["initial.velocity_m_s", "array of 3 numbers"]),
         (edited("rendezvous-2021", control="[1.0, 1.0, nan]"), ["bounds.control", "finite"]),
@@ -294,6 +310,17 @@ def test_unsound_files_are_told(text: str, parts: list[str], infoset: Infoset, t
     for part in parts:
         assert part in err
     assert [each.name for each in tmp_path.iterdir()] == ["mine.toml"]
+
+
+def test_a_setting_outside_the_bounds_is_listed_with_other_problems(infoset: Infoset) -> None:
+    settings = ("--set", "initial.position_m=[3200.0, -2540.0, 2120.0]", "--set", "periods=0")
+    code, out, err = infoset("rendezvous-2021", *settings)
+    assert (code, out) == (2, "")
+    assert (
+        "with --set: initial.position_m: x is outside its bound, 3000.0: found 3200.0; move it inside, or raise "
+        "bounds.position_m"
+    ) in err
+    assert "with --set: periods: must be from 1 to 256, found 0" in err
 
 
 def test_a_conflict_says_when_and_by_how_much(infoset: Infoset, tmp_path: Path) -> None:
