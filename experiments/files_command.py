@@ -14,7 +14,7 @@ MODULE = "experiments.files"
 
 BuiltInName = Annotated[str, typer.Argument(help="A built-in name.")]
 FileName = Annotated[str, typer.Argument(help="A file, or a built-in name.")]
-NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
+NewFile = Annotated[Path, typer.Argument(help="The file to write; - is stdout.")]
 
 
 def _commands(noun: str, built_in: str, text: str, example: str) -> typer.Typer:
@@ -85,7 +85,7 @@ def new_problem(
             "observer; or the command that takes it, for example reach.",
         ),
     ],
-    file: NewFile,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")],
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:

@@ -26,12 +26,12 @@ class InputError(Exception):
 
 
 @contextlib.contextmanager
-def input_errors(source: str) -> Iterator[None]:
-    """Turn a `ValueError` into an `InputError` with the name of the file or the option."""
+def input_errors(source: str, remedy: str = "") -> Iterator[None]:
+    """Turn a `ValueError` into an `InputError` with the name of the file or the option, and a remedy at its end."""
     try:
         yield
     except ValueError as error:
-        raise InputError(f"{source}: {error}") from None
+        raise InputError(f"{source}: {error}{remedy}") from None
 
 
 def shown(value: object) -> str:

@@ -66,7 +66,7 @@ def _check_feedback(options: Pursuit) -> None:
 
 def _solve(problem: PursuitProblem, options: Pursuit, evader: EvaderPolicy | None, begin: Begin) -> Report:
     began_s, progress = perf_counter(), begin("solve")
-    with input_errors(problem.source):
+    with input_errors(problem.source, "; correct the problem"):
         solution = solve(problem.game(), all_directions=options.certify)
     progress(0.5)
     certificate = None if solution.capture is None else certify(solution, all_directions=options.certify)

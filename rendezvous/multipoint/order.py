@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import permutations
 from math import factorial
+from operator import getitem
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -114,9 +115,9 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     check_times(tour.start_s, times, times)
     # Whether each target may be visited at each time: its stay must end before the next visit.
     fits = times[:, None] + tour.dwell_s < np.append(times[1:], np.inf)[:, None]
-    orders = np.array(list(permutations(range(count))))
-    unfit = int(np.count_nonzero(~fits[np.arange(count), orders].all(axis=1)))
-    if unfit == len(orders):
+    rows = fits.tolist()
+    unfit = sum(not all(map(getitem, rows, order)) for order in permutations(range(count)))
+    if unfit == factorial(count):
         raise ValueError(
             "no order fits the times: in each one a stay ends after the next visit; make times farther apart, or "
             "stays shorter"

@@ -59,6 +59,16 @@ def test_help_has_an_example(command: list[str], infoset: Command) -> None:
 
 
 @pytest.mark.parametrize(
+    ("command", "arguments"),
+    [("scenarios show", "{name}"), ("scenarios new", "{file}"), ("problems new", "{KIND} {FILE}")],
+)
+def test_help_names_the_arguments(command: str, arguments: str, infoset: Command) -> None:
+    code, out, _ = infoset(*command.split(), "--help")
+    assert code == 0
+    assert f"Usage: infoset {command} [OPTIONS] {arguments}" in out
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["zzz"], "error: no such command 'zzz'; see infoset --help\n"),

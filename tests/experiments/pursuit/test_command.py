@@ -7,6 +7,7 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -146,6 +147,12 @@ def test_what_is_no_game_is_told_in_a_line_with_a_remedy(settings: list[str], in
     assert settings[-1].split("=")[0] in err
     assert ";" in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_of_the_solver_has_a_remedy(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.pursuit.run.solve", Mock(side_effect=ValueError("the game has no end")))
+    code, _, err = infoset("pursuit")
+    assert (code, err) == (2, "error: geo-pursuit: the game has no end; correct the problem\n")
 
 
 def test_time_between_plans_suits_the_game(infoset: Infoset) -> None:

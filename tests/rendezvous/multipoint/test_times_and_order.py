@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
@@ -114,6 +115,20 @@ def test_slots_that_no_order_fits_are_refused(meet: Meet) -> None:
     staying = Tour(motion, DriftingTargets(stays, motion, np.zeros((5, 6))), np.ones(6))
     with pytest.raises(ValueError, match="no order fits the times"):
         best_order_of_slots(staying, 400.0 * np.arange(1.0, 6.0))
+
+
+def test_orders_are_counted_without_a_list_of_them() -> None:
+    targets = tuple(Target(str(number), Meet.RENDEZVOUS, 500.0) for number in range(8))
+    motion = ClohessyWiltshire(1.10e-3)
+    tour = Tour(motion, DriftingTargets(targets, motion, np.zeros((8, 6))), np.ones(6))
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match="no order fits the times"):
+            best_order_of_slots(tour, 400.0 * np.arange(1.0, 9.0))
+        _, most_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most_bytes < 500_000
 
 
 def test_a_long_stay_fits_where_it_is_last() -> None:
