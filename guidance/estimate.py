@@ -24,6 +24,10 @@ class MissEstimate:
         Signed miss and its standard deviation, m. Pending impulses count as given.
     to_go_s : ndarray, shape (B,)
         Time from the impulse that is decided now to the closest approach, s; not negative.
+
+    Notes
+    -----
+    The rate of the line of sight at the impulse is miss / (c tau^2), with the closing speed c and the time to go tau.
     """
 
     miss_m: Floats

@@ -52,8 +52,8 @@ class KalmanBank:
     has this spectral density (Zarchan).
 
     A camera with a constant centroid error has two parts of errors. The pixel part is the noise of the measurements;
-    the variance c^2/3 of the centroid part is added to that of the miss. Errors of the engine add the variance (delta
-    k)^2/3 to that of V_z after an impulse k.
+    the variance c^2/3 of the centroid part is added to that of the miss. Errors of the engine add the variance
+    (delta k)^2/3 to that of V_z after an impulse k.
 
     References
     ----------

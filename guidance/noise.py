@@ -38,8 +38,8 @@ class LineOfSight:
     Parameters
     ----------
     alpha_rad, omega_rad_s : ndarray, shape (B,)
-        True line-of-sight angle (rad) and its rate (rad/s). In space, shape (2, B): the angles atan2(y, x) and atan2(z,
-        x) in every convention of the sensor.
+        True line-of-sight angle (rad) and its rate (rad/s). In space, shape (2, B): the angles atan2(y, x) and
+        atan2(z, x) in every convention of the sensor.
     range_m : ndarray, shape (B,)
         True distance, m.
     sensors : mapping of str to Sensor

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from infoset._compile import allocation_free, constants, inlined
 from infoset.arrays import Floats
-from infoset.chains import EPSILON, Chain, has_vertices, height_in, origin_height, read, vertex, write
+from infoset.chains import EPSILON, Chain, number_vertices, height_in, origin_height, read, vertex, write
 
 ZERO, ONE, TWO = constants(3)
 FORWARD, BACKWARD = ONE, -ONE
@@ -56,7 +56,7 @@ def start(
     """
     for chain in (right, left):
         move_to_zero(chain)
-        has_vertices(chain, TWO)
+        number_vertices(chain, TWO)
     write(right, rings, ZERO, bottom[1], bottom[2] + tau * bottom[1])
     write(right, rings, ONE, top[1], top[2] + tau * top[1])
     write(left, rings, ZERO, top[0], top[2] + tau * top[0])
@@ -198,11 +198,10 @@ def cut_end(
 
 @inlined
 def cut(right: Chain, left: Chain, rings: Floats, tau: float, lower: float, upper: float) -> tuple[bool, float]:
-    """Intersect a section at time to go `tau` with the band lower <= z <= upper; return whether it lives, and the
-    overlap.
+    """Intersect a section at time to go `tau` with the band lower <= z <= upper.
 
-    If the intersection is empty, the section is unchanged. The overlap is the smaller one of section and band at the
-    two borders, m; minus their distance if they do not intersect.
+    Return whether it lives, and the smaller overlap of section and band at the two borders, m: minus their distance if
+    they do not intersect. If the intersection is empty, the section is unchanged.
     """
     least, greatest = heights(right, left, rings, tau)
     overlap = min(greatest - lower, upper - least)

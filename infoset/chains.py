@@ -165,7 +165,7 @@ def write(chain: Chain, rings: Floats, i: int, v: float, m: float) -> None:
 
 
 @inlined
-def has_vertices(chain: Chain, count: int) -> None:
+def number_vertices(chain: Chain, count: int) -> None:
     """Note that a chain consists of `count` vertices, numbered from zero, and that its peak is not known."""
     chain.begin = 0
     chain.end = count
@@ -263,8 +263,8 @@ def copy_section(records: Records, rings: Floats, n: int, to_records: Records, t
     """Copy a section to section `to` of other chains, whose rings must have enough unused room."""
     right, left = chains_of(records, n)
     to_right, to_left = chains_of(to_records, to)
-    has_vertices(to_right, ZERO)
-    has_vertices(to_left, ZERO)
+    number_vertices(to_right, ZERO)
+    number_vertices(to_left, ZERO)
     wanted = room_for(min(count_of(right, left) + ROOM_AHEAD, CAPACITY), room_of(to_right))
     if wanted > room_of(to_right):
         widen_rings(to_right, to_left, to_rings, wanted)

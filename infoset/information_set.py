@@ -218,8 +218,7 @@ class InformationSet(InformationSetView):
             self._recover(emptied, event, *before)
 
     def measure_rate(self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True) -> None:
-        """Cut every section by a measurement of the line-of-sight rate (Kumkov and Patsko, 2001): |omega - omega_m| <=
-        error.
+        """Cut every section by a measurement of the line-of-sight rate: |omega - omega_m| <= error.
 
         Parameters
         ----------
@@ -229,6 +228,10 @@ class InformationSet(InformationSetView):
             Error bound of the rate, rad/s.
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
+
+        References
+        ----------
+        Kumkov and Patsko (2001).
         """
         NOT_NEGATIVE.need("error_rad_s", error_rad_s)
         measured = self._spread(omega_rad_s, "omega_rad_s")

@@ -6,7 +6,7 @@ from infoset import polygon, polygon_hull
 from infoset._compile import ZERO, allocation_free, inlined
 from infoset.arrays import Floats
 from infoset.chain_steps import move_to_zero
-from infoset.chains import CAPACITY, EPSILON, MOST_ADDED, REDUCED, Chain, count_of, has_vertices, read, vertex, write
+from infoset.chains import CAPACITY, EPSILON, MOST_ADDED, REDUCED, Chain, count_of, number_vertices, read, vertex, write
 
 
 @inlined
@@ -39,7 +39,7 @@ def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points:
         # |V| of a new vertex may exceed the previous bound.
         v, _ = vertex(longer, rings, i)
         right.reach = max(right.reach, abs(v))
-    has_vertices(longer, count)
+    number_vertices(longer, count)
 
 
 @allocation_free
@@ -123,4 +123,4 @@ def write_chain(chain: Chain, rings: Floats, points: Floats, count: int, first: 
         at = (first + i) % count
         write(chain, rings, i, points[at, 0], points[at, 1])
     move_to_zero(chain)
-    has_vertices(chain, length)
+    number_vertices(chain, length)

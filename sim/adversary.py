@@ -157,12 +157,13 @@ def find_worst(
 
     Notes
     -----
-    A quarter of the budget is for first plans: game noise with its four tie rules, noise that keeps the upper or the
-    lower extreme in a random or blockwise order, constant and extremal errors, and errors that show the middle between
-    the true motion and one with the same measurements. The plans with the greatest misses are then changed, by a few
-    steps, blocks, switching times or coordinates of the start, and compete with their changes. In the first part of the
-    search, the number of plans from one first plan is limited. In space, both axes have errors of their own, and a
-    change of the angle errors is along one axis or both.
+    A quarter of the budget is for first plans: game noise with its four tie rules and, before a cut-off or
+    scheduled impulses, its shift; noise that keeps the upper or the lower extreme in a random or blockwise order,
+    constant and extremal errors, and errors that show the middle between the true motion and one with the same
+    measurements. The plans with the greatest misses are then changed, by a few steps, blocks, switching times or
+    coordinates of the start, and compete with their changes. In the first part of the search, the number of plans
+    from one first plan is limited. In space, both axes have errors of their own, and a change of the angle errors
+    is along one axis or both.
 
     References
     ----------

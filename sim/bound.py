@@ -80,10 +80,9 @@ class TruthPair:
         return -self.label_m / self.vx_m_s
 
     def difference_m(self, step_s: float) -> tuple[Floats, Floats]:
-        """Return the times of all steps and of the arrival, s, shape (n,), and the differences of the two, m, shape
-        (axes, n).
+        """Return the times of all steps and of the arrival, s, and the differences of the two motions there, m.
 
-        The difference is first motion minus second, along z, or along y and z.
+        The shapes are (n,) and (axes, n). The difference is first motion minus second, along z, or along y and z.
         """
         steps = self.acceleration_m_s2.shape[-1]
         times_s = np.append(np.arange(steps) * step_s, self.arrival_s)

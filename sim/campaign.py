@@ -335,8 +335,16 @@ class Campaign:
 class Sweep(Campaign):
     """A sweep: the same runs in many cells. Starts and errors are the same, so that only the varied values differ.
 
-    The parameters are those of `Campaign`; `runs` is the number of engagements per cell, and the guaranteed miss is not
-    computed by default.
+    Parameters
+    ----------
+    scenario : Scenario
+        Scenario that is varied.
+    axes : tuple of Axis
+        As for `Campaign`; at least one.
+    runs : int
+        Engagements per cell.
+    cells, folder, seed, noise, guarantee, chunk, strategy, until, most_runs, require
+        As for `Campaign`; the guaranteed miss is not computed by default.
 
     Raises
     ------

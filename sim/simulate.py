@@ -30,8 +30,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[int, Step], None] | None = None,
 ) -> Results:
-    """Simulate engagements whose starts and measurement errors are drawn at random; return the results in the order of
-    runs.
+    """Simulate engagements whose starts and measurement errors are drawn at random.
 
     Parameters
     ----------
@@ -48,6 +47,11 @@ def simulate(
     observe : callable or None
         Called at each step of each batch, with the index in `runs` of the batch's first run, and the step: `time_s`,
         `tracking`, `measured`, `predicted_miss`, `impulse_m_s` and `information` (the view of the set), among others.
+
+    Returns
+    -------
+    Results
+        In the order of `runs`.
 
     Raises
     ------

@@ -177,8 +177,9 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
 
     A plane is a facet if the points on it span d - 1 dimensions and are not a subset of the points on another plane. A
     point is a vertex if it is the only common point of the planes through it. O(k m d^2), and O(m^2 k) for matrix
-    products. The hull of the vertices is computed again as a check: it must contain all points, and each simplex of its
-    surface must lie in a facet. Distances of points from planes are either rounding or real: the widest gap among them
+    products. As a check, the hull of the vertices is computed again: it must contain all points, and each simplex of its
+    surface must lie in a facet. With many vertices and fewer facets the intersection of the facets is computed instead:
+    it must have these vertices. Distances of points from planes are either rounding or real: the widest gap among them
     separates the two. If the check fails, fixed tolerances are tried.
     """
     lengths = np.linalg.norm(normals, axis=1)
@@ -238,8 +239,11 @@ def _meet_in(points: Floats, corners: Integers, normals: Floats, offsets: Floats
     """
     vertices = points[corners]
     try:
-        met = HalfspaceIntersection(np.column_stack([normals, -offsets]), vertices.mean(axis=0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            met = HalfspaceIntersection(np.column_stack([normals, -offsets]), vertices.mean(axis=0))
     except QhullError:
+        return False
+    if not np.isfinite(met.intersections).all():  # the facets do not bound a set
         return False
     apart, nearest = cKDTree(vertices).query(met.intersections, p=np.inf)
     return (

@@ -104,7 +104,7 @@ class PolytopeArrays:
 
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
-        """Return {x: lower <= x <= upper}, flat along the axes with equal `lower` and `upper`, shape (n,). Exact."""
+        """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds are equal. Exact."""
         least, most = box_ends(lower, upper, "n")
         unit, wide = np.eye(len(least)), least < most
         corners = list(itertools.product(*(dict.fromkeys(pair) for pair in zip(least, most, strict=True))))

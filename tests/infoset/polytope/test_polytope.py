@@ -90,6 +90,9 @@ def test_many_vertices_and_few_facets() -> None:
     assert not _qhull._meet_in(
         np.vstack([corners, np.zeros(8)]), np.arange(257), normals, offsets, np.vstack([on, on[:1]])
     )
+    for facet in range(3):  # the others do not bound a set
+        rest = np.delete(normals, facet, 0), np.delete(offsets, facet), np.delete(on, facet, 1)
+        assert not _qhull._meet_in(corners, every, *rest)
     on[0] = False
     assert not _qhull._meet_in(corners, every, normals, offsets, on)
 
