@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from infoset._compile import allocation_free, constants, inlined
 from infoset.arrays import Floats
-from infoset.chains import EPSILON, Chain, number_vertices, height_in, origin_height, read, vertex, write
+from infoset.chains import EPSILON, Chain, height_in, number_vertices, origin_height, read, vertex, write
 
 ZERO, ONE, TWO = constants(3)
 FORWARD, BACKWARD = ONE, -ONE

@@ -103,11 +103,11 @@ def enlarge(
 ) -> int:
     """Write a polygon, not empty, that is moved by (shift_x, shift_y) and contains the sum with a small box.
 
-    Half the widths of the box are (half_x, half_y). Return the number of vertices: the result has `count` vertices for most sets, at most count + 4.
-    O(count). The lowest, rightmost, highest and leftmost vertices divide the boundary into four parts, and each part
-    moves by one corner of the box. A dividing vertex moves so that both of its edges move far enough, by at most five
-    boxes; at a sharp tip it becomes two vertices. The division at extremes is correct for edges of a few ulp with a
-    wrong direction.
+    Half the widths of the box are (half_x, half_y). Return the number of vertices: the result has `count` vertices for
+    most sets, at most count + 4. O(count). The lowest, rightmost, highest and leftmost vertices divide the boundary
+    into four parts, and each part moves by one corner of the box. A dividing vertex moves so that both of its edges
+    move far enough, by at most five boxes; at a sharp tip it becomes two vertices. The division at extremes is correct
+    for edges of a few ulp with a wrong direction.
     """
     low = right = high = left = 0
     for i in range(1, count):
@@ -256,9 +256,10 @@ def cut_to_preimage(
 ) -> None:
     """Write the points x of each polygon for which matrix x is in a later polygon.
 
-    The result has at most four vertices more than both. `slack` is the enlargement of the half-planes of the later polygon, relative to the terms of a height. The level of
-    each half-plane is the greatest height of all vertices, so that the half-plane of an edge of a few ulp with a wrong
-    direction contains the set. Half-planes along the axes bound what such edges leave open at sharp tips.
+    The result has at most four vertices more than both. `slack` is the enlargement of the half-planes of the later
+    polygon, relative to the terms of a height. The level of each half-plane is the greatest height of all vertices, so
+    that the half-plane of an edge of a few ulp with a wrong direction contains the set. Half-planes along the axes
+    bound what such edges leave open at sharp tips.
     """
     for b in range(counts.size):
         made[b] = 0

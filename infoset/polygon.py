@@ -328,8 +328,8 @@ def pass_edge(
 def margin(points: Points, count: int, x: float, y: float) -> float:
     """Return the signed distance from (x, y) to the boundary: positive inside, negative outside, -inf if empty.
 
-    O(count). The parity of the edges to the right gives the sign, and the nearest edge the distance. An edge of a few ulp with a
-    wrong direction has no effect on either; the signed distance to its line would be wrong.
+    O(count). The parity of the edges to the right gives the sign, and the nearest edge the distance. An edge of a few
+    ulp with a wrong direction has no effect on either; the signed distance to its line would be wrong.
     """
     nearest = np.inf
     inside = False

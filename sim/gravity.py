@@ -50,10 +50,11 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     `impulses_m_s` is the greatest sum of the impulses' moduli, which change the lateral velocity.
 
     To first order, the difference of the Sun's attraction at two points with distance vector r is
-    (K/R^3)(3 (n . r) n - r), with the direction n of the Sun. Along a lateral axis, with offset a, it is at most (K/R^3)(1.5 |r| + 0.5 |a|),
-    in any direction at most 2 K/R^3 |r|. The lengths of the model scale with V_x, which gravity changes; this adds 0.7
-    |a| and 2 (|r| + |a|) V/|V_x|, with the velocity V across x. R decreases by at most the range and the distance
-    travelled. A margin of 5 % covers the second order and the change of n. docs/guarantee.md has the derivation.
+    (K/R^3)(3 (n . r) n - r), with the direction n of the Sun. Along a lateral axis, with offset a, it is at most
+    (K/R^3)(1.5 |r| + 0.5 |a|), in any direction at most 2 K/R^3 |r|. The lengths of the model scale with V_x, which
+    gravity changes; this adds 0.7 |a| and 2 (|r| + |a|) V/|V_x|, with the velocity V across x. R decreases by at most
+    the range and the distance travelled. A margin of 5 % covers the second order and the change of n. docs/guarantee.md
+    has the derivation.
     """
     if sun is None:
         return replace(model, gravity_m_s2=0.0, gravity_y_m_s2=None, gravity_speed_change=LEAST_SPEED_CHANGE)

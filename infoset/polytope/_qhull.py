@@ -177,10 +177,10 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
 
     A plane is a facet if the points on it span d - 1 dimensions and are not a subset of the points on another plane. A
     point is a vertex if it is the only common point of the planes through it. O(k m d^2), and O(m^2 k) for matrix
-    products. As a check, the hull of the vertices is computed again: it must contain all points, and each simplex of its
-    surface must lie in a facet. With many vertices and fewer facets the intersection of the facets is computed instead:
-    it must have these vertices. Distances of points from planes are either rounding or real: the widest gap among them
-    separates the two. If the check fails, fixed tolerances are tried.
+    products. As a check, the hull of the vertices is computed again: it must contain all points, and each simplex of
+    its surface must lie in a facet. With many vertices and fewer facets the intersection of the facets is computed
+    instead: it must have these vertices. Distances of points from planes are either rounding or real: the widest gap
+    among them separates the two. If the check fails, fixed tolerances are tried.
     """
     lengths = np.linalg.norm(normals, axis=1)
     normals, offsets = normals / lengths[:, None], offsets / lengths
