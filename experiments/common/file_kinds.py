@@ -135,7 +135,7 @@ def read_input(file: Path, noun: str, most_bytes: int, remedy: str, *, only_ordi
     except FileNotFoundError:
         raise InputError(f"{file}: there is no such file; {remedy}") from None
     except PermissionError:
-        raise InputError(f"{file}: cannot be read: Permission denied; check its permissions") from None
+        raise InputError(f"{file}: cannot be read: Permission denied; check its name and permissions") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise InputError(f"{shown(str(file))}: cannot be read: {reason}; check the path") from None
