@@ -130,8 +130,10 @@ def read_input(file: Path, noun: str, most_bytes: int, remedy: str, *, only_ordi
             raise InputError(f"{file}: {use_of_folder(file, noun)}")
         if only_ordinary and file.exists() and not file.is_file():
             raise InputError(f"{file}: is not an ordinary file; {remedy}")
+        # The buffer of a read has the size that is asked for.
+        size = min(most_bytes, file.stat().st_size) if only_ordinary else most_bytes
         with file.open("rb") as stream:
-            content = stream.read(most_bytes + 1)
+            content = stream.read(size + 1)
     except FileNotFoundError:
         raise InputError(f"{file}: there is no such file; {remedy}") from None
     except PermissionError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -56,6 +57,17 @@ def test_no_more_than_the_limit_is_read(tmp_path: Path) -> None:
     assert read_input(file, "file", 10, "shorten it") == b"x" * 10
     with pytest.raises(InputError, match="has more than 9 bytes, more than any file; shorten it"):
         read_input(file, "file", 9, "shorten it")
+
+
+def test_a_small_file_needs_little_memory_whatever_the_limit(tmp_path: Path) -> None:
+    file = tmp_path / "x.npz"
+    file.write_bytes(b"x" * 10)
+    tracemalloc.start()
+    try:
+        assert read_input(file, "record", 1 << 26, "shorten it", only_ordinary=True) == b"x" * 10
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
 
 
 @pipes
