@@ -71,6 +71,19 @@ def environment_is_put_back() -> Iterator[None]:
     assert after == before
 
 
+@pytest.fixture(scope="session", autouse=True)
+def pdfs_with_type_3_fonts() -> Iterator[None]:
+    """Write PDF files with Type 3 fonts, which take a tenth of the time of the style's fonts.
+
+    `experiments/common/test_figure_style.py` tests those of the style.
+    """
+    from experiments.common import figure_style
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(figure_style._STYLE, "pdf.fonttype", 3)
+        yield
+
+
 @pytest.fixture(scope="session")
 def brief() -> Scenario:
     """A short scenario with few sections: the last ten seconds of an approach with a known range."""

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.experiments.conftest import pdfs_with_type_3_fonts  # noqa: F401
-
 ROOT = Path(__file__).resolve().parents[2]
 _BLOCK = re.compile(
     r"(?:^<!-- (?P<comment>[^\n]*?) -->\n)?^(?P<fence>```+|~~~+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=fence)[ ]*$",

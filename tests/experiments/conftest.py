@@ -1,28 +1,13 @@
-"""Running commands in an empty folder; PDF files that are written quickly."""
+"""Running commands in an empty folder."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from experiments.common import figure_style
 from tests.experiments.command_line import Command
-
-FONT_TYPE = figure_style._STYLE["pdf.fonttype"]
-
-
-@pytest.fixture(scope="session", autouse=True)
-def pdfs_with_type_3_fonts() -> Iterator[None]:
-    """Write PDF files with Type 3 fonts, which take a tenth of the time of the style's.
-
-    `common/test_figure_style.py` tests those of the style, of the type `FONT_TYPE`. The tests of other folders import
-    this fixture.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(figure_style._STYLE, "pdf.fonttype", 3)
-        yield
 
 
 @pytest.fixture

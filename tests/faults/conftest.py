@@ -16,7 +16,6 @@ from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import scenario_to_toml
 from sim import Scenario
 from sim.storage import CampaignFolder
-from tests.experiments.conftest import pdfs_with_type_3_fonts  # noqa: F401
 
 
 @dataclass(frozen=True)

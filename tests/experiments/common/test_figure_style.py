@@ -9,7 +9,9 @@ import pytest
 
 from experiments.common import figure_style
 from experiments.common.figure_style import figure_bytes, figure_grid, place_labels, style
-from tests.experiments.conftest import FONT_TYPE
+
+FONT_TYPE = figure_style._STYLE["pdf.fonttype"]
+"""Type of the fonts of the style, read before the fixture `pdfs_with_type_3_fonts` replaces it."""
 
 
 @pytest.mark.parametrize("centred", [False, True])
