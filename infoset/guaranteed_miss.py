@@ -331,6 +331,8 @@ class GuaranteedMiss:
 
     def fire(self, impulse_m_s: Floats, elapsed: int) -> None:
         """Apply impulses, m/s, shape (C, B), to the labels that have left but not arrived."""
+        if not self._pending:
+            return
         e = self._law.closing_speed
         travelled = e * (self._law.step * elapsed)
         doubt = np.stack([impulse_doubts(impulse_m_s, law) for law in self._laws])

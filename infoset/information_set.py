@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -30,7 +32,11 @@ class InformationSetView(SetQueries):
         """
         if name not in self.axes:
             raise ValueError(f"name must be one of the lateral axes, {', '.join(self.axes)}: got {name!r}")
-        return InformationSetView(self._state, name)
+        return self._views[name]
+
+    @cached_property
+    def _views(self) -> dict[str, InformationSetView]:
+        return {name: InformationSetView(self._state, name) for name in self.axes}
 
     def copy(self) -> InformationSet:
         """Return an independent information set that starts from the state of this one.
@@ -324,11 +330,13 @@ class InformationSet(InformationSetView):
         if channels == 1:
             return np.ascontiguousarray(real_array(name, value, (self.batch,)).reshape(1, self.batch))
         values, shape = real_values(name, value), (channels, self.batch)
-        if values.shape not in ((channels,), shape):
+        if values.shape == (channels,):
+            values = np.repeat(values[:, None], self.batch, axis=1)
+        if values.shape != shape:
             raise ValueError(
                 f"{name} must have two values, along y and z, or the shape {shape}: got the shape {values.shape}"
             )
-        return real_array(name, np.broadcast_to(values.T, shape[::-1]).T, shape)
+        return np.ascontiguousarray(real_array(name, values, shape))
 
     def _active(self, where: ArrayLike) -> Flags:
         return np.asarray(self.tracking & flags("where", where, (self.batch,)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from functools import lru_cache
+from functools import cached_property
 from typing import Annotated
 
 from infoset.limits import ADDED_LATER, NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
@@ -229,7 +229,26 @@ class SetModel:
 
         It has plane angles and no error of pointing: `section_laws` adds what couples the two axes.
         """
-        return self if len(self.axes) == 1 else _planar_model(self, name)
+        return self if len(self.axes) == 1 else self._planar[name]
+
+    @cached_property
+    def _planar(self) -> dict[str, SetModel]:
+        """The planar models of a model in space."""
+        along_y = (_of(self.disturbance_y_m_s2, self.disturbance_m_s2), _of(self.gravity_y_m_s2, self.gravity_m_s2))
+        along_z = (self.disturbance_m_s2, self.gravity_m_s2)
+        return {
+            name: replace(
+                self,
+                bounds=self.bounds.axis(name),
+                angle_sensor=self.angle_sensor.axis(name),
+                disturbance_m_s2=disturbance,
+                gravity_m_s2=gravity,
+                disturbance_y_m_s2=None,
+                gravity_y_m_s2=None,
+                pointing_error_rad=0.0,
+            )
+            for name, (disturbance, gravity) in (("y", along_y), ("z", along_z))
+        }
 
     def check_period(self, name: str, sensor: Sensor) -> None:
         """Refuse a sensor whose period is not a whole number of steps; `name` is its name in the message.
@@ -322,22 +341,6 @@ class SetModel:
                 f"gravity_speed_change let it differ by {eta:.3g} of closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
             )
         return least / (1.0 + eta), greatest / (1.0 - eta)
-
-
-@lru_cache(maxsize=64)
-def _planar_model(model: SetModel, name: str) -> SetModel:
-    """Return `SetModel.axis` of a spatial model; strategies ask for it at every step."""
-    own = name == "y"
-    return replace(
-        model,
-        bounds=model.bounds.axis(name),
-        angle_sensor=model.angle_sensor.axis(name),
-        disturbance_m_s2=_of(model.disturbance_y_m_s2 if own else None, model.disturbance_m_s2),
-        gravity_m_s2=_of(model.gravity_y_m_s2 if own else None, model.gravity_m_s2),
-        disturbance_y_m_s2=None,
-        gravity_y_m_s2=None,
-        pointing_error_rad=0.0,
-    )
 
 
 def _of(value: float | None, common: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from infoset.arrays import Flags, Floats
 from infoset.pictures import predicted_miss_svg
@@ -24,7 +24,7 @@ class ExtremePoints:
 
     def axis(self, number: int) -> ExtremePoints:
         """Return the points of one lateral axis in space."""
-        return ExtremePoints(*(getattr(self, field.name)[number] for field in fields(self)))
+        return ExtremePoints(self.alpha_rad[number], self.omega_rad_s[number], self.range_m[number])
 
 
 @dataclass(frozen=True)

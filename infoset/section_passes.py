@@ -403,6 +403,47 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
 
 
 @entry
+def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: Floats) -> None:
+    """Write the least and the greatest alpha of the living sections along each axis, rad, and their ranges, m.
+
+    `extremes`, shape (4, C, B), is not written for engagements without a living section.
+    """
+    slots, used, summaries = sections.slots, sections.used, sections.summaries
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        for b in range(len(used)):
+            none = True
+            for s in range(used[b]):
+                x = range_of(slots[b, s].label, elapsed, law)
+                # Only sections of stopped engagements can be at range zero.
+                if not slots[b, s].living or x == 0.0:
+                    continue
+                least, greatest = summaries[channel, b, s, Z_LEAST] / x, summaries[channel, b, s, Z_GREATEST] / x
+                if none or least < extremes[0, channel, b]:
+                    extremes[0, channel, b], extremes[2, channel, b] = least, x
+                if none or greatest > extremes[1, channel, b]:
+                    extremes[1, channel, b], extremes[3, channel, b] = greatest, x
+                none = False
+
+
+@entry
+def keep_labels_all(active: Flags, least: Floats, greatest: Floats, sections: Sections, removed: Flags) -> int:
+    """Remove the living sections with labels outside limits of shape (B,), m; return their number.
+
+    `removed`, shape (B, S), receives the mask of the removed ones.
+    """
+    number = 0
+    for b in range(len(sections.used)):
+        for s in range(sections.used[b]):
+            slot = sections.slots[b, s]
+            if active[b] and slot.living and not least[b] <= slot.label <= greatest[b]:
+                slot.living = False
+                removed[b, s] = True
+                number += 1
+    return number
+
+
+@entry
 def write_outline(records: chains.Records, rings: Floats, n: int, tau: float, out: Floats) -> int:
     """Call `whole_chains.outline` from Python."""
     right, left = chains.chains_of(records, n)

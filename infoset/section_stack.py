@@ -87,13 +87,13 @@ class SectionStack:
         self._summarise(Freshness.SUMMARISED)
         return self.sections.summaries
 
-    @property
-    def heights(self) -> tuple[Floats, Floats]:
-        """Least and greatest z of each living section, m, each (C, B, S)."""
+    def extreme_angles(self, elapsed: int) -> Floats:
+        """Return the extreme angles of the living sections in the format of `section_passes.extreme_angles_all`."""
         # The predicted misses are usually needed next: one pass computes both.
         self._summarise(Freshness.WITH_HEIGHTS)
-        summaries = self.sections.summaries
-        return summaries[..., section_life.Z_LEAST], summaries[..., section_life.Z_GREATEST]
+        extremes = np.zeros((4, len(self.laws), self.batch))
+        section_passes.extreme_angles_all(elapsed, self.sections, self.table, extremes)
+        return extremes
 
     def _summarise(self, wanted: Freshness) -> None:
         """Update the sections and the summaries."""
@@ -205,11 +205,8 @@ class SectionStack:
 
     def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> tuple[Flags, int]:
         """Remove the living sections with labels outside [least, greatest]; return a mask of them and their number."""
-        inside = (least[:, None] <= self.labels) & (self.labels <= greatest[:, None])
-        used = np.arange(self.labels.shape[1]) < self.sections.used[:, None]
-        removed = active[:, None] & used & self.living & ~inside
-        self.living[removed] = False
-        return removed, int(np.count_nonzero(removed))
+        removed = np.zeros(self.labels.shape, dtype=bool)
+        return removed, section_passes.keep_labels_all(active, least, greatest, self.sections, removed)
 
     def widest(self, elapsed: int, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
         """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`.

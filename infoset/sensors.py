@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from functools import lru_cache
+from functools import cached_property
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -302,7 +302,25 @@ class AngleSensor(Sensor):
 
     def axis(self, name: str) -> AngleSensor:
         """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes negligible."""
-        return _planar_sensor(self, name)
+        return self._planar[name]
+
+    @cached_property
+    def _planar(self) -> dict[str, AngleSensor]:
+        """The sensors of both plane angles, which strategies need at every step."""
+        along_z = (self.error_at_nominal_range_rad, self.error_at_zero_range_rad)
+        along_y = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
+        return {
+            name: replace(
+                self,
+                error_at_nominal_range_rad=at_nominal,
+                error_at_zero_range_rad=at_zero,
+                error_at_nominal_range_y_rad=None,
+                error_at_zero_range_y_rad=None,
+                convention=Convention.PLANE,
+                error_shape=None,
+            )
+            for name, (at_nominal, at_zero) in (("y", along_y), ("z", along_z))
+        }
 
     @property
     def _bounds_of_y(self) -> tuple[float, float]:
@@ -446,23 +464,6 @@ class AngleSensor(Sensor):
         if self.centroid_error_m:
             bound = bound / (1.0 + bound * bound)
         return False, errors * bound * range_m
-
-
-@lru_cache(maxsize=64)
-def _planar_sensor(sensor: AngleSensor, name: str) -> AngleSensor:
-    """Return `AngleSensor.axis` of a sensor; strategies ask for it at every step."""
-    at_nominal, at_zero = sensor.error_at_nominal_range_rad, sensor.error_at_zero_range_rad
-    if name == "y":
-        at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in sensor._bounds_of_y)
-    return replace(
-        sensor,
-        error_at_nominal_range_rad=at_nominal,
-        error_at_zero_range_rad=at_zero,
-        error_at_nominal_range_y_rad=None,
-        error_at_zero_range_y_rad=None,
-        convention=Convention.PLANE,
-        error_shape=None,
-    )
 
 
 def _direction(alpha_rad: Floats) -> Floats:

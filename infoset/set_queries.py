@@ -198,24 +198,9 @@ class SetQueries:
         alpha_least, alpha_greatest, range_of_least, range_of_greatest : ndarray, shape (B,), in space (2, B)
             rad and m; zeros where no section lives.
         """
-        ranges = self.ranges_m
-        # Empty or unused slots may have any range, and so may the sections of stopped engagements.
-        living = self.living & (ranges != 0.0)
-        least, greatest = (self._by_axis(values) for values in self._state.stack.heights)
-        alphas_least = np.divide(least, ranges, out=np.full(least.shape, np.inf), where=living)
-        alphas_greatest = np.divide(greatest, ranges, out=np.full(least.shape, -np.inf), where=living)
-        tracked, rows = living.any(axis=-1), np.arange(len(ranges))
-        least_at, greatest_at = alphas_least.argmin(axis=-1), alphas_greatest.argmax(axis=-1)
-        # By index, because a minimum along the sections takes NumPy several times as long.
-        flat, slots = np.arange(least_at.size).reshape(least_at.shape), ranges.shape[1]
-        found = (
-            alphas_least.reshape(-1, slots)[flat, least_at],
-            alphas_greatest.reshape(-1, slots)[flat, greatest_at],
-            ranges[rows, least_at],
-            ranges[rows, greatest_at],
-        )
-        alpha_least, alpha_greatest, of_least, of_greatest = (np.where(tracked, values, 0.0) for values in found)
-        return alpha_least, alpha_greatest, of_least, of_greatest
+        extremes = self._state.stack.extreme_angles(self._state.history.elapsed)
+        least, greatest, of_least, of_greatest = (self._by_axis(values) for values in extremes)
+        return least, greatest, of_least, of_greatest
 
     def predicted_miss(self, pending: Sequence[tuple[float, Floats]] = ()) -> PredictedMiss:
         """Return the predicted-miss interval of each engagement and the states that reach its ends.
