@@ -13,7 +13,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from experiments.common.errors import InputError, nearest, shown
-from experiments.common.file_kinds import PROBLEM_COMMANDS, SCENARIO, built_in, built_in_files, kind_of, taken_by
+from experiments.common.file_kinds import PROBLEMS, SCENARIO, built_in, built_in_files, kind_of, taken_by
 from experiments.common.options import choice
 from experiments.common.output import STDOUT, library_version, to_json, write_file
 from experiments.common.problem_file import ProblemTables, problem_form
@@ -22,21 +22,12 @@ from experiments.common.toml_file import document_of
 from experiments.common.toml_form import Form, template
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_template, scenario_warnings
 
-LOADERS = {
-    "pareto-encounter": ("pareto", "load_pareto"),
-    "multipoint": ("multipoint", "load_multipoint"),
-    "reachable-rendezvous": ("reachability", "load_rendezvous"),
-    "pursuit-evasion": ("pursuit", "load_pursuit"),
-    "observer": ("observer", "load_observer"),
-}
-"""Folder and loader of each kind of problem; a folder is imported for its files only."""
-
 
 def form_and_loader(kind: str) -> tuple[Form[Any], Callable[[str], Any]]:
     """Return the form and the loader of a kind of problem."""
-    folder, loader = LOADERS[kind]
-    module = import_module(f"experiments.{folder}.file")
-    return module.FORM, getattr(module, loader)
+    problem = PROBLEMS[kind]
+    module = import_module(f"experiments.{problem.folder}.file")
+    return module.FORM, getattr(module, problem.loader)
 
 
 def list_files(noun: str, json: bool, quiet: bool) -> None:
@@ -60,7 +51,7 @@ def list_files(noun: str, json: bool, quiet: bool) -> None:
 
 def show(noun: str, name: str) -> None:
     """Print the file of a built-in scenario or problem."""
-    kinds = [SCENARIO] if noun == SCENARIO else PROBLEM_COMMANDS
+    kinds = [SCENARIO] if noun == SCENARIO else PROBLEMS
     typer.echo(built_in(name, kinds, f"no built-in {noun}").text, nl=False)
 
 
@@ -93,10 +84,10 @@ def _problem_kind(file: str) -> str:
         raise InputError(f"{file}: {taken_by(kind)}")
     if kind is None:
         found = f"found {shown(document['kind'])}" if "kind" in document else "which is missing"
-        guess = nearest(str(document.get("kind")), [*LOADERS])
-        example = f'write for example kind = "{next(iter(LOADERS))}" above the first table'
+        guess = nearest(str(document.get("kind")), [*PROBLEMS])
+        example = f'write for example kind = "{next(iter(PROBLEMS))}" above the first table'
         remedy = f"did you mean {guess}?" if guess else example
-        raise InputError(f"{file}: kind: must be one of {', '.join(LOADERS)}, {found}; {remedy}")
+        raise InputError(f"{file}: kind: must be one of {', '.join(PROBLEMS)}, {found}; {remedy}")
     return kind
 
 
@@ -105,9 +96,9 @@ def new(kind: str | None, file: Path, overwrite: bool, quiet: bool) -> None:
     if kind is None:
         text, steps = scenario_template(), f"infoset scenarios check {file}"
     else:
-        kinds = {command: kind for kind, command in PROBLEM_COMMANDS.items()}
-        kind = kinds.get(kind) or choice("KIND", kind, [*LOADERS])
-        command = PROBLEM_COMMANDS[kind]
+        kinds = {problem.command: kind for kind, problem in PROBLEMS.items()}
+        kind = kinds.get(kind) or choice("KIND", kind, [*PROBLEMS])
+        command = PROBLEMS[kind].command
         head = [
             f"A problem for: infoset {command} FILE. Check it with: infoset problems check FILE",
             "Every key carries its unit in its name. A line `# key = value` is optional: the default or an example.",

@@ -142,9 +142,8 @@ class Scenario:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        for name, sensor in (("range_sensor", self.range_sensor), ("rate_sensor", self.rate_sensor)):
-            if sensor is not None:
-                self.set_model.check_period(name, sensor)
+        for name, sensor in self.sensors.items():
+            self.set_model.check_period(f"{name}_sensor", sensor)
         self._check_axes()
         self.thruster.impulse_steps(self.nominal_arrival_s, self.set_model.step_s)
         self.set_model.check_start("dispersion", self.dispersion)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.common.file_kinds import PROBLEM_COMMANDS, SCENARIO, built_in, built_in_names
+from experiments.common.file_kinds import PROBLEMS, SCENARIO, built_in, built_in_names
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -14,4 +14,4 @@ def scenario_text(name: str) -> str:
 
 
 def problem_text(name: str) -> str:
-    return built_in(name, PROBLEM_COMMANDS, "no built-in problem").text
+    return built_in(name, PROBLEMS, "no built-in problem").text

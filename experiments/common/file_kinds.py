@@ -8,19 +8,29 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from experiments.common.errors import InputError, nearest, shown
 
 SCENARIO = "scenario"
-PROBLEM_COMMANDS = {
-    "pareto-encounter": "pareto",
-    "multipoint": "multipoint",
-    "reachable-rendezvous": "reach",
-    "pursuit-evasion": "pursuit",
-    "observer": "observe",
+
+
+class ProblemKind(NamedTuple):
+    """Command of a kind of problem, and where its files are read: folder of `experiments`, and function in its `file`."""
+
+    command: str
+    folder: str
+    loader: str
+
+
+PROBLEMS = {
+    "pareto-encounter": ProblemKind("pareto", "pareto", "load_pareto"),
+    "multipoint": ProblemKind("multipoint", "multipoint", "load_multipoint"),
+    "reachable-rendezvous": ProblemKind("reach", "reachability", "load_rendezvous"),
+    "pursuit-evasion": ProblemKind("pursuit", "pursuit", "load_pursuit"),
+    "observer": ProblemKind("observe", "observer", "load_observer"),
 }
-"""Command of each kind of problem."""
+"""Kinds of problems by the `kind` of their files."""
 LARGEST_FILE_BYTES = 100_000
 """Size of the largest TOML file that is read."""
 LONGEST_LINE = 1000
@@ -86,7 +96,7 @@ def built_in(name: str, kinds: Collection[str], missing: str) -> BuiltIn:
 def kind_of(document: Mapping[str, Any]) -> str | None:
     """Return the kind of a parsed file: `SCENARIO`, a kind of problem, or None."""
     kind = document.get("kind")
-    if isinstance(kind, str) and kind in PROBLEM_COMMANDS:
+    if isinstance(kind, str) and kind in PROBLEMS:
         return kind
     return SCENARIO if kind is None and len(_SCENARIO_TABLES & document.keys()) >= _FEWEST_TABLES else None
 
@@ -95,7 +105,7 @@ def taken_by(kind: str, file: str = "FILE") -> str:
     """Return what a file of a kind is, and the command that takes it."""
     if kind == SCENARIO:
         return f"this is a scenario; use infoset engage {file}"
-    return f"this is a problem of kind {kind}; use infoset {PROBLEM_COMMANDS[kind]} {file}"
+    return f"this is a problem of kind {kind}; use infoset {PROBLEMS[kind].command} {file}"
 
 
 def use_of_file(path: Path) -> str | None:

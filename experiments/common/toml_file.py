@@ -17,7 +17,7 @@ from experiments.common.errors import InputError, nearest, shown
 from experiments.common.file_kinds import (
     LARGEST_FILE_BYTES,
     LONGEST_LINE,
-    PROBLEM_COMMANDS,
+    PROBLEMS,
     SCENARIO,
     ZIP,
     built_in,
@@ -77,7 +77,7 @@ def _text_of(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> tuple[
     given = os.fspath(name_or_path)
     marks = [mark for mark in (os.sep, os.altsep) if mark]
     is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and not any(mark in given for mark in marks)
-    kinds = [form.kind] if form.kind else PROBLEM_COMMANDS
+    kinds = [form.kind] if form.kind else PROBLEMS
     if is_name and (given in built_in_names(kinds) or not os.path.lexists(given)):
         return built_in(given, kinds, f"no file and no built-in {form.noun}").text, f"{given} (built in)"
     return _text_of_file(form, given), given

@@ -34,7 +34,7 @@ from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.limits import POSITIVE, limits_of
 from infoset.model import MOST_SECTIONS, InitialSet, Model, Recovery, SetModel, StateBox
-from infoset.sensors import AngleSensor, Bias, Convention, ErrorShape, RangeSensor, RateSensor
+from infoset.sensors import SENSORS, AngleSensor, Bias, Convention, ErrorShape, RangeSensor, RateSensor
 from sim.draws import MOST_STEPS
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 
@@ -162,7 +162,7 @@ class RateSensorTable(Table, owner=RateSensor):
     error_rad_s: Decimal = key("greatest error of the line of sight's angular rate", "1e-6")
 
 
-OPTIONAL_SENSORS: Mapping[str, type[Any]] = {"range_sensor": RangeSensor, "rate_sensor": RateSensor}
+OPTIONAL_SENSORS: Mapping[str, type[Any]] = {f"{kind.name}_sensor": kind for kind in SENSORS if kind is not AngleSensor}
 """Kinds of sensors that a scenario may leave out, by table and field; keys of a table are the fields of the kind."""
 
 

@@ -252,13 +252,6 @@ def test_examples_in_the_help_name_options_that_exist() -> None:
         check_options("infoset teleport")
 
 
-def test_the_reference_has_the_help_of_every_command(pages: list[Page]) -> None:
-    (page,) = (each for each in pages if each.name == "docs/reference/commands.md")
-    root: Any = commands()
-    shown = [block.language.removeprefix("{command-help} ") for block in page.blocks()]
-    assert set(root.commands) <= set(shown)
-
-
 def test_the_rules_make_lines_smaller() -> None:
     sweep = reduced("infoset sweep --vary a.b=0.5e-4:5e-4:8,c.d=log:2:20:7 --runs 400 --out x")
     assert sweep == "infoset sweep --vary a.b=0.5e-4:5e-4:2,c.d=log:2:20:2 --runs 2 --out x"

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in_files
+from experiments.common.file_kinds import PROBLEMS, SCENARIO, built_in_files
 from experiments.common.problem_file import problem_toml
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import keys_of, tables_of
 from experiments.files import form_and_loader
 
 Infoset = Callable[..., tuple[int, str, str]]
-KINDS = list(PROBLEM_COMMANDS)
+KINDS = list(PROBLEMS)
 OTHER_CASES = {"y_m", "z_m", "epoch_s", "description"}
 """Keys that do not go with other values of a template, and the description, whose example is text."""
 
@@ -25,10 +25,10 @@ OTHER_CASES = {"y_m", "z_m", "epoch_s", "description"}
 def test_a_template_is_valid_and_solved_by_its_command(kind: str, infoset: Infoset) -> None:
     code, out, err = infoset("problems", "new", kind, "mine.toml")
     assert (code, err) == (0, "")
-    assert f"infoset {PROBLEM_COMMANDS[kind]} mine.toml" in out
+    assert f"infoset {PROBLEMS[kind].command} mine.toml" in out
     code, out, _ = infoset("problems", "check", "mine.toml", "--json")
     assert (code, json.loads(out)["kind"], json.loads(out)["warnings"]) == (0, kind, [])
-    assert infoset(PROBLEM_COMMANDS[kind], "mine.toml", "--quiet") == (0, "", "")
+    assert infoset(PROBLEMS[kind].command, "mine.toml", "--quiet") == (0, "", "")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -36,7 +36,7 @@ def test_a_template_has_every_key_and_optional_keys_have_their_defaults(
     kind: str, infoset: Infoset, tmp_path: Path
 ) -> None:
     form, load = form_and_loader(kind)
-    infoset("problems", "new", PROBLEM_COMMANDS[kind], "mine.toml")
+    infoset("problems", "new", PROBLEMS[kind].command, "mine.toml")
     lines = (tmp_path / "mine.toml").read_text().splitlines()
     problem, seen = load("mine.toml"), set()
     table: tuple[str, ...] = ("",)
@@ -100,7 +100,8 @@ def test_a_new_file_needs_a_known_kind(infoset: Infoset) -> None:
     assert "did you mean pursuit-evasion?" in err
 
 
-COMMANDS = [*PROBLEM_COMMANDS.values(), "pursuit-map", "engage", "experiment", "compare", "bound", "adversary"]
+PROBLEM_COMMANDS = [*(problem.command for problem in PROBLEMS.values()), "pursuit-map"]
+COMMANDS = [*PROBLEM_COMMANDS, "engage", "experiment", "compare", "bound", "adversary"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -108,8 +109,8 @@ def test_a_file_of_another_kind_is_one_message_with_its_command(command: str, in
     for name in ("asteroid-1997", "service-3", "pareto-2008"):
         file = built_in_files()[name]
         (tmp_path / "mine.toml").write_text(file.text)
-        wanted = PROBLEM_COMMANDS.get(file.kind, "engage")
-        if command == wanted or (wanted == "engage" and command not in [*PROBLEM_COMMANDS.values(), "pursuit-map"]):
+        wanted = "engage" if file.kind == SCENARIO else PROBLEMS[file.kind].command
+        if command == wanted or (wanted == "engage" and command not in PROBLEM_COMMANDS):
             continue
         what = "a scenario" if wanted == "engage" else f"a problem of kind {file.kind}"
         assert infoset(command, "mine.toml") == (
@@ -142,7 +143,7 @@ def test_records_campaigns_and_toml_files_are_told_apart(infoset: Infoset, tmp_p
         assert message in err
 
 
-@pytest.mark.parametrize("name", [file.name for file in built_in_files().values() if file.kind in PROBLEM_COMMANDS])
+@pytest.mark.parametrize("name", [file.name for file in built_in_files().values() if file.kind != SCENARIO])
 def test_the_written_problem_is_the_changed_one(name: str, tmp_path: Path) -> None:
     form, load = form_and_loader(built_in_files()[name].kind)
     tables = load_tables(form, name, ["name=mine"])

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in_files
+from experiments.common.file_kinds import SCENARIO, built_in_files
 from experiments.common.toml_file import read_tables
 from experiments.interception import record_file
 from experiments.interception.scenario_file import load_scenario, read_scenario, scenario_to_toml, scenario_warnings
@@ -60,7 +60,7 @@ def text_files() -> Mapping[str, TextFile]:
     """Return the kinds of files that people write, by name."""
     problems: dict[str, list[str]] = {}
     for each in built_in_files().values():
-        if each.kind in PROBLEM_COMMANDS:
+        if each.kind != SCENARIO:
             problems.setdefault(each.kind, []).append(each.text)
     readers: dict[str, Callable[[str], object]] = {
         "pareto-encounter": load_pareto,
