@@ -126,7 +126,8 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def infoset(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+        bool,
+        typer.Option("--version", metavar="", callback=_show_version, is_eager=True, help="Show the version and exit."),
     ] = False,
 ) -> None:
     """Simulate interceptions guided by information sets, and solve rendezvous and pursuit problems.

@@ -107,7 +107,7 @@ class Sensor(ABC):
     quantity : str
         What it measures, with the unit: ``measured_<quantity>`` is its column in files.
     stream : int
-        Its stream of random numbers (`sim.draws`), different for each kind.
+        Its stream of random numbers: a number below 16 that no other kind and no stream of `sim.draws` has.
     is_lateral : bool
         Whether it measures one value for each lateral axis; in space its arrays are of shape (2, B), not (B,).
     """

@@ -63,6 +63,8 @@ def _checked(parameter: inspect.Parameter, hint: Any) -> Any:
     info = copy.copy(info)
     if get_origin(kinds[0]) is Literal:
         info.parser = partial(choice, option, valid=get_args(kinds[0]))
+    elif kinds[0] is bool:
+        info.metavar = ""  # The help of a flag shows no type, because a flag has no value.
     elif kinds[0] in (int, float):
         number = parameter.default if isinstance(parameter.default, kinds[0]) else max(info.min or 0, EXAMPLE)
         limits = {"least": info.min, "greatest": info.max, "example": f"{option} {number}"}

@@ -16,7 +16,7 @@ SCENARIO = "scenario"
 
 
 class ProblemKind(NamedTuple):
-    """Command of a kind of problem, and where its files are read: folder of `experiments`, and function in its `file`."""
+    """Command of a kind of problem, its folder in `experiments`, and the loader in the module `file` there."""
 
     command: str
     folder: str

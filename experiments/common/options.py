@@ -26,7 +26,7 @@ def _silence_the_compile_notice(quiet: bool) -> bool:
 
 
 ProblemName = Annotated[
-    str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
+    str, typer.Argument(metavar="PROBLEM", help="A built-in problem (see: infoset problems list), or a problem file.")
 ]
 Settings = Annotated[
     list[str] | None,
@@ -44,7 +44,7 @@ Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for figures and results; created if needed.")
 ]
 Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints JSON only.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+AsJson = Annotated[bool, typer.Option("--json", metavar="", help="Print JSON.")]
 Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write a table as CSV; - prints CSV only.")]
 TrajectoryCsv = Annotated[
     Path | None,
@@ -62,10 +62,14 @@ Html = Annotated[
     ),
 ]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace existing files, and write into a folder that is not empty.")
+    bool,
+    typer.Option("--overwrite", metavar="", help="Replace existing files, and write into a folder that is not empty."),
 ]
 Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", callback=_silence_the_compile_notice, help="Print no progress and no tables.")
+    bool,
+    typer.Option(
+        *("--quiet", "-q"), metavar="", callback=_silence_the_compile_notice, help="Print no progress and no tables."
+    ),
 ]
 
 

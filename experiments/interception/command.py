@@ -13,7 +13,7 @@ from experiments.common.options import Csv, FileOptions, Html, Out, Overwrite, Q
 MOST_RUNS = 10_000_000
 
 ScenarioName = Annotated[
-    str, typer.Argument(metavar="[SCENARIO]", help="A built-in scenario (see: infoset scenarios), or a scenario file.")
+    str, typer.Argument(metavar="SCENARIO", help="A built-in scenario (see: infoset scenarios), or a scenario file.")
 ]
 StrategyName = Annotated[
     str | None,
