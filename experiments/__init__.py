@@ -8,9 +8,10 @@ from __future__ import annotations
 TYPE_CHECKING = False  # importing `typing` would take most of the time in which an interrupt cannot be caught
 if TYPE_CHECKING:
     from experiments.interception.figures.bound import draw_bound
+    from experiments.interception.figures.plot import plot
     from experiments.interception.figures.process import draw_process
     from experiments.interception.figures.sets import draw_sets
-    from experiments.interception.python_interface import find_worst, fly_one, lower_bound, plot, save, simulate
+    from experiments.interception.python_interface import find_worst, fly_one, lower_bound, save, simulate
     from experiments.interception.record_file import load_record
     from experiments.interception.scenario_file import load_scenario
     from experiments.multipoint.file import load_multipoint
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 _NAMES = {
     "interception.scenario_file": ("load_scenario",),
     "interception.record_file": ("load_record",),
-    "interception.python_interface": ("find_worst", "fly_one", "lower_bound", "plot", "save", "simulate"),
+    "interception.python_interface": ("find_worst", "fly_one", "lower_bound", "save", "simulate"),
+    "interception.figures.plot": ("plot",),
     "interception.figures.bound": ("draw_bound",),
     "interception.figures.process": ("draw_process",),
     "interception.figures.sets": ("draw_sets",),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,16 +13,19 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from experiments.campaigns.campaign_columns import CampaignColumns
+from experiments.campaigns.samples import noise_flags
 from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, separate_labels, style
+from experiments.interception.figures.b_plane import Cloud, draw_b_plane, greatest_guarantee
 from experiments.interception.figures.distributions import MOST_POINTS, Sample, axis_limit, beyond, draw_samples
 from infoset.arrays import Floats
 from sim import estimate_quantiles
-from sim.statistics import correlation_interval, level_name, shows
+from sim.statistics import level_name, shows
+from sim.storage import CampaignFolder
 
 CONVERGING = (0.5, 0.9, 0.99)
 RUNS_A_BIN = 100
 """Least mean number of runs in a bin of the median and the 90 % quantile over the initial state."""
-_CONFIDENCE = 0.95
 _LOOKS = 28
 _BINS = 24
 _SMALL_KM_S = 0.01
@@ -38,27 +40,13 @@ _START_LABELS = {
 }
 
 
-@dataclass(frozen=True)
-class CampaignColumns:
-    """The columns of the rows of one noise.
-
-    `start` has the components of the initial state by column: of position, then of velocity. `guaranteed_miss_m` has
-    the known values, so it may be shorter than the other columns.
-    """
-
-    noise: str
-    range_meter: bool
-    miss_m: Floats
-    impulse_m_s: Floats
-    guaranteed_miss_m: Floats
-    start: Mapping[str, Floats]
-    guarantees: bool
-    radius_m: float | None = None
-
-    @property
-    def look(self) -> dict[str, Any]:
-        """Line style: dark and solid, or light and dashed, which differ also without colours."""
-        return CURVE_LOOKS[1 if self.noise == "random" else 4]
+def draw_all(folder: CampaignFolder, columns: Sequence[CampaignColumns]) -> Iterator[Figure]:
+    """Draw the figures of a campaign, one after the other; in space also the misses across the approach."""
+    yield draw_campaign_distributions(columns)
+    yield draw_convergence(columns)
+    yield draw_dispersion(columns)
+    if folder.manifest.scenario.is_spatial:
+        yield draw_b_plane(_clouds(folder), folder.manifest.scenario.radius_m)
 
 
 def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
@@ -70,7 +58,7 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
         samples.append(
             Sample(
                 f"{column.noise} noise, {meter} range meter, {column.miss_m.size} runs",
-                column.look,
+                _look(column),
                 column.miss_m,
                 column.impulse_m_s,
                 column.guaranteed_miss_m,
@@ -78,6 +66,18 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
             )
         )
     return draw_samples(samples, columns[0].radius_m)
+
+
+def _clouds(folder: CampaignFolder) -> list[Cloud]:
+    miss_m = folder.numbers("miss_m").data
+    across_m = np.column_stack([folder.numbers(name).data for name in ("miss_y_m", "miss_z_m")])
+    bounds_m = folder.numbers("guaranteed_miss_m").filled(np.inf)
+    guaranteed = folder.manifest.scenario.set_model.is_guaranteed
+    clouds = []
+    for noise, rows in noise_flags(folder).items():
+        bound_m = greatest_guarantee(bounds_m[rows].tolist()) if guaranteed else None
+        clouds.append(Cloud(f"{noise} noise, {len(miss_m[rows])} runs", across_m[rows], miss_m[rows], bound_m))
+    return [each for each in clouds if len(each.miss_m)]
 
 
 def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
@@ -95,7 +95,7 @@ def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
             for axes, label, sample in zip(
                 row, ("miss, m", "impulse spent, m/s"), (column.miss_m, column.impulse_m_s), strict=True
             ):
-                _convergence(axes, sample, str(column.look["color"]), drawn, banded)
+                _convergence(axes, sample, _look(column)["color"], drawn, banded)
                 axes.set_title(f"({next(letter)}) {label.split(',')[0]}, {column.noise} noise")
                 axes.set_xlabel("runs")
                 axes.set_ylabel(label)
@@ -123,7 +123,7 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
                 label, values = _START_LABELS[name], column.start[name]
                 if label.endswith("km/s") and 0.0 < np.ptp(values) < _SMALL_KM_S:
                     label, values = label.replace("km/s", "m/s"), 1e3 * values
-                binned |= _cloud(axes, values, column.miss_m, str(column.look["color"]))
+                binned |= _cloud(axes, values, column.miss_m, _look(column)["color"])
                 axes.set_xlabel(label)
                 axes.ticklabel_format(axis="x", useOffset=False)
                 axes.set_ylim(0.0, 1.04 * limit or 1.0)
@@ -143,44 +143,6 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
         note = None if binned else f"too few runs for median and p90 ({2 * RUNS_A_BIN} of a noise are needed)"
         figure.legend(handles=handles, loc="lower center", ncols=3, title=note, title_fontsize=7.5)
     return figure
-
-
-def correlations(columns: CampaignColumns) -> dict[str, dict[str, float | None]]:
-    """Return Pearson's and Spearman's correlation of the miss with each component of the initial state, by component.
-
-    Each has the ends of its 95 % confidence interval. The moduli of the lateral components are included, for example
-    `|z_km|`. A correlation is None where the component or the miss does not vary, and its ends also with fewer than 4
-    runs.
-    """
-    start = dict(columns.start)
-    start |= {f"|{name}|": np.abs(values) for name, values in start.items() if name not in ("x_km", "vx_km_s")}
-    miss = columns.miss_m
-    return {
-        name: _with_ends("pearson", _correlation(values, miss), miss.size)
-        | _with_ends("spearman", _correlation(_ranks(values), _ranks(miss)), miss.size)
-        for name, values in start.items()
-    }
-
-
-def _with_ends(kind: str, value: float | None, size: int) -> dict[str, float | None]:
-    ends = None if value is None else correlation_interval(value, size, _CONFIDENCE, ranks=kind == "spearman")
-    lower, upper = (None, None) if ends is None else ends
-    return {kind: value, f"{kind}_lower": lower, f"{kind}_upper": upper}
-
-
-def _correlation(one: Floats, other: Floats) -> float | None:
-    deviations = one - one.mean(), other - other.mean()
-    size = float(np.sqrt((deviations[0] ** 2).sum() * (deviations[1] ** 2).sum()))
-    if len(one) < 2 or size == 0.0:
-        return None
-    return float(np.clip((deviations[0] * deviations[1]).sum() / size, -1.0, 1.0))
-
-
-def _ranks(values: Floats) -> Floats:
-    """Return the ranks of values, from 0; equal values have the mean of their ranks."""
-    _, indices, counts = np.unique(values, return_inverse=True, return_counts=True)
-    first = np.cumsum(counts) - counts
-    return np.asarray((first + 0.5 * (counts - 1))[indices], dtype=np.float64)
 
 
 def _convergence_legend(figure: Figure, drawn: set[float], banded: set[float]) -> None:
@@ -207,7 +169,7 @@ def _convergence(axes: Axes, sample: Floats, colour: str, drawn: set[float], ban
     """Draw the quantiles over the number of runs, and add the levels that are drawn, with and without interval."""
     least = min(10, sample.size)
     counts = np.unique(np.geomspace(least, sample.size, _LOOKS).astype(np.int64))
-    looks = [estimate_quantiles(sample[:count], CONVERGING, _CONFIDENCE) for count in counts.tolist()]
+    looks = [estimate_quantiles(sample[:count], CONVERGING) for count in counts.tolist()]
     for index, level in enumerate(CONVERGING):
         known = [(runs, look[index]) for runs, look in zip(counts.tolist(), looks, strict=True) if shows(runs, level)]
         if not known:
@@ -258,3 +220,8 @@ def _cloud(axes: Axes, start: Floats, miss: Floats, colour: str) -> bool:
 
 def _line(index: int) -> Any:
     return ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))[index]
+
+
+def _look(column: CampaignColumns) -> dict[str, Any]:
+    """Return the line style: dark and solid, or light and dashed, which differ also without colours."""
+    return CURVE_LOOKS[1 if column.noise == "random" else 4]

@@ -3,26 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any
 
-import numpy as np
-
-from experiments.campaigns.campaign_figures import (
-    CampaignColumns,
-    correlations,
-    draw_campaign_distributions,
-    draw_convergence,
-    draw_dispersion,
-)
+from experiments.campaigns.campaign_columns import campaign_columns, correlations
 from experiments.campaigns.command import Report
 from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
 from experiments.campaigns.samples import (
-    START,
     Sample,
     game_notes,
     heading,
-    noise_flags,
     noises_of,
     sample_json,
     samples,
@@ -36,13 +25,9 @@ from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, progress_bar, say, show
-from experiments.interception.figures.b_plane import Cloud, draw_b_plane, greatest_guarantee
 from experiments.interception.scenario_file import scenario_to_toml
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
-
-FIGURES = ("figure-distributions", "figure-convergence", "figure-dispersion")
-B_PLANE = "figure-b-plane"
 
 Correlations = Mapping[str, Mapping[str, Mapping[str, float | None]]]
 
@@ -53,13 +38,18 @@ def run(options: Report) -> None:
         need_arrow()
         folder = _read(options)
         swept = bool(folder.manifest.axes)
-        campaign_figures = (*FIGURES, B_PLANE) if folder.manifest.scenario.is_spatial else FIGURES
-        figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*campaign_figures)
+        figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*_figures(folder))
         with output_of(options, [*figures, "report.json", SCENARIO_FILE]) as written:
             with progress_bar(options.quiet) as begin:
                 parts = (_report_sweep if swept else _report_campaign)(folder, options, written, begin)
                 written.save(SCENARIO_FILE, scenario_to_toml(folder.manifest.scenario))
             show(parts, options.quiet, stdout_taken=written.stdout_taken)
+
+
+def _figures(folder: CampaignFolder) -> Sequence[str]:
+    """Return the names of the figures of a campaign."""
+    names = ("figure-distributions", "figure-convergence", "figure-dispersion", "figure-b-plane")
+    return names if folder.manifest.scenario.is_spatial else names[:-1]
 
 
 def _read(options: Report) -> CampaignFolder:
@@ -116,7 +106,7 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, b
         if value is not None:
             raise InputError(f"{option}: is only for a sweep, and {folder.path} is a campaign; omit it")
     progress = begin("quantiles")
-    columns = _columns(folder)
+    columns = campaign_columns(folder)
     progress(0.3)
     by_noise = samples(folder)
     progress(1.0)
@@ -135,45 +125,10 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, b
     }
     written.save("report.json", to_json(report), "--json")
     if options.out is not None:
-        draws = (draw_campaign_distributions, draw_convergence, draw_dispersion)
-        drawings = {name: partial(draw, columns) for name, draw in zip(FIGURES, draws, strict=True)}
-        if folder.manifest.scenario.is_spatial:
-            drawings[B_PLANE] = partial(draw_b_plane, _clouds(folder), folder.manifest.scenario.radius_m)
-        written.draw(drawings, begin("figures"))
+        from experiments.campaigns.campaign_figures import draw_all
+
+        written.draw(_figures(folder), draw_all(folder, columns), begin("figures"))
     return _parts(folder, by_noise, related, worst)
-
-
-def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
-    """Return the columns of all rows, one entry for each noise with rows."""
-    scenario = folder.manifest.scenario
-    miss, impulse, guaranteed = (folder.numbers(name) for name in ("miss_m", "impulse_m_s", "guaranteed_miss_m"))
-    start = {name: values.data for name in START if (values := folder.numbers(name)).count()}
-    columns = [
-        CampaignColumns(
-            noise,
-            scenario.range_sensor is not None,
-            miss.data[rows],
-            impulse.data[rows],
-            guaranteed[rows].compressed(),
-            {name: values[rows] for name, values in start.items()},
-            scenario.set_model.is_guaranteed,
-            scenario.radius_m,
-        )
-        for noise, rows in noise_flags(folder).items()
-    ]
-    return [column for column in columns if column.miss_m.size]
-
-
-def _clouds(folder: CampaignFolder) -> list[Cloud]:
-    miss_m = folder.numbers("miss_m").data
-    across_m = np.column_stack([folder.numbers(name).data for name in ("miss_y_m", "miss_z_m")])
-    bounds_m = folder.numbers("guaranteed_miss_m").filled(np.inf)
-    guaranteed = folder.manifest.scenario.set_model.is_guaranteed
-    clouds = []
-    for noise, rows in noise_flags(folder).items():
-        bound_m = greatest_guarantee(bounds_m[rows].tolist()) if guaranteed else None
-        clouds.append(Cloud(f"{noise} noise, {len(miss_m[rows])} runs", across_m[rows], miss_m[rows], bound_m))
-    return [each for each in clouds if len(each.miss_m)]
 
 
 def _parts(

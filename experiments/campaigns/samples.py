@@ -23,8 +23,6 @@ from sim.stopping_rule import QUANTITIES
 from sim.storage import CampaignFolder, Manifest, scenario_hash
 
 LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
-START = ("y_km", "z_km", "x_km", "vy_km_s", "vz_km_s", "vx_km_s")
-"""Columns of the initial state; those of y are null in a plane."""
 WORST = 10
 OUTCOMES = tuple(outcome.value for outcome in Outcome)
 

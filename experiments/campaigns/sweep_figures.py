@@ -22,6 +22,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocat
 
 from experiments.campaigns.sweep_axes import key_label, unit_of
 from experiments.campaigns.sweep_table import (
+    QUANTITY_NAMES,
     Limit,
     SweepTable,
     answers,
@@ -52,12 +53,6 @@ Grid = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 MOST_NUMBERS = 120
 """Greatest number of cells for which numbers are drawn in the cells."""
 
-QUANTITY_NAMES = {
-    "miss_m": "miss, m",
-    "impulse_m_s": "impulse spent, m/s",
-    "guaranteed_miss_m": "guaranteed miss, m",
-    "hit": "probability of a hit",
-}
 DECISION_COLOURS = {Decision.MET: "#3f7fb5", Decision.UNDECIDED: "#ececec", Decision.NOT_MET: "#f2a65a"}
 """Colours that differ in grey too, and for colour-blind readers."""
 _PANEL_MM = 56.0

@@ -12,8 +12,8 @@ import numpy as np
 
 from experiments.campaigns.samples import game_notes, heading, sample_json
 from experiments.campaigns.sweep_axes import unit_of
-from experiments.campaigns.sweep_figures import QUANTITY_NAMES, draw_sweep
 from experiments.campaigns.sweep_table import (
+    QUANTITY_NAMES,
     SHOWN,
     SHOWN_WITH_HITS,
     TABLE,
@@ -96,6 +96,8 @@ class SweepReport:
         """Write the table, and for one or two axes a figure of each noise, into the output's folder."""
         written.save(TABLE, self.folder.table_file(*self.table.columns()))
         if self.is_drawn and written.folder is not None:
+            from experiments.campaigns.sweep_figures import draw_sweep
+
             for noise, name in zip(self.table.noises, figure_names(self.table.noises), strict=True):
                 written.figure(name, draw_sweep(self.table, self.shown, noise))
 

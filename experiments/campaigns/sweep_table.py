@@ -24,6 +24,12 @@ from sim.storage import Axis, CampaignFolder
 TABLE = "sweep.parquet"
 SHOWN = tuple(QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99))
 SHOWN_WITH_HITS = (SHOWN[0], SHOWN[1], SHOWN[3])
+QUANTITY_NAMES = {
+    "miss_m": "miss, m",
+    "impulse_m_s": "impulse spent, m/s",
+    "guaranteed_miss_m": "guaranteed miss, m",
+    "hit": "probability of a hit",
+}
 _LOG_FROM = 30.0
 """Ratio of the greatest to the least value from which the values have a logarithmic axis."""
 _MOST_WHOLE = 1e9

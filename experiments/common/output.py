@@ -78,11 +78,12 @@ class Output:
             for kind, content in figure_bytes(figure):
                 self._write(self.folder / f"{name}.{kind}", content)
 
-    def draw(self, drawings: Mapping[str, Callable[[], Figure]], progress: Callable[[float], None]) -> None:
-        """Draw figures by name and write them into the folder; without a folder, draw nothing."""
-        for done, (name, draw) in enumerate(drawings.items() if self.folder is not None else (), start=1):
-            self.figure(name, draw())
-            progress(done / len(drawings))
+    def draw(self, names: Sequence[str], figures: Iterable[Figure | None], progress: Callable[[float], None]) -> None:
+        """Write figures under their names, each as soon as it is drawn; None is a figure that a result lacks."""
+        for done, (name, figure) in enumerate(zip(names, figures, strict=True), start=1):
+            if figure is not None:
+                self.figure(name, figure)
+            progress(done / len(names))
 
     def add(self, file: Path) -> None:
         """List a file that another function has written."""

@@ -1,24 +1,19 @@
-"""Interception from Python: the functions of `sim` with scenarios by name, files and figures of what they return."""
+"""Interception from Python: the functions of `sim` with scenarios by name, and files of what they return."""
 
 from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
-from matplotlib.figure import Figure
-
 import sim
 from experiments.common.errors import InputError
-from experiments.common.figure_style import INK, SET_EDGE, figure_grid, style
 from experiments.common.output import to_csv, to_json, write_file
-from experiments.interception.figures.distributions import draw_band
-from experiments.interception.figures.process import draw_process
 from experiments.interception.record_file import write_record
 from experiments.interception.scenario_file import load_scenario
-from sim import Record, Results, Scenario, empirical_distribution
+from sim import Record, Results, Scenario
 
 ScenarioOrName = Scenario | str | os.PathLike[str]
 _Arguments = ParamSpec("_Arguments")
@@ -71,26 +66,3 @@ def save(results: Results | Record, path: str | os.PathLike[str], *, overwrite: 
     else:
         raise InputError(f"{file}: results are written as .csv or .json; for example results.csv")
     write_file(file, text, overwrite=overwrite)
-
-
-def plot(results: Results | Record | Sequence[Record]) -> Figure:
-    """Draw results, or the course of up to two engagements.
-
-    Parameters
-    ----------
-    results : Results, Record or sequence of Record
-        Results give the distributions of miss and impulse, each with its 95 % confidence band. Records give angle,
-        rate, predicted miss and impulses over time (`draw_process`).
-    """
-    if not isinstance(results, Results):
-        return draw_process([results] if isinstance(results, Record) else results)
-    with style():
-        figure, (left, right) = figure_grid(75.0, 1, 2, (14.0, 4.0, 12.0, 7.0), (9.0, 0.0))
-        panels = ((left, "miss, m", results.miss_m), (right, "impulse spent, m/s", results.impulse_m_s))
-        for axes, label, sample in panels:
-            found = empirical_distribution(sample)
-            draw_band(axes, found.values, found.lower, found.upper, SET_EDGE)
-            axes.plot(found.values, found.probability, drawstyle="steps-post", color=INK)
-            axes.set_xlabel(label)
-        left.set_ylabel(f"share of {len(results)} runs")
-    return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from experiments.common.figure_style import (
     style,
 )
 from experiments.multipoint.file import Axes as FrameAxes
-from experiments.multipoint.report import CostCurve, Scene
+from experiments.multipoint.report import CostCurve, Report, Scene
 from infoset.arrays import Floats
 
 _TRACK_POINTS = 241
@@ -37,6 +38,14 @@ _START: dict[str, Any] = {"color": TRUTH, "marker": "s", "markersize": 4.5}
 _CENTRE: dict[str, Any] = {"color": MEASURED, "marker": "*", "markersize": 8.0, "linestyle": "none"}
 _NODE: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize": 5.0, "linestyle": "none"}
 _DOTTED: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (2, 2))}
+
+
+def draw_all(report: Report, curves: list[CostCurve]) -> Iterator[Figure]:
+    """Draw the figures of a report, one after the other; `curves` are those of `draw_times`."""
+    yield draw_path(report.scene)
+    yield draw_control(report.scene, report.problem.greatest_control_m_s2)
+    yield draw_costates(report.scene)
+    yield draw_times(report.scene, curves)
 
 
 @style()

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError, input_errors
 from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, show
 from experiments.multipoint.command import BEST, GIVEN, Multipoint
-from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import MultipointProblem, load_multipoint
 from experiments.multipoint.page import multipoint_page
 from experiments.multipoint.report import Report, Scene, Search, cost_curves, report_json, report_parts, trajectories
@@ -43,8 +40,10 @@ def run(options: Multipoint) -> None:
             page = multipoint_page(problem.name, report.scene, problem.greatest_control_m_s2)
             written.deliver("--html", page)
         if options.out is not None:
-            drawings = _drawings(report, begin("cost against times"))
-            written.draw(dict(zip(FIGURES, drawings, strict=True)), begin("figures"))
+            from experiments.multipoint.figures import draw_all
+
+            curves = cost_curves(report.scene, begin("cost against times"))
+            written.draw(FIGURES, draw_all(report, curves), begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
@@ -106,13 +105,3 @@ def _best(problem: MultipointProblem, search: Search, progress: Progress) -> Bes
     assert problem.times_s is not None
     path = tour.fly(order, problem.times_s)
     return BestOrder(order, path, path.cost + problem.price_per_s * float(problem.times_s[-1]), 1, 1)
-
-
-def _drawings(report: Report, progress: Progress) -> list[Callable[[], Figure]]:
-    scene = report.scene
-    return [
-        partial(draw_path, scene),
-        partial(draw_control, scene, report.problem.greatest_control_m_s2),
-        partial(draw_costates, scene),
-        partial(draw_times, scene, cost_curves(scene, progress)),
-    ]

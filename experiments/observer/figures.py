@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from experiments.common.figure_style import IMPULSE, INK, MEASURED, SET_EDGE, SET_FILL, TRUTH, figure_grid, plain, style
-from experiments.observer.report import Report
+from experiments.observer.report import Report, times
 from infoset import Estimate
 from infoset.arrays import Floats
 
 _MOST_OUTLINES = 60
+
+
+def draw_all(report: Report) -> Iterator[Figure]:
+    """Draw the figures of a report, one after the other."""
+    yield draw_bounds(report)
+    if len(report.problem.a) == 2:
+        yield draw_sets(report)
 
 
 @style()
@@ -74,13 +81,6 @@ def _mark_contradiction(panel: Axes, report: Report, label: str | None = None) -
     empty = time[[estimate.is_empty for estimate in report.estimates]]
     panel.axvspan(empty[0], time[-1], facecolor="none", edgecolor=IMPULSE, hatch="////", linewidth=0.0, alpha=0.35)
     panel.axvline(empty[0], color=IMPULSE, linewidth=1.2, label=label)
-
-
-def times(report: Report) -> tuple[Floats, str]:
-    """Return the times of the steps, and the title of their axis."""
-    steps = np.array([estimate.step for estimate in report.estimates], dtype=float)
-    step_s = report.problem.step_s
-    return (steps, "step") if step_s is None else (steps * step_s, "time, s")
 
 
 @style()

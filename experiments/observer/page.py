@@ -7,8 +7,7 @@ from importlib import resources
 import numpy as np
 
 from experiments.common.page_document import page
-from experiments.observer.figures import times
-from experiments.observer.report import Report, shown_bounds
+from experiments.observer.report import Report, shown_bounds, times
 
 
 def observer_page(report: Report) -> str:

@@ -98,6 +98,13 @@ def report_csv(report: Report) -> str:
     return to_csv(["k", "empty", *ends, *true], rows)
 
 
+def times(report: Report) -> tuple[Floats, str]:
+    """Return the times of the steps, and the title of their axis."""
+    steps = np.array([estimate.step for estimate in report.estimates], dtype=float)
+    step_s = report.problem.step_s
+    return (steps, "step") if step_s is None else (steps * step_s, "time, s")
+
+
 def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
     """Return the lower and upper bounds of the states, shape (N, 2, n), to be read; NaN for the empty set.
 

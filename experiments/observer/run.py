@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, show
 from experiments.observer.command import Observe
 from experiments.observer.data import Data, data_of, need_size
-from experiments.observer.figures import draw_bounds, draw_sets
 from experiments.observer.file import ObserverProblem, load_observer
 from experiments.observer.page import observer_page
 from experiments.observer.report import Report, report_csv, report_json, report_parts
@@ -20,7 +18,7 @@ def run(options: Observe) -> None:
     """Compute the sets, write the files and print the tables."""
     problem = load_observer(options.problem, options.settings)
     data = data_of(problem, options.data, options.errors, options.seed)
-    figures = {"figure-bounds": draw_bounds} | ({"figure-sets": draw_sets} if len(problem.a) == 2 else {})
+    figures = ("figure-bounds", "figure-sets") if len(problem.a) == 2 else ("figure-bounds",)
     with (
         output_of(options, ("problem.toml", "results.json", "bounds.csv", *figure_files(*figures))) as written,
         progress_bar(options.quiet) as begin,
@@ -32,7 +30,10 @@ def run(options: Observe) -> None:
         written.save("bounds.csv", report_csv(report), "--csv")
         if options.html is not None:
             written.deliver("--html", observer_page(report))
-        written.draw({name: partial(draw, report) for name, draw in figures.items()}, begin("figures"))
+        if options.out is not None:
+            from experiments.observer.figures import draw_all
+
+            written.draw(figures, draw_all(report), begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 

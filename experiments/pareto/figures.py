@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from experiments.common.display_units import length_unit
 from experiments.common.figure_style import INK, LIMIT, LINE_LOOKS, SET_EDGE, SET_FILL, figure_grid, new_figure, style
+from experiments.pareto.report import Report
 from infoset.arrays import Floats
 from rendezvous.pareto import (
     Coalitions,
@@ -53,6 +54,15 @@ def _line(index: int) -> dict[str, Any]:
 
 def _names(solution: EncounterSolution) -> list[str]:
     return [cost.craft.name for cost in solution.costs]
+
+
+def draw_all(report: Report) -> Iterator[Figure]:
+    """Draw the figures of a report, one after the other."""
+    solution = report.solution
+    yield draw_trajectories(solution)
+    yield draw_controls(solution, report.problem.greatest_control_m_s2)
+    yield draw_front(solution, report.selections, report.sweep)
+    yield draw_costs(solution, report.coalitions, report.impulses_m_s)
 
 
 @style()

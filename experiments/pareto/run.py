@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError, input_errors, shown
 from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, show
 from experiments.common.toml_values import LARGEST
 from experiments.pareto.command import Pareto
-from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
 from experiments.pareto.file import TERMINAL, ParetoProblem, load_pareto
 from experiments.pareto.page import pareto_page
 from experiments.pareto.report import Report, report_json, report_parts, trajectories
@@ -35,12 +32,7 @@ from rendezvous.pareto import (
 )
 from rendezvous.pareto.coalitions import MOST_CRAFT
 
-FIGURES: dict[str, Callable[[Report], Figure]] = {
-    "figure-trajectories": lambda report: draw_trajectories(report.solution),
-    "figure-controls": lambda report: draw_controls(report.solution, report.problem.greatest_control_m_s2),
-    "figure-front": lambda report: draw_front(report.solution, report.selections, report.sweep),
-    "figure-costs": lambda report: draw_costs(report.solution, report.coalitions, report.impulses_m_s),
-}
+FIGURES = ("figure-trajectories", "figure-controls", "figure-front", "figure-costs")
 SWEEP = (0.5, 2.0, 31)
 """Smallest and largest duration of the sweep, relative to the duration of the problem, and their number."""
 
@@ -60,7 +52,10 @@ def run(options: Pareto) -> None:
             written.save(TRAJECTORIES, trajectories(report, options.samples), "--csv")
         if options.html is not None:
             written.deliver("--html", pareto_page(problem.name, report.solution, report.selections))
-        written.draw({name: partial(draw, report) for name, draw in FIGURES.items()}, begin("figures"))
+        if options.out is not None:
+            from experiments.pareto.figures import draw_all
+
+            written.draw(FIGURES, draw_all(report), begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,9 @@ from matplotlib.ticker import MaxNLocator
 
 from experiments.common.display_units import M_PER_KM, length_unit, time_unit
 from experiments.common.figure_style import IMPULSE, LIMIT, MEASURED, TRUTH, figure_grid, new_figure, style
+from experiments.pursuit.report import Report, thrust_angles
 from infoset.arrays import Floats
-from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict, orbital_axes
+from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict, history, orbital_axes
 
 PURSUER: dict[str, Any] = {"color": TRUTH, "linestyle": "-"}
 EVADER: dict[str, Any] = {"color": MEASURED, "linestyle": (0, (5, 1.5))}
@@ -25,6 +26,16 @@ _STAR: dict[str, Any] = {"marker": "*", "markersize": 9.0, "color": IMPULSE, "li
 _LEVEL: dict[str, Any] = {"color": LIMIT, "linewidth": 0.8, "linestyle": "--"}
 
 _ARROWS, _ARROW_LENGTH, _LEAST_HEIGHT = 14, 0.17, 0.15
+
+
+def draw_all(report: Report) -> Iterator[Figure | None]:
+    """Draw the figures of a report, one after the other; None is a figure without results."""
+    solution, feedback = report.solution, report.feedback
+    sampled = None if solution.capture is None else history(solution)
+    for draw in (draw_orbits, draw_relative, draw_control):
+        yield None if sampled is None else draw(sampled)
+    yield draw_distance(solution) if len(solution.curve.duration_s) > 1 else None
+    yield None if feedback is None else draw_feedback(solution, feedback.flights)
 
 
 @style()
@@ -112,12 +123,6 @@ def draw_control(sampled: History) -> Figure:
         axes.set_xlabel(f"time, {unit}")
     switching.legend(loc="best")
     return figure
-
-
-def thrust_angles(player: PlayerHistory) -> Floats:
-    """Return the angles of the thrust in the craft's orbital frame, in and out of plane, rad, shape (n, 2)."""
-    u = np.einsum("nij,nj->ni", orbital_axes(player.position_m, player.velocity_m_s), player.thrust_direction)
-    return np.stack([np.unwrap(np.arctan2(u[:, 0], u[:, 1])), np.arcsin(np.clip(u[:, 2], -1.0, 1.0))], axis=1)
 
 
 @style()

@@ -16,7 +16,7 @@ from experiments.common.output import Cell, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, show
 from experiments.pursuit.command import ROWS, PursuitMap
 from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
-from experiments.pursuit.map_figure import STATUS_WORDS, counted, draw_map
+from experiments.pursuit.report import STATUS_WORDS, counted
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus, capture_map
 
 FIGURE = "figure-map"
@@ -65,7 +65,9 @@ def run(options: PursuitMap) -> None:
         written.save("results.json", to_json(_summary(problem, x, y, solved, elapsed_s)), "--json")
         written.save("map.csv", to_csv(*_table(x, y, solved)), "--csv")
         if options.out is not None:
-            written.draw({FIGURE: lambda: draw_map(solved, x.parameter, y.parameter)}, begin("figure"))
+            from experiments.pursuit.map_figure import draw_map
+
+            written.figure(FIGURE, draw_map(solved, x.parameter, y.parameter))
     lines = [f"{problem.name}: {points} points in {elapsed_s:.1f} s: {counted(solved)}"]
     if solved.capture_s.count():
         least, greatest = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from experiments.common.display_units import S_PER_HOUR, split_unit
 from experiments.common.figure_style import INK, LIMIT, new_figure, style
+from experiments.pursuit.report import STATUS_WORDS, counted
 from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
 
@@ -26,25 +27,11 @@ _UNKNOWN: dict[PointStatus, tuple[str, str]] = {
     PointStatus.PROPELLANT_EXHAUSTED: ("#d2d2d2", "\\\\\\\\"),
     PointStatus.NO_GAME: ("#ffffff", "xxxx"),
 }
-STATUS_WORDS = {
-    PointStatus.FOLLOWED: "solved from scratch",
-    PointStatus.NEIGHBOUR: "continued from a neighbour",
-    PointStatus.NOT_CERTIFIED: "not certified",
-    PointStatus.ESCAPES: "escape",
-    PointStatus.PROPELLANT_EXHAUSTED: "propellant exhausted",
-    PointStatus.NO_GAME: "no game",
-}
 _RATIOS = {
     "phase_deg": "lead of the evader, deg",
     "thrust_ratio": "thrust of the evader / thrust of the pursuer",
     "mass_ratio": "mass of the evader / mass of the pursuer",
 }
-
-
-def counted(solved: CaptureMap) -> str:
-    """Return the number of points of each status, for the terminal and the figure."""
-    counts = {words: solved.count(status) for status, words in STATUS_WORDS.items()}
-    return ", ".join(f"{count} {words}" for words, count in counts.items() if count)
 
 
 @style()

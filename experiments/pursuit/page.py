@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.common.display_units import length_unit
 from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
-from experiments.pursuit.figures import thrust_angles
+from experiments.pursuit.report import thrust_angles
 from rendezvous.pursuit_evasion import Solution, history, orbital_axes
 
 MOMENTS = 301

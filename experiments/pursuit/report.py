@@ -1,4 +1,4 @@
-"""Results of `infoset pursuit`, as JSON and as text."""
+"""Results of `infoset pursuit` and `infoset pursuit-map`, as JSON and as text."""
 
 from __future__ import annotations
 
@@ -11,18 +11,23 @@ from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.output import STATE_COLUMNS, Cell, trajectories_csv
 from experiments.common.screen import Part, number, number_table
 from experiments.pursuit.file import PursuitProblem
+from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import (
     Capture,
+    CaptureMap,
     Certificate,
     Ended,
     Flight,
     Observation,
     PlayerEnd,
+    PlayerHistory,
+    PointStatus,
     Route,
     Solution,
     Verdict,
     capture_quantiles_s,
     history,
+    orbital_axes,
 )
 
 _LEVELS = ("least", "10%", "50%", "90%", "greatest")
@@ -33,6 +38,14 @@ _METHODS = {
     Route.SWITCHED: "extremals for increasing durations, with a change to those that keep the evader farther away",
     Route.HOMOTOPY: "the thrust of the evader raised from zero in steps",
     Route.LINEAR_GAME: "the linear game as initial guess",
+}
+STATUS_WORDS = {
+    PointStatus.FOLLOWED: "solved from scratch",
+    PointStatus.NEIGHBOUR: "continued from a neighbour",
+    PointStatus.NOT_CERTIFIED: "not certified",
+    PointStatus.ESCAPES: "escape",
+    PointStatus.PROPELLANT_EXHAUSTED: "propellant exhausted",
+    PointStatus.NO_GAME: "no game",
 }
 
 
@@ -178,6 +191,18 @@ def trajectories(solution: Solution) -> str:
     ]
     directions = (f"thrust_direction_{axis}" for axis in "xyz")
     return trajectories_csv(["player"], ["time_s", *STATE_COLUMNS, "mass_kg", *directions], tracks)
+
+
+def thrust_angles(player: PlayerHistory) -> Floats:
+    """Return the angles of the thrust in the craft's orbital frame, in and out of plane, rad, shape (n, 2)."""
+    u = np.einsum("nij,nj->ni", orbital_axes(player.position_m, player.velocity_m_s), player.thrust_direction)
+    return np.stack([np.unwrap(np.arctan2(u[:, 0], u[:, 1])), np.arcsin(np.clip(u[:, 2], -1.0, 1.0))], axis=1)
+
+
+def counted(solved: CaptureMap) -> str:
+    """Return the number of points of each status, for the terminal and the figure."""
+    counts = {words: solved.count(status) for status, words in STATUS_WORDS.items()}
+    return ", ".join(f"{count} {words}" for words, count in counts.items() if count)
 
 
 def report_parts(report: Report) -> Iterator[Part]:

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from time import perf_counter
-
-from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError, input_errors
 from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, say, say_warnings, show
 from experiments.pursuit.command import Pursuit
 from experiments.pursuit.evader import EvaderPolicy, evader_policy
-from experiments.pursuit.figures import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
 from experiments.pursuit.file import PursuitProblem, load_pursuit
 from experiments.pursuit.page import pursuit_page
 from experiments.pursuit.report import Feedback, Report, report_json, report_parts, trajectories
-from rendezvous.pursuit_evasion import Observation, PathError, Solution, certify, fly_many, history, solve
+from rendezvous.pursuit_evasion import Observation, PathError, Solution, certify, fly_many, solve
 
-FIGURES = ("figure-orbits", "figure-relative", "figure-control", "figure-distance")
-FEEDBACK_FIGURE = "figure-feedback"
+FIGURES = ("figure-orbits", "figure-relative", "figure-control", "figure-distance", "figure-feedback")
 REPLAN_S, LEAST_PLANS, MOST_PLANS = 600.0, 50, 2000
 """Default time between plans, and the smallest and largest number of plans in a game."""
 
@@ -32,7 +27,7 @@ def run(options: Pursuit) -> None:
     _check_feedback(options)
     problem = load_pursuit(options.problem, options.settings)
     evader = None if options.feedback is None else evader_policy(options.feedback, options.seed)
-    names = FIGURES if evader is None else (*FIGURES, FEEDBACK_FIGURE)
+    names = FIGURES[:-1] if evader is None else FIGURES
     with output_of(options, ("problem.toml", "results.json", TRAJECTORIES, *figure_files(*names))) as written:
         say_warnings(problem.warnings(), options.quiet)
         with progress_bar(options.quiet) as begin:
@@ -50,8 +45,10 @@ def run(options: Pursuit) -> None:
             if written.wants("--csv") and has_trajectory:
                 written.save(TRAJECTORIES, trajectories(solution), "--csv")
             if options.out is not None:
+                from experiments.pursuit.figures import draw_all
+
                 written.save("problem.toml", problem.toml)
-                written.draw(_drawings(report), begin("figures"))
+                written.draw(FIGURES, draw_all(report), begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
@@ -107,17 +104,3 @@ def _time_between_plans(game_s: float, asked_s: float | None) -> float:
             f"choose {game_s / MOST_PLANS:.3g} or more"
         )
     return asked_s
-
-
-def _drawings(report: Report) -> dict[str, Callable[[], Figure]]:
-    solution = report.solution
-    drawings: dict[str, Callable[[], Figure]] = {}
-    if solution.capture is not None:
-        sampled = history(solution)
-        for name, draw in zip(FIGURES[:3], (draw_orbits, draw_relative, draw_control), strict=True):
-            drawings[name] = partial(draw, sampled)
-    if len(solution.curve.duration_s) > 1:
-        drawings[FIGURES[3]] = partial(draw_distance, solution)
-    if report.feedback is not None:
-        drawings[FEEDBACK_FIGURE] = partial(draw_feedback, solution, report.feedback.flights)
-    return drawings

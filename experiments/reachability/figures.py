@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Any
 
@@ -107,6 +106,14 @@ def _shadows(report: Report, axes: Sequence[int], most_times: int, tolerance: fl
         else:
             groups.append(([t], points))
     return groups
+
+
+def draw_all(report: Report) -> Iterator[Figure]:
+    """Draw the figures of a report, one after the other."""
+    yield draw_space(report, first=0)
+    yield draw_space(report, first=3)
+    yield draw_planes(report)
+    yield draw_controls(report)
 
 
 @style()
@@ -273,11 +280,3 @@ def draw_controls(report: Report) -> Figure:
     handles, names = row[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="upper center", ncols=len(names))
     return figure
-
-
-FIGURES: dict[str, Callable[[Report], Figure]] = {
-    "figure-positions": partial(draw_space, first=0),
-    "figure-velocities": partial(draw_space, first=3),
-    "figure-planes": draw_planes,
-    "figure-controls": draw_controls,
-}

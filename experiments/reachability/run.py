@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from itertools import chain
 
 from rich.table import Table
@@ -13,7 +12,6 @@ from experiments.common.options import choice, read_number
 from experiments.common.output import TRAJECTORIES, output_of, to_csv, to_json
 from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, show
 from experiments.reachability.command import Reach
-from experiments.reachability.figures import FIGURES
 from experiments.reachability.file import load_rendezvous
 from experiments.reachability.page import reachability_page
 from experiments.reachability.printed_tables import COLUMNS, Comparison, compare_published, is_published
@@ -31,6 +29,7 @@ from experiments.reachability.report import (
 from rendezvous.reachability import Route, SetKind, effort
 
 TABLES = "published-tables.csv"
+FIGURES = ("figure-positions", "figure-velocities", "figure-planes", "figure-controls")
 _COUNTED = ("vertices", "facets")
 _NORM = "(m, m/s)"
 """Unit of a norm of states."""
@@ -57,7 +56,10 @@ def run(options: Reach) -> None:
         try:
             if options.html is not None:
                 written.deliver("--html", reachability_page(report))
-            written.draw({name: partial(draw, report) for name, draw in FIGURES.items()}, begin("figures"))
+            if options.out is not None:
+                from experiments.reachability.figures import draw_all
+
+                written.draw(FIGURES, draw_all(report), begin("figures"))
         except ArithmeticError as error:
             raise InputError(
                 f"cannot draw the tube: {error}; the numbers are in results.json, or use --json alone"

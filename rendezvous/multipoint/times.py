@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
-from scipy.stats import qmc
 
 from rendezvous._arrays import Floats
+from rendezvous._halton import halton
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path
 
 FlyAt = Callable[[Floats], Flown]
@@ -289,7 +289,7 @@ def _spread(count: int, scale: float, least: float, bounded: bool, most: int) ->
     extra = max(scale - count * least, 0.0) if bounded else scale
     shapes = (np.ones(count), rising, rising[::-1])
     shares = [length * shape / shape.sum() for shape in shapes for length in lengths]
-    for point in qmc.Halton(count + 1, scramble=False).random(most + 1)[1:]:
+    for point in halton(count + 1, most):
         weights = 0.2 - np.log(point)
         if bounded:  # the last weight is that of the time that is left at the end
             shares.append((weights / weights.sum())[:count])

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from rendezvous._arrays import Floats
+from rendezvous._halton import halton
 from rendezvous.pareto.solution import EncounterSolution
 
 
@@ -59,7 +59,7 @@ def simplex_weights(craft: int, count: int) -> Floats:
         divisions = max(1, int(np.sqrt(2.0 * count)) - 1)
         pairs = [(i, j) for i in range(divisions + 1) for j in range(divisions + 1 - i)]
         return np.array([(divisions - i - j, i, j) for i, j in pairs], dtype=np.float64) / divisions
-    uniform = qmc.Halton(craft, scramble=False).random(count + 1)[1:]
+    uniform = halton(craft, count)
     spread = -np.log(uniform)
     return np.concatenate([np.eye(craft), spread / spread.sum(axis=1, keepdims=True)])
 

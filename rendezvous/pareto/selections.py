@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
 from rendezvous._arrays import Floats
+from rendezvous._halton import halton
 from rendezvous.pareto.front import simplex_weights
 from rendezvous.pareto.solution import EncounterSolution
 
@@ -163,7 +163,7 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
 
     count = len(ideals)
     # If the shapes of the M differ much, shares of a millionth matter.
-    wide = 10.0 ** (-6.0 * qmc.Halton(count, scramble=False).random(3 * _TRIED)[1:])
+    wide = 10.0 ** (-6.0 * halton(count, 3 * _TRIED - 1))
     candidates = np.concatenate([np.eye(count), np.full((1, count), 1.0 / count), simplex_weights(count, _TRIED), wide])
     nearest = np.argsort((points(candidates) ** 2).sum(axis=1), kind="stable")
     shares, left = _least_share(distance, candidates[nearest[0]]), np.inf

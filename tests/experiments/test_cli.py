@@ -100,11 +100,17 @@ def test_the_bare_command_prints_its_help(infoset: Command) -> None:
     assert err == ""
 
 
-def test_help_imports_nothing_heavy() -> None:
+def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_draws() -> None:
     heavy = ["numpy", "numba", "pydantic", "matplotlib", "scipy", "shapely", "infoset", "sim"]
-    code = f"import experiments.cli, sys; print([each for each in {heavy} if each in sys.modules])"
+    drawing = ["matplotlib", "PIL", "scipy.stats"]
+    code = (
+        "import importlib, sys; from experiments.cli import COMMANDS; "
+        f"print([name for name in {heavy} if name in sys.modules]); "
+        "[importlib.import_module(f'experiments.{module}') for rows in COMMANDS.values() for _, module, _ in rows]; "
+        f"print([name for name in {drawing} if name in sys.modules])"
+    )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "[]"
+    assert found.stdout.split() == ["[]", "[]"]
 
 
 def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:

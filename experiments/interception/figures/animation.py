@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -13,7 +12,6 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.axes import Axes
 from PIL import Image, ImageSequence
 
-from experiments.common.errors import InputError
 from experiments.common.figure_style import INK, new_figure, place_axes, plain, style
 from experiments.interception.course import Clock, evenly, record_titles
 from experiments.interception.figures.approach import count_down
@@ -28,19 +26,6 @@ COLOURS = 16
 
 _SECTIONS = 7
 _SECOND_MM = 58.0
-
-
-def animation_path(option: str, path: Path | None, ending: str) -> None:
-    """Raise `InputError` if an animation file has another suffix, or the program that writes it is missing."""
-    if path is None:
-        return
-    if path.suffix != ending:
-        raise InputError(f"{option}: {path} must end in {ending}; for example {option} flight{ending}")
-    if ending == MP4 and shutil.which("ffmpeg") is None:
-        raise InputError(
-            f"{option}: the program ffmpeg, which writes such files, is not on the path; install it (Debian: apt-get "
-            "install ffmpeg), or use --gif flight.gif"
-        )
 
 
 def animate(

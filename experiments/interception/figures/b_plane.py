@@ -18,13 +18,9 @@ from matplotlib.ticker import MaxNLocator
 from experiments.common.figure_style import INK, SET_EDGE, TRUTH, WIDTH_MM, figure_grid, plain, style
 from experiments.common.screen import number
 from experiments.interception.figures.distributions import RADIUS_LOOK, axis_limit
-from guidance import NoiseKind
 from infoset.arrays import Floats
 from sim import Results
 from sim.statistics import shows
-
-B_PLANE = {noise: f"figure-b-plane-{noise.value}" for noise in NoiseKind}
-"""Name of the figure of each noise."""
 
 _MOST_COLUMNS = 3
 _WIDEST_MM = 62.0

@@ -24,7 +24,6 @@ from experiments.common.screen import (
 )
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Bound
-from experiments.interception.figures.bound import draw_bound
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, need_finite, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import greatest_guarantee_m
@@ -98,7 +97,9 @@ def run(options: Bound) -> None:
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         if options.out is not None:
-            written.draw({FIGURE: lambda: draw_bound(scenario, lower)}, begin("figure"))
+            from experiments.interception.figures.bound import draw_bound
+
+            written.figure(FIGURE, draw_bound(scenario, lower))
     show(_parts(scenario, lower, nominal, worst, options), options.quiet, stdout_taken=written.stdout_taken)
 
 

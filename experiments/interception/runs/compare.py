@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from time import perf_counter
-
-from matplotlib.figure import Figure
 
 from experiments.common.output import Cell, hit_key, output_of, to_csv, to_json
 from experiments.common.screen import (
@@ -23,9 +20,7 @@ from experiments.common.screen import (
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Compare
 from experiments.interception.comparison import Comparison, Flight, flights, gather, summary
-from experiments.interception.figures.b_plane import B_PLANE, cloud, draw_b_plane
-from experiments.interception.figures.comparison import draw_comparison
-from experiments.interception.runs.shared import Progress, simulate_in_threads, summary_head
+from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_in_threads, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import QUANTILES, SetCounts, game_note, percent, set_counts, set_warnings
 from guidance import NoiseKind, Strategy
@@ -40,8 +35,8 @@ def run(options: Compare) -> None:
     """Simulate the strategies, write the files and print the table."""
     scenario, notes = study_scenario(options)
     strategies = chosen_strategies(scenario, options.strategies)
-    b_planes = B_PLANE if scenario.is_spatial else {}
-    names = ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, *b_planes.values()))
+    figures = [FIGURE, *b_plane_figures(scenario)]
+    names = ("scenario.toml", "results.json", "results.csv", *figure_files(*figures))
     with output_of(options, names) as written, progress_bar(options.quiet) as begin:
         say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
@@ -63,17 +58,10 @@ def run(options: Compare) -> None:
             columns = (*COLUMNS, "miss_y_m", "miss_z_m") if scenario.is_spatial else COLUMNS
             written.save("results.csv", _csv(compared, columns), "--csv")
         if options.out is not None:
-            drawings = {FIGURE: lambda: draw_comparison(compared, scenario.radius_m)}
-            drawings |= {name: partial(_b_plane, scenario, compared, noise) for noise, name in b_planes.items()}
-            written.draw(drawings, begin("figure"))
+            from experiments.interception.figures.commands import draw_compared
+
+            written.draw(figures, draw_compared(scenario, compared), begin("figure"))
     show(_parts(scenario, compared), options.quiet, stdout_taken=written.stdout_taken)
-
-
-def _b_plane(scenario: Scenario, compared: Sequence[Comparison], noise: NoiseKind) -> Figure:
-    """Draw the misses across the approach of each strategy; with game noise, those of the worst tie rule of a run."""
-    title = {NoiseKind.RANDOM: "random noise", NoiseKind.GAME: "game noise, worst tie rule"}[noise]
-    clouds = [cloud(f"{each.strategy}\n{title}", [*each.results.values()]) for each in compared if each.noise is noise]
-    return draw_b_plane(clouds, scenario.radius_m)
 
 
 def _simulate(

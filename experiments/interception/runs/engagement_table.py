@@ -5,26 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from experiments.common.errors import InputError
 from experiments.common.options import read_number
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
-from experiments.interception.course import Clock
-from experiments.interception.figures.approach import draw_approach
-from experiments.interception.figures.process import draw_process
-from experiments.interception.figures.sets import draw_sets
 from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
 from experiments.interception.runs.shared import allowance, bound_name
 from sim import Record
 from sim.results import ending
 
-FIGURE_2 = "figure-2-process"
-FIGURE_3 = "figure-3-sets"
-APPROACH = "figure-approach"
-FIGURES = (FIGURE_2, FIGURE_3, APPROACH)
-DEFAULT_TIMES = (0.5, 4.0, 8.0)
+FIGURES = ("figure-2-process", "figure-3-sets", "figure-approach")
 MOST_TIMES = 12
 
 
@@ -110,22 +100,11 @@ def need_times(text: str | None, times_s: Sequence[float], records: Sequence[Rec
         raise InputError(f"--times: {late_s[0]:g} s is after the last step, at {last_s:g} s; give earlier times")
 
 
-def _default_times(records: Sequence[Record]) -> tuple[float, ...]:
-    """Return the times of figure 3, s: those of the paper, or in a long flight evenly over the logarithm of time."""
-    if not Clock.of(records).counts_down:
-        return DEFAULT_TIMES
-    arrival_s, step_s = records[0].scenario.nominal_arrival_s, records[0].scenario.set_model.step_s
-    return tuple((arrival_s - np.geomspace(arrival_s, step_s, 5)[1:4]).tolist())
-
-
 def draw_engagements(
     records: Sequence[Record], times_s: Sequence[float], written: Output, begin: BeginProgress
 ) -> None:
     """Draw the figures of one or two engagements into the folder, if there is one."""
     if written.folder is not None:
-        drawings = {
-            FIGURE_2: lambda: draw_process(records),
-            FIGURE_3: lambda: draw_sets(records, times_s or _default_times(records)),
-            APPROACH: lambda: draw_approach(records),
-        }
-        written.draw(drawings, begin("figures"))
+        from experiments.interception.figures.commands import draw_flights
+
+        written.draw(FIGURES, draw_flights(records, times_s), begin("figures"))

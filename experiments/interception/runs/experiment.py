@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from time import perf_counter
 
-from matplotlib.figure import Figure
 from rich.table import Table
 
 from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
@@ -25,14 +23,17 @@ from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
 from experiments.interception.curves import Curve, curve_scenarios
-from experiments.interception.figures.b_plane import B_PLANE, cloud, draw_b_plane
-from experiments.interception.figures.corridor import draw_corridor
-from experiments.interception.figures.distributions import draw_distributions
 from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
-from experiments.interception.runs.shared import allowance, bound_name, certificate, simulate_in_threads, summary_head
+from experiments.interception.runs.shared import (
+    allowance,
+    b_plane_figures,
+    bound_name,
+    certificate,
+    simulate_in_threads,
+    summary_head,
+)
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import QUANTILES, SetCounts, game_note, hit_text, set_counts, set_warnings
-from guidance import NoiseKind
 from infoset import Recovery
 from sim import Outcome, Results, Scenario
 from sim.statistics import shown_quantiles
@@ -45,8 +46,8 @@ def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     scenario = scenario_with(options)
     own = own_strategy(options.strategy, scenario)
-    b_planes = B_PLANE if scenario.is_spatial else {}
-    names = ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, CORRIDOR, *b_planes.values()))
+    figures = [FIGURE, CORRIDOR, *b_plane_figures(scenario)]
+    names = ("scenario.toml", "results.json", "results.csv", *figure_files(*figures))
     with output_of(options, names) as written, progress_bar(options.quiet) as begin:
         say_warnings(scenario_warnings(scenario), options.quiet)
         if scenario.range_sensor is None:
@@ -85,20 +86,10 @@ def run(options: Experiment) -> None:
         if written.wants("--csv"):
             written.save("results.csv", _csv(curves), "--csv")
         if options.out is not None:
-            drawings = {FIGURE: lambda: draw_distributions(curves, radius_m=scenario.radius_m)}
-            drawings[CORRIDOR] = lambda: draw_corridor(curves, courses[::-1])
-            drawings |= {name: partial(_b_plane, scenario, curves, noise) for noise, name in b_planes.items()}
-            written.draw(drawings, begin("figure"))
+            from experiments.interception.figures.commands import draw_experiment
+
+            written.draw(figures, draw_experiment(scenario, curves, courses[::-1]), begin("figure"))
     show(_parts(scenario, curves), options.quiet, stdout_taken=written.stdout_taken)
-
-
-def _b_plane(scenario: Scenario, curves: Sequence[Curve], noise: NoiseKind) -> Figure:
-    clouds = [
-        cloud(f"{noise.value} noise, {'with' if curve.range_meter else 'no'} range meter", [curve.results])
-        for curve in curves
-        if curve.noise is noise
-    ]
-    return draw_b_plane(clouds, scenario.radius_m)
 
 
 def _key(curve: Curve) -> dict[str, int | str | bool]:

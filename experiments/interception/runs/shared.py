@@ -16,7 +16,7 @@ from experiments.common.screen import NOT_FINITE, BeginProgress
 from experiments.interception.course import Courses
 from experiments.interception.scenario_file import scenario_hash, scenario_warnings
 from experiments.interception.study import set_counts
-from guidance import Strategy
+from guidance import NoiseKind, Strategy
 from sim import Results, Scenario, simulate
 from sim.adversary import BudgetError, NothingCountsError, WorstEngagement, find_worst
 from sim.gravity import on_board_model
@@ -73,6 +73,11 @@ def summary_head(scenario: Scenario, own: Strategy | None = None) -> dict[str, o
         **({"warnings": warnings} if warnings else {}),
         **({"strategy": strategy_name(scenario, own)} if own is not None else {}),
     }
+
+
+def b_plane_figures(scenario: Scenario) -> list[str]:
+    """Return the names of the figures of misses across the approach, one for each noise; none in a plane."""
+    return [f"figure-b-plane-{noise.value}" for noise in NoiseKind] if scenario.is_spatial else []
 
 
 def bound_name(scenario: Scenario) -> str:

@@ -13,14 +13,8 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from scipy.stats import pearsonr, spearmanr
 
-from experiments.campaigns.campaign_figures import (
-    CampaignColumns,
-    correlations,
-    draw_campaign_distributions,
-    draw_convergence,
-    draw_dispersion,
-)
-from experiments.campaigns.samples import START
+from experiments.campaigns.campaign_columns import START, CampaignColumns, correlations
+from experiments.campaigns.campaign_figures import draw_campaign_distributions, draw_convergence, draw_dispersion
 from experiments.common.screen import BeginProgress
 from experiments.interception.figures.distributions import MOST_POINTS
 from experiments.interception.scenario_file import load_scenario

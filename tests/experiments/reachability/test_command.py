@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from experiments.common.file_kinds import built_in_files
-from experiments.reachability.figures import FIGURES as DRAWINGS
-from experiments.reachability.figures import shown_times
+from experiments.reachability.figures import draw_all, shown_times
 from experiments.reachability.file import KIND, load_rendezvous
 from experiments.reachability.printed_tables import TABLES, compare_published, corrected, is_published
 from experiments.reachability.report import Request, make_report
@@ -370,7 +369,7 @@ def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> No
 
 def test_figures_show_sets_members_and_ranges() -> None:
     report = make_report(load_rendezvous("rendezvous-2021"), Request(["energy", "l1", "norms"]))
-    positions, velocities, planes, controls = (draw(report) for draw in DRAWINGS.values())
+    positions, velocities, planes, controls = draw_all(report)
     assert "nonlinear" in positions.legends[0].get_texts()[0].get_text()
     assert velocities.axes[0].get_xlabel() == "$v_x$, m/s"
     assert [each.get_xlabel() for each in planes.axes] == ["x, m", "x, m", "$v_x$, m/s", "$v_x$, m/s"]

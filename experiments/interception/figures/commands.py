@@ -1,0 +1,64 @@
+"""The figures of the commands, in the order of their names; each is drawn after the one before is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from experiments.interception.comparison import Comparison
+from experiments.interception.course import Clock, Courses
+from experiments.interception.curves import Curve
+from experiments.interception.figures.approach import draw_approach
+from experiments.interception.figures.b_plane import cloud, draw_b_plane
+from experiments.interception.figures.comparison import draw_comparison
+from experiments.interception.figures.corridor import draw_corridor
+from experiments.interception.figures.distributions import draw_distributions
+from experiments.interception.figures.process import draw_process
+from experiments.interception.figures.sets import draw_sets
+from guidance import NoiseKind
+from sim import Record, Scenario
+
+DEFAULT_TIMES = (0.5, 4.0, 8.0)
+NOISES = {NoiseKind.RANDOM: "random noise", NoiseKind.GAME: "game noise, worst tie rule"}
+
+
+def draw_experiment(scenario: Scenario, curves: Sequence[Curve], courses: Sequence[Courses]) -> Iterator[Figure]:
+    """Draw the distributions and the corridor, and in space the misses across the approach for each noise."""
+    yield draw_distributions(curves, radius_m=scenario.radius_m)
+    yield draw_corridor(curves, courses)
+    for noise in NoiseKind if scenario.is_spatial else ():
+        clouds = [
+            cloud(f"{noise.value} noise, {'with' if curve.range_meter else 'no'} range meter", [curve.results])
+            for curve in curves
+            if curve.noise is noise
+        ]
+        yield draw_b_plane(clouds, scenario.radius_m)
+
+
+def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Figure]:
+    """Draw the comparison, and in space the misses across the approach for each noise.
+
+    With game noise, the misses are those of the worst tie rule of a run.
+    """
+    yield draw_comparison(compared, scenario.radius_m)
+    for noise in NoiseKind if scenario.is_spatial else ():
+        chosen = [comparison for comparison in compared if comparison.noise is noise]
+        clouds = [cloud(f"{one.strategy}\n{NOISES[noise]}", [*one.results.values()]) for one in chosen]
+        yield draw_b_plane(clouds, scenario.radius_m)
+
+
+def draw_flights(records: Sequence[Record], times_s: Sequence[float]) -> Iterator[Figure]:
+    """Draw one or two engagements: over time, their sets at some times, and their approach; no times: the default."""
+    yield draw_process(records)
+    yield draw_sets(records, times_s or _default_times(records))
+    yield draw_approach(records)
+
+
+def _default_times(records: Sequence[Record]) -> tuple[float, ...]:
+    """Return the times of figure 3, s: those of the paper, or in a long flight evenly over the logarithm of time."""
+    if not Clock.of(records).counts_down:
+        return DEFAULT_TIMES
+    arrival_s, step_s = records[0].scenario.nominal_arrival_s, records[0].scenario.set_model.step_s
+    return tuple((arrival_s - np.geomspace(arrival_s, step_s, 5)[1:4]).tolist())
