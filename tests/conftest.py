@@ -72,8 +72,8 @@ def environment_is_put_back() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def pdfs_with_type_3_fonts() -> Iterator[None]:
-    """Write PDF files with Type 3 fonts, which take a tenth of the time of the style's fonts.
+def figures_are_small() -> Iterator[None]:
+    """Write PNG files of 50 dpi, and PDF files with Type 3 fonts, which take a tenth of the time of the style's fonts.
 
     `experiments/common/test_figure_style.py` tests those of the style.
     """
@@ -81,6 +81,7 @@ def pdfs_with_type_3_fonts() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(figure_style._STYLE, "pdf.fonttype", 3)
+        patch.setattr(figure_style, "PNG_DPI", 50)
         yield
 
 

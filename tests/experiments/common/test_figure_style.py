@@ -10,8 +10,8 @@ import pytest
 from experiments.common import figure_style
 from experiments.common.figure_style import figure_bytes, figure_grid, place_labels, style
 
-FONT_TYPE = figure_style._STYLE["pdf.fonttype"]
-"""Type of the fonts of the style, read before the fixture `pdfs_with_type_3_fonts` replaces it."""
+FONT_TYPE, PNG_DPI = figure_style._STYLE["pdf.fonttype"], figure_style.PNG_DPI
+"""Type of the fonts and resolution of the style, read before the fixture `figures_are_small` replaces them."""
 
 
 @pytest.mark.parametrize("centred", [False, True])
@@ -45,11 +45,14 @@ def test_labels_of_nested_outlines_do_not_touch_and_stay_inside_the_axes(centred
     figure.clear()
 
 
-def test_pdfs_have_truetype_fonts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pdfs_have_truetype_fonts_and_pngs_200_dpi(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(figure_style._STYLE, "pdf.fonttype", FONT_TYPE)
+    monkeypatch.setattr(figure_style, "PNG_DPI", PNG_DPI)
     with style():
         figure, (axes,) = figure_grid(40.0, 1, 1, (10.0, 5.0, 10.0, 5.0), (0.0, 0.0))
         axes.set_xlabel("ν² of $\\Phi_0$, −1 to 1 µm")
         files = dict(figure_bytes(figure))
     assert files["pdf"].count(b"/FontFile2") == 2
     assert b"/Type3" not in files["pdf"]
+    # The header of a PNG has its width at byte 16.
+    assert int.from_bytes(files["png"][16:20], "big") == round(180.0 / 25.4 * 200.0)

@@ -133,7 +133,7 @@ def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Sc
 
 def test_both_greatest_misses_are_those_of_bound(infoset: Command) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
-    options = ("--budget", 40, "--model", "paper", "--json")
+    options = ("--budget", 12, "--model", "paper", "--json")
     table = infoset("bound", "--strategies", "symmetric-miss", *options, "bound.json")[1]
     shown = infoset("adversary", "--strategy", "symmetric-miss", *options, "adversary.json")[1]
     (of_bound,) = json.loads(Path("bound.json").read_text())["strategies"]
