@@ -31,9 +31,3 @@ def asked_scenario(
     if options.no_range_meter:
         scenario = replace(scenario, range_sensor=None)
     return scenario, options.runs, options.seed
-
-
-def title(scenario: Scenario) -> str:
-    """Return the name, the range meter and the model of a scenario as text."""
-    meter = "with" if scenario.range_sensor is not None else "without"
-    return f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"

@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.asked_scenario import asked_scenario, title
+from benchmarks.asked_scenario import asked_scenario
+from experiments.interception.study import scenario_title
 from guidance import NoiseKind, Patient, Strategy, SymmetricMiss, TieRule
 from sim import Scenario, simulate
 
@@ -41,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     scenario, runs, seed = asked_scenario(__doc__, arguments, runs=200, seed=100)
     line = sys.stdout.write
-    line(f"{title(scenario)}, {runs} runs, seed {seed}\n")
+    line(f"{scenario_title(scenario)}, {runs} runs, seed {seed}\n")
     line(f"{'':15}{'random noise':^48}{'game noise, worst tie rule':^48}\n")
     line(f"{'share':15}" + 2 * f"{'miss, m':^24}{'impulse, m/s':^24}" + "\n")
     line(f"{'':15}" + 4 * f"{'50 %':>7}{'90 %':>7}{'worst':>7}   " + "\n")

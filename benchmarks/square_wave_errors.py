@@ -14,7 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.asked_scenario import asked_scenario, title
+from benchmarks.asked_scenario import asked_scenario
+from experiments.interception.study import scenario_title
 from guidance import make_strategy, strategy_names
 from guidance.scripted_noise import ScriptedNoise
 from sim import Scenario
@@ -46,7 +47,7 @@ def worst(scenario: Scenario, name: str, runs: int, seed: int) -> tuple[NDArray[
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     scenario, runs, seed = asked_scenario(__doc__, arguments, runs=50, seed=0)
-    sys.stdout.write(f"{title(scenario)}, {runs} starts, ")
+    sys.stdout.write(f"{scenario_title(scenario)}, {runs} starts, ")
     sys.stdout.write(f"seed {seed}: the worst of {2 * len(HALF_PERIODS)} square waves\n")
     sys.stdout.write(f"{'':26}{'miss, m':^20}{'impulse, m/s':^20}\n")
     sys.stdout.write(f"{'strategy':26}{'median':>10}{'worst':>10}{'median':>10}{'worst':>10}\n")

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from experiments.campaigns.command import Campaign as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, campaign_errors, duration, fly, scenario_of
-from experiments.campaigns.samples import game_notes, heading, sample_json, samples, samples_table, stop_notes
+from experiments.campaigns.samples import game_notes, heading, sample_json, samples, samples_table, stop_notes, title
 from experiments.common.errors import input_errors
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import Part, show
@@ -59,7 +59,8 @@ def run(options: Options) -> None:
 def _parts(flown: Flown, table: Table, notes: Sequence[str]) -> Iterator[Part]:
     folder, manifest = flown.result.folder, flown.result.folder.manifest
     stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
-    runs = f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}"
+    runs = f"{folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}"
+    yield title(folder)
     yield f"{runs}; quantiles with {'' if stopped else '95 % '}confidence limits"
     yield table
     yield from (*notes, *game_notes(folder), *stop_notes(manifest))

@@ -17,6 +17,7 @@ from experiments.campaigns.samples import (
     samples,
     samples_table,
     stop_notes,
+    title,
     worst_runs,
 )
 from experiments.campaigns.sweep_report import SweepReport, default_requirement, figure_names, quantile_options
@@ -137,17 +138,18 @@ def _parts(
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     table, notes = samples_table(by_noise, manifest.scenario)
-    yield f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}"
+    yield title(folder)
+    yield f"{folder.finished_runs} runs{stopped}"
     yield table
     yield from (*notes, *game_notes(folder), *stop_notes(manifest), "")
     runs = ", ".join(f"{sample.runs} runs of {sample.noise} noise" for sample in by_noise)
     yield f"correlation of the miss with the initial state ({runs}; CI by Fisher's z):"
     table = number_table("noise", "component", "Pearson", "95 % CI", "Spearman", "95 % CI", left=2)
     for noise, components in related.items():
-        title = noise
+        label = noise
         for name, values in components.items():
-            table.add_row(title, name, *_correlation_cells(values, "pearson"), *_correlation_cells(values, "spearman"))
-            title = ""
+            table.add_row(label, name, *_correlation_cells(values, "pearson"), *_correlation_cells(values, "spearman"))
+            label = ""
     yield table
     yield from ("", "the worst runs, each with the command that simulates it again:")
     for row in worst:

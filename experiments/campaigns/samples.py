@@ -14,7 +14,7 @@ from rich.table import Table
 from experiments.common.output import hit_key, library_version
 from experiments.common.screen import number, number_table, quantile_notes
 from experiments.interception.runs.shared import bound_name
-from experiments.interception.study import SetCounts, game_note, hit_text, set_counts, set_warnings
+from experiments.interception.study import SetCounts, game_note, hit_text, scenario_title, set_counts, set_warnings
 from guidance import NoiseKind
 from infoset.arrays import Flags, Integers
 from sim import HitEstimate, Outcome, QuantileEstimate, Scenario, estimate_hits, estimate_quantiles
@@ -156,6 +156,13 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
     }
 
 
+def title(folder: CampaignFolder) -> str:
+    """Return what the numbers of a folder rest on: scenario, model, strategy and seed, and a line with its settings."""
+    manifest = folder.manifest
+    head = f"{scenario_title(manifest.scenario)}, strategy {manifest.strategy}, seed {manifest.seed}"
+    return "\n".join(line for line in (head, manifest.scenario.description) if line)
+
+
 def game_notes(folder: CampaignFolder) -> list[str]:
     """Return a line about what results with game noise are; no line without game noise."""
     return [game_note(folder.manifest.scenario)] if NoiseKind.GAME.value in noises_of(folder) else []
@@ -235,14 +242,14 @@ def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table
     table = number_table("noise", "quantity", "quantile", "value", "95 % CI", left=2)
     notes = []
     for sample in by_noise:
-        title = sample.noise
+        label = sample.noise
         for quantity, estimates in sample.quantiles.items():
             name = names[quantity]
             for estimate in estimates:
                 value = shown_value(sample, quantity, estimate)
                 interval = f"{number(estimate.lower)} to {number(estimate.upper)}"
-                table.add_row(title, name, level_name(estimate.level), number(value), interval)
-                title = name = ""
+                table.add_row(label, name, level_name(estimate.level), number(value), interval)
+                label = name = ""
             table.add_row("", "", "max", number(sample.worst[quantity]), "")
         notes += [f"{sample.noise} noise: {text}" for text in quantile_notes(sample.runs, LEVELS, len(by_noise))]
         outcomes = ", ".join(f"{count} {name}" for name, count in sample.outcomes.items())

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.campaigns.samples import game_notes, heading, sample_json
+from experiments.campaigns.samples import game_notes, heading, sample_json, title
 from experiments.campaigns.sweep_axes import unit_of
 from experiments.campaigns.sweep_table import (
     QUANTITY_NAMES,
@@ -108,7 +108,8 @@ class SweepReport:
         watched = " although runs were added" if manifest.is_watched else ""
         if manifest.until:
             watched = " although runs are added until it is made"
-        yield f"{manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs"
+        yield title(folder)
+        yield f"{len(table.cells)} cells, {folder.finished_runs} runs"
         yield (
             f"the decision in each cell has a confidence of at least 95 %{watched}; "
             "this holds for each cell, not for all cells together"
@@ -166,7 +167,11 @@ class SweepReport:
         if len(more) < len(undecided):
             where = f" in {len(undecided) - len(more)} of them" if more else ""
             text += f"; the estimate is at the bound{where}: the number of runs that would decide is not known yet"
-        hint = f"a greater --most-runs than {manifest.runs}" if manifest.until else "--until decided"
+        hint = (
+            f"a greater --most-runs than {manifest.runs}"
+            if manifest.until
+            else "--until decided (--most-runs, by default 2000)"
+        )
         return [text, f"to add runs to these cells: repeat infoset sweep with --resume and {hint}"]
 
     def _answer_lines(self, noise: str) -> Iterator[str]:
@@ -218,13 +223,12 @@ def _decision_tables(table: SweepTable, noise: str) -> Iterator[Part]:
     first, *others = table.axes
     if not others:
         unit = unit_of(first.key)
-        titles = (f"value, {unit}" if unit else "value", "decision", "runs", "95 % CI from", table.required.name, "to")
+        titles = (f"value, {unit}" if unit else "value", "decision", "runs", table.required.name, "95 % CI")
         shown = number_table(*titles, left=2)
         for cell, value in enumerate(first.values):
             verdict = table.verdict(cell, noise)
             if verdict is not None:
-                ends = (verdict.lower, verdict.value, verdict.upper)
-                shown.add_row(value_text(first, value), str(verdict.decision), str(verdict.runs), *map(number, ends))
+                shown.add_row(value_text(first, value), str(verdict.decision), str(verdict.runs), *_estimate(verdict))
         yield shown
         return
     second, *rest = others
@@ -236,16 +240,21 @@ def _decision_tables(table: SweepTable, noise: str) -> Iterator[Part]:
         shown = number_table("", *(value_text(second, value) for value in second.values))
         for row, value in enumerate(first.values):
             verdicts = [table.verdict(cell, noise) for cell in grid[row].tolist()]
-            entries = ["-" if one is None else f"{one.decision}\n{number(one.value)}\n{one.runs}" for one in verdicts]
-            shown.add_row(value_text(first, value), *entries)
-        title = f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}"
+            lines = [("-",) if one is None else (str(one.decision), *_estimate(one), str(one.runs)) for one in verdicts]
+            shown.add_row(value_text(first, value), *map("\n".join, lines))
+        keys = f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}"
         units = {"rows": unit_of(first.key), "columns": unit_of(second.key)}
         unit_text = ", ".join(f"{name} in {unit}" for name, unit in units.items() if unit)
         unit = QUANTITY_NAMES[table.required.quantity].partition(", ")[2]
         estimate = f"{table.required.name} in {unit}" if unit else table.required.name
-        cell_text = f"lines of a cell: decision, {estimate} (- if too few runs), number of runs"
-        yield f"{title}\n{unit_text}; {cell_text}" if unit_text else f"{title}\n{cell_text}"
+        cell_text = f"lines of a cell: decision, {estimate} (- if too few runs), its 95 % CI, number of runs"
+        yield f"{keys}\n{unit_text}; {cell_text}" if unit_text else f"{keys}\n{cell_text}"
         yield shown
+
+
+def _estimate(verdict: Verdict) -> tuple[str, str]:
+    """Return the estimate of a decision and its interval as text."""
+    return number(verdict.value), f"{number(verdict.lower)} to {number(verdict.upper)}"
 
 
 def quantile_options(

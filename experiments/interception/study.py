@@ -59,6 +59,12 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
     ]
 
 
+def scenario_title(scenario: Scenario) -> str:
+    """Return the name of a scenario, with its range meter and its model."""
+    meter = "with" if scenario.range_sensor is not None else "without"
+    return f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"
+
+
 def game_note(scenario: Scenario, rule: str | None = None) -> str:
     """Return a line about what a result with game noise is; `rule` is its tie rule, None that of the scenario."""
     bound = "; no errors within the bounds give a miss above Phi" if scenario.set_model.is_guaranteed else ""

@@ -19,6 +19,7 @@ from experiments.interception.runs.engage import steps_csv
 from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, need_times, read_times
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.study import scenario_title
 from sim import Scenario
 from sim.adversary import WorstEngagement
 
@@ -112,7 +113,6 @@ def _halfway_m(found: WorstEngagement) -> float | None:
 
 
 def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> Iterator[Part]:
-    meter = "with" if scenario.range_sensor is not None else "without"
     same = worst.set_kept is worst.overall
     columns = [("set never empty, set also empty" if same else "set never empty", worst.set_kept)]
     columns += [] if same else [("set also empty", worst.overall)]
@@ -122,7 +122,7 @@ def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s
     strategy = worst.engagements[0].strategy
     count = sum(found.evaluations for found in worst.engagements)
     yield (
-        f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}, strategy {strategy}: "
+        f"{scenario_title(scenario)}, strategy {strategy}: "
         f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
     )
     yield table

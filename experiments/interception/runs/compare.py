@@ -22,7 +22,15 @@ from experiments.interception.command import Compare
 from experiments.interception.comparison import Comparison, Flight, flights, gather, summary
 from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_in_threads, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
-from experiments.interception.study import QUANTILES, SetCounts, game_note, percent, set_counts, set_warnings
+from experiments.interception.study import (
+    QUANTILES,
+    SetCounts,
+    game_note,
+    percent,
+    scenario_title,
+    set_counts,
+    set_warnings,
+)
 from guidance import NoiseKind, Strategy
 from sim import Scenario
 
@@ -136,10 +144,8 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
                 shares.append(f"{percent(hits.lower)} to {percent(hits.upper)}")
             sets.add_row(title, comparison.strategy, *shares)
             title = ""
-    meter = "with" if scenario.range_sensor is not None else "without"
     runs = len(compared[0].miss_m)
-    title = f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}: quantiles of {runs} runs"
-    yield f"{title}; game noise: {TIES}"
+    yield f"{scenario_title(scenario)}: quantiles of {runs} runs; game noise: {TIES}"
     yield table
     yield from ("", f"of the {runs} runs:", sets)
     yield game_note(scenario, TIES)

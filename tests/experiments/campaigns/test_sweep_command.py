@@ -148,8 +148,9 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Infoset, swept: 
     assert code == 0
     assert "impulse_m_s p50<60 is met in" in out
     assert "angle_sensor.error_at_zero_range_rad (rows) and thruster.greatest_impulse_m_s (columns)" in out
-    assert "rows in rad, columns in m/s; lines of a cell: decision, impulse_m_s p50 in m/s (- if too few runs)" in out
-    assert re.search(r"met.*\n +[\d.]+ .*\n +20 +20", out)
+    assert "rows in rad, columns in m/s; lines of a cell: decision, impulse_m_s p50 in m/s (- if too few runs), " in out
+    assert re.search(r"met.*\n +[\d.]+ .*\n +[\d.]+ to [\d.]+ .*\n +20 +20", out)
+    assert "brief, with range meter, model paper, strategy symmetric-miss, seed 0\n" in out
     names = ["figure-sweep.pdf", "figure-sweep.png", "report.json", "scenario.toml", "sweep.parquet"]
     assert sorted(each.name for each in (tmp_path / "report").iterdir()) == names
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").num_rows == 6
