@@ -131,7 +131,7 @@ def copy_of_rings(rings: Floats, size: int) -> Floats:
 
 def working_room() -> Floats:
     """Return the working array of the operations on whole chains."""
-    return np.empty((2 * CAPACITY + 4, 2))
+    return np.empty((3 * CAPACITY + 4, 2))
 
 
 @inlined

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from infoset._compile import allocation_free, compiled, inlined
+from infoset.arrays import Floats
 from infoset.polygon import ROUNDING, Points, append, close, cross
 
 
@@ -157,31 +158,56 @@ def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> tup
 
 
 @allocation_free
-def drop_inner_edges(points: Points, count: int, fewest: int, added: Points) -> tuple[int, bool]:
+def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> tuple[int, bool]:
     """Remove edges inside a path, in place, until `fewest` vertices are left; the path moves outward only.
 
-    Return the new number of vertices, and False if no edge can be removed before that. `added`, shape (>= count,), is a
-    working array: the area that the removal of each edge adds. A removal changes four of these areas.
+    The edge that adds the least area is removed first, of equal ones the first. Return the new number of vertices, and
+    False if no edge can be removed before that. O(count + removed log(count)). `work` is a working array of twice as
+    many rows as the least power of two from `count`. Its first column is a tree: the leaves are the areas that the
+    removal of the edge after each vertex adds, the other nodes are the lesser of two children. Its second column has
+    the numbers of the next and, from `leaves`, of the previous vertex.
     """
-    first, last = 1, count - 3
-    while count > fewest:
-        for i in range(first, last + 1):
-            added[i] = removed_edge(points, i - 1, i, i + 1, i + 2)[0]
-        least = np.inf
-        for i in range(1, count - 2):
-            least = min(least, added[i])
-        if least == np.inf or least < 0.0:
-            return count, False
-        chosen = 1
-        while added[chosen] > least:
-            chosen += 1
-        _, points[chosen, 0], points[chosen, 1] = removed_edge(points, chosen - 1, chosen, chosen + 1, chosen + 2)
+    leaves = 1
+    while leaves < count:
+        leaves *= 2
+    tree, links, last = work[:, 0], work[:, 1], count - 1
+    for i in range(leaves):
+        links[i], links[leaves + i] = min(i + 1, last), max(i - 1, 0)
+        tree[leaves + i] = removed_edge(points, i - 1, i, i + 1, i + 2)[0] if 0 < i < last - 1 else np.inf
+    update_nodes(tree, leaves, 2 * leaves - 1)
+    while count > fewest and 0.0 <= tree[1] < np.inf:
+        at = 1
+        while at < leaves:
+            at = 2 * at + (tree[2 * at] > tree[1])
+        i = at - leaves
+        before, j = int(links[leaves + i]), int(links[i])
+        after = int(links[j])
+        _, points[i, 0], points[i, 1] = removed_edge(points, before, i, j, after)
+        links[i], links[leaves + after], tree[leaves + j] = after, i, np.inf
         count -= 1
-        for i in range(chosen + 1, count):
-            points[i, 0], points[i, 1] = points[i + 1, 0], points[i + 1, 1]
-            added[i] = added[i + 1]
-        first, last = max(chosen - 2, 1), min(chosen + 1, count - 3)
-    return count, True
+        # The removal changes the areas of four edges.
+        first = i = int(links[leaves + before])
+        for _ in range(4):
+            before, at, j = int(links[leaves + i]), i, int(links[i])
+            after = int(links[j])
+            inside = before < i < j < after
+            tree[leaves + i] = removed_edge(points, before, i, j, after)[0] if inside else np.inf
+            i = j
+        update_nodes(tree, leaves + first, leaves + at)
+    i = 0
+    for made in range(count):
+        points[made, 0], points[made, 1] = points[i, 0], points[i, 1]
+        i = int(links[i])
+    return count, count <= fewest
+
+
+@inlined
+def update_nodes(tree: Floats, first: int, last: int) -> None:
+    """Compute the nodes above the leaves from `first` to `last`."""
+    while first > 1:
+        first, last = first >> 1, last >> 1
+        for node in range(first, last + 1):
+            tree[node] = min(tree[2 * node], tree[2 * node + 1])
 
 
 @compiled

@@ -20,9 +20,8 @@ def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points:
     """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
 
     An edge is removed by extending its neighbours to their intersection; the edge that adds the least area is removed
-    first, at O(CAPACITY) per edge. Vertices that are not convex because of rounding are removed before. If no edge can
-    be removed, three sides of a box around the chain replace it. `points`, shape (2 CAPACITY + 4, 2), is a working
-    array.
+    first. Vertices that are not convex because of rounding are removed before. If no edge can be removed, three sides
+    of a box around the chain replace it. `points`, shape (3 CAPACITY + 4, 2), is a working array.
     """
     in_right, in_left = right.end - right.begin, left.end - left.begin
     longer, sign = (right, 1.0) if in_right > in_left else (left, -1.0)
@@ -31,7 +30,7 @@ def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points:
         v, m = read(longer, rings, i)
         count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
     most = REDUCED - min(in_right, in_left)
-    count, done = polygon_hull.drop_inner_edges(points, count, most, points[CAPACITY + 2 :, 0])
+    count, done = polygon_hull.drop_inner_edges(points, count, most, points[CAPACITY + 2 :])
     if not done:
         count = box_around(points, count, sign, tau)
     for i in range(count):

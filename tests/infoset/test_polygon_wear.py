@@ -532,6 +532,29 @@ def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
         assert polygon.area(reduced, len(reduced)) < 1e-14
 
 
+def test_the_edge_that_adds_the_least_area_is_removed_first() -> None:
+    """The reference computes all areas again after each removal; the lengths are equal in pairs, so that areas tie."""
+    rng = np.random.default_rng(2)
+    work = np.empty((128, 2))
+    for count in (5, 16, 33, 60):
+        lengths = 10.0 ** rng.uniform(-4.0, 0.0, count)
+        directions = np.linspace(0.0, 3.0, count)
+        steps = np.minimum(lengths, lengths[::-1])[:, None] * np.stack(
+            [np.cos(directions), np.sin(directions)], axis=-1
+        )
+        path = np.cumsum(steps, axis=0)
+        expected = path.copy()
+        while len(expected) > 4:
+            removals = [
+                polygon_hull.removed_edge(expected, i - 1, i, i + 1, i + 2) for i in range(1, len(expected) - 2)
+            ]
+            first = min(range(len(removals)), key=lambda i: removals[i][0])
+            expected[first + 1] = removals[first][1:]
+            expected = np.delete(expected, first + 2, axis=0)
+        assert polygon_hull.drop_inner_edges(path, count, 4, work) == (4, True)
+        np.testing.assert_array_equal(path[:4], expected)
+
+
 @checked
 @given(clouds())
 def test_the_hull_is_the_exact_one(points: Floats) -> None:

@@ -24,7 +24,7 @@ from experiments.common.screen import (
 )
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Bound
-from experiments.interception.runs.shared import WorstMisses, find_worst_misses, need_finite, summary_head
+from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import greatest_guarantee_m
 from guidance import Strategy
@@ -111,20 +111,25 @@ def _simulate(
     begin: BeginProgress,
 ) -> list[WorstOfStrategy]:
     worst = []
-    for name, own in strategies.items():
-        report, flights = begin(name), []
+    report = begin("strategies")
+    for index, (name, own) in enumerate(strategies.items()):
         flown = scenario if own is not None else replace(scenario, strategy=name)
-        for i, pair in enumerate(lower.pairs):
-            flight = fly_pair(flown, pair, own)
+        flights = [(pair, fly_pair(flown, pair, own)) for pair in lower.pairs]
+        for _, flight in flights:
             need_finite(flight.results)
-            flights.append((pair, flight))
-            report((i + 1) / len(lower.pairs))
         searched = WorstMisses(None, None)
         if options.budget > 0:
-            searched = find_worst_misses(flown, own, budget=options.budget, seed=options.seed, begin=begin)
+            part = _part_of(report, index, len(strategies))
+            searched = find_worst_misses(flown, own, budget=options.budget, seed=options.seed, begin=part)
+        report((index + 1) / len(strategies))
         records = tuple(engagement.record(own) for engagement in searched.engagements)
         worst.append(WorstOfStrategy(name, tuple(flights), searched, records))
     return worst
+
+
+def _part_of(report: Progress, index: int, parts: int) -> BeginProgress:
+    """Return the progress of one of several equal parts."""
+    return lambda _name: lambda done: report((index + done) / parts)
 
 
 def _nominal(scenario: Scenario) -> TruthPair:
