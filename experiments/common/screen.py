@@ -153,10 +153,10 @@ def _progress_lines() -> BeginProgress:
 
 
 def number(value: float | None) -> str:
-    """Return a number with three significant digits, one decimal from 100 on, for tables."""
+    """Return a number with three significant digits, from 100 to 1e9 with one decimal, for tables."""
     if value is None:
         return "-"
-    return f"{value:.1f}" if abs(value) >= 100 else f"{value:.3g}"
+    return f"{value:.1f}" if 100 <= abs(value) < 1e9 else f"{value:.3g}"
 
 
 def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[str]:

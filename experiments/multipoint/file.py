@@ -234,7 +234,7 @@ def _time_problems(known: Known, paths: Sequence[KeyPath]) -> Iterator[Problem]:
         last = times[-1] if times else None
         if last is not None and latest is not None and last > latest:
             text = f"is {latest}, before the last visit at {last} s"
-            yield Problem(("times", "latest_s"), text, "make it later, or remove it")
+            yield Problem(("times", "latest_s"), text, "make it later, or set optimise = true under [times]")
     stays = sum(dwell[:-1], ZERO)
     need = len(paths) * gap + stays
     if latest is not None and paths and (latest < need or latest <= stays):

@@ -14,7 +14,7 @@ from experiments.common.screen import Part, number_table
 from experiments.multipoint.command import BEST, GIVEN
 from experiments.multipoint.file import Axes, MultipointProblem
 from infoset.arrays import Floats
-from rendezvous.multipoint import BestOrder, Path, Visits
+from rendezvous.multipoint import BestOrder, Path, Tour, Visits
 
 _POINTS = 1601
 _CURVE_POINTS = 41
@@ -137,6 +137,16 @@ class Report:
     best: BestOrder
     peak_m_s2: float
 
+    @property
+    def notes(self) -> list[str]:
+        """Return what is known of the best order and of the best times."""
+        notes = []
+        if self.search.order == BEST:
+            linear = isinstance(self.problem.tour, Tour)
+            proved = linear and self.search.times == GIVEN and not self.best.lost
+            notes.append("no order that fits costs less" if proved else "the order is the best one found")
+        return [*notes, "the times are a local minimum"] if self.search.times == BEST else notes
+
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
@@ -159,6 +169,7 @@ def report_json(report: Report) -> dict[str, object]:
         "orders_begun": report.best.nodes,
         "orders_left_out": len(report.best.lost),
         "orders_that_do_not_fit": report.best.unfit,
+        "notes": report.notes,
     }
 
 
@@ -193,6 +204,8 @@ def report_parts(report: Report) -> Iterator[Part]:
     """Yield the cost, the visits and the extent of the search, for the screen."""
     path, nodes = report.scene.path, report.scene.path.nodes
     yield f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"
+    if report.problem.price_per_s > 0.0:
+        yield f"cost with the price of the time {report.best.objective:.8g} m^2/s^3"
     unit, per_s = report.scene.time_unit
     table = number_table(
         "target", "meet", f"time\n{unit}", "relative speed\nm/s", "dI/dt\nm^2/s^4", "costate jump\nm/s^3", left=2
@@ -216,4 +229,4 @@ def report_parts(report: Report) -> Iterator[Part]:
         text += f", {report.best.nodes} partial orders examined"
         text += f", {len(report.best.lost)} left out because no trajectory was found" if report.best.lost else ""
         text += f"; {report.best.unfit} orders do not fit the times" if report.best.unfit else ""
-    yield text + ("; the times are a local minimum" if report.search.times == BEST else "")
+    yield "; ".join([text, *report.notes])

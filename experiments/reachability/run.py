@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
+import numpy as np
 from rich.table import Table
 
 from experiments.common.errors import InputError
@@ -89,7 +90,9 @@ def _selection(text: str) -> tuple[list[str], int]:
 def _summary(report: Report) -> Iterator[str]:
     solution, least = report.solution, report.least_periods
     dimension = solution.optimal.dimension
-    reached = f"norm 0 needs at least {least} periods" if least else f"norm 0 not reached in {report.searched_periods}"
+    reached = f"norm 0 not reached in {report.searched_periods} periods"
+    if least is not None:
+        reached = f"norm 0 needs at least {least} period{'s' if least > 1 else ''}"
     yield f"{report.rendezvous.name}: least terminal norm {solution.optimal.miss:.9g} {_NORM}; {reached}"
     yield f"route: {solution.route.value} ({solution.reason})"
     yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
@@ -103,11 +106,11 @@ def _feedback(report: Report) -> Iterator[str]:
     if report.flight is not None:
         yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)} {_NORM}"
     if report.noisy:
-        misses = sorted(flight.miss for flight in report.noisy)
+        misses = [flight.miss for flight in report.noisy]
         relaxed = max(float(flight.relaxations.max()) for flight in report.noisy)
         yield (
-            f"with navigation errors, {len(misses)} simulations: median {number(misses[len(misses) // 2])}, "
-            f"largest {number(misses[-1])} {_NORM}; constraints relaxed by at most {relaxed:.2%}"
+            f"with navigation errors, {len(misses)} simulations: median {number(float(np.median(misses)))}, "
+            f"largest {number(max(misses))} {_NORM}; constraints relaxed by at most {relaxed:.2%}"
         )
     if report.robustness is not None:
         conflict, plan = report.robustness.conflict, report.robustness.plan

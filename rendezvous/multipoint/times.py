@@ -26,6 +26,7 @@ _MOST_WALLS = 6
 _MOST_RESTARTS = 4
 _SETTLED = 1e-3
 _ROUNDING = 1e-26
+_SMALLEST = float(np.finfo(float).tiny)
 _CLOCK = 1e-9
 """Travel times below this share of the times are rounding errors, and leave no gaps."""
 
@@ -262,7 +263,7 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
     # The objective of a path that costs nothing is the rounding of states.
     states = best.flown.nodes.arrive
     size = (states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps
-    return float(gain.max() / (best.objective + _ROUNDING * size.sum()))
+    return float(gain.max() / max(best.objective + _ROUNDING * size.sum(), _SMALLEST))
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:

@@ -13,7 +13,8 @@ from rendezvous._arrays import Floats
 from rendezvous.pareto.solution import EncounterSolution, weighted_point
 
 MOST_CRAFT = 12
-_RELATIVE = 1e-12
+_ROUNDING = 1e-18
+"""Excess that is the rounding of an ideal, relative to the squared cost that the free values change."""
 
 
 class Core(Enum):
@@ -30,7 +31,10 @@ class Core(Enum):
                 "the core is empty: each craft alone has zero excess, so its share in the core is at most zero, but "
                 "the shares must sum to the cost of the common meeting, which is positive"
             )
-        return "all ideal meetings coincide: no craft has an excess, and in the only division of the core all are zero"
+        return (
+            "the ideal meetings of all craft with a weight above 0 coincide: these craft have no excess, and in the "
+            "only division of the core all shares are zero"
+        )
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     """Analyse every coalition of a `solution`, whose meeting is the best one for the group.
 
     With one M and equal weights c(S) = sum over pairs of d_ij^2 / |S|. c is superadditive with c({i}) = 0, so its core
-    is empty unless all ideals coincide. O(2^n n).
+    is empty unless all ideals of craft with a weight above 0 coincide. O(2^n n).
 
     Raises
     ------
@@ -85,9 +89,9 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
             regret = max(float(common[list(members)].sum()) - worth[members], 0.0)
             coalitions.append(Coalition(members, worth[members], regret))
     shapley = np.array([_shapley(craft, count, worth) for craft in range(count)])
-    # Relative to the size of the ideals: equal ideals are equal up to rounding only.
-    scale = float(sum((cost.root @ cost.ideal) @ (cost.root @ cost.ideal) for cost in solution.costs))
-    core = Core.EMPTY if worth[tuple(range(count))] > _RELATIVE * scale else Core.ZERO
+    # Equal ideals are equal up to rounding only.
+    rounding = _ROUNDING * sum(weights * [cost.effort_base @ cost.effort_base for cost in solution.costs])
+    core = Core.EMPTY if worth[tuple(range(count))] > rounding else Core.ZERO
     return Coalitions(tuple(coalitions), shapley, common - shapley - (common.sum() - shapley.sum()) / count, core)
 
 

@@ -19,7 +19,7 @@ _TIDY = 1e-7
 
 
 class NoRobustPlanError(ValueError):
-    """No plan satisfies the constraints for all disturbances."""
+    """No plan with affine feedback satisfies the constraints for all disturbances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def tightened(problem: ReachabilityProblem, disturbance: Floats) -> Reachability
 
 
 def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> FeedbackPlan:
-    """Return the plan with feedback from past disturbances whose worst terminal state is least.
+    """Return the plan with affine feedback from past disturbances whose worst terminal state is least.
 
     The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; w(t) is known from t + 1 on, by
     the state.
@@ -104,7 +104,7 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     Raises
     ------
     NoRobustPlanError
-        If no plan satisfies the constraints.
+        If no plan with affine feedback satisfies the constraints.
     ValueError
         If there are too many periods, or thrust is in a ball.
     """
@@ -188,7 +188,7 @@ class _Program:
         optimum = linprog(cost, A_ub=matrix, b_ub=self.limits, bounds=(None, None), method="highs-ipm", options=HIGHS)
         if optimum.status == 2:
             raise NoRobustPlanError(
-                "no plan with feedback keeps the constraints under every disturbance; reduce the disturbance, "
+                "no plan with affine feedback keeps the constraints under every disturbance; reduce the disturbance, "
                 "or relax the bounds"
             )
         if optimum.status != 0:

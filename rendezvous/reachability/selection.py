@@ -174,11 +174,11 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
     corners = []
     for part in optimal.blocks:
         if part.optimal.ball:
-            raise TooManyVerticesError("with thrust in a ball the optimal controls have no vertices; choose a box")
+            raise TooManyVerticesError("with thrust in a ball the optimal controls have no vertices")
         if part.optimal.size > _MOST_DIMENSIONS:
             raise TooManyVerticesError(
                 f"the optimal controls of a block span {part.optimal.size} dimensions, more than the limit of "
-                f"{_MOST_DIMENSIONS} for vertices: choose samples"
+                f"{_MOST_DIMENSIONS} for vertices"
             )
         if not part.optimal.size:
             corners.append(np.zeros((1, 0)))
@@ -192,9 +192,7 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
             ) from error
     count = int(np.prod([len(block) for block in corners]))
     if count > most:
-        raise TooManyVerticesError(
-            f"the optimal controls have {count} vertices, more than the limit of {most}: choose samples"
-        )
+        raise TooManyVerticesError(f"the optimal controls have {count} vertices, more than the limit of {most}")
     points = corners[0]
     for block in corners[1:]:
         points = np.hstack([np.repeat(points, len(block), axis=0), np.tile(block, (len(points), 1))])

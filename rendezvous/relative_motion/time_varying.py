@@ -126,8 +126,14 @@ class TimeVaryingMotion(LinearMotion):
 
 
 def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Solution:
-    """Double the panels until two solutions agree, or differ by rounding only."""
+    """Double the panels until two solutions agree, or differ by rounding only; many intervals in parts."""
     panels = _first_panels(motion, starts, ends)
+    if len(starts) > 1 and panels * len(starts) > MOST_PANELS:
+        half = len(starts) // 2
+        parts = [_refined(motion, starts[part], ends[part]) for part in (slice(None, half), slice(half, None))]
+        return _Solution(
+            *(np.concatenate(arrays) for arrays in zip(*(vars(part).values() for part in parts), strict=True))
+        )
     coarse, apart = _collocated(motion, starts, ends, panels), np.inf
     while 2 * panels <= MOST_PANELS:
         panels *= 2

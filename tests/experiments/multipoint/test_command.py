@@ -31,6 +31,7 @@ KEYS = [
         "orders_begun",
         "orders_left_out",
         "orders_that_do_not_fit",
+        "notes",
     ),
 ]
 NODE_KEYS = ["name", "meet", "position_m", "velocity_m_s", "target_velocity_m_s", "leave_s", "jump_m_s3"]
@@ -101,15 +102,17 @@ def test_three_targets_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
 
 def test_order_and_times_override_the_file(infoset: Infoset, mine: Callable[[str], Path]) -> None:
     best = told(infoset, "service-3", "--times", "best")
-    assert best["times_chosen"] == "best"
+    assert (best["times_chosen"], best["notes"]) == ("best", ["the times are a local minimum"])
     assert best["cost_m2_s3"] == pytest.approx(0.01835844971766454, rel=1e-9)
     np.testing.assert_allclose(best["times_s"], [1521.3233432870954, 3015.0416119664947, 4000.0], rtol=1e-9)
     both = told(infoset, "service-3", "--order", "best", "--times", "best")
     assert both["order"] == ["T3", "T2", "T1"]
     assert both["cost_m2_s3"] == pytest.approx(0.008734876263, rel=1e-9)
     assert both["orders_begun"] <= 15
+    assert both["notes"] == ["the order is the best one found", "the times are a local minimum"]
     slots = told(infoset, "service-3", "--order", "best")
     assert slots["times_s"] == [1200.0, 2600.0, 4000.0]
+    assert slots["notes"] == ["no order that fits costs less"]
     assert slots["cost_m2_s3"] <= 0.0211422802
     asked = mine(changed("optimise = false", "optimise = true"))
     assert told(infoset, asked)["cost_m2_s3"] == pytest.approx(best["cost_m2_s3"], rel=1e-12)
@@ -142,6 +145,22 @@ def test_rendezvous_stays_prices_and_eccentric_orbits(infoset: Infoset, mine: Ca
         for anomaly in ("0.0", "180.0")
     ]
     assert costs[0] != pytest.approx(costs[1], rel=0.05)
+
+
+def test_a_chaser_that_is_at_its_target_costs_nothing(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    resting = (
+        TWO[: TWO.index("[[target]]")]
+        + """[[target]]
+name = "T1"
+position_m = [0.0, 0.0, 0.0]
+velocity_m_s = [0.0, 0.0, 0.0]
+meet = "rendezvous"
+[times]
+optimise = true
+latest_s = 3000.0
+"""
+    )
+    assert told(infoset, mine(resting))["cost_m2_s3"] == 0.0
 
 
 def test_keys_that_may_be_left_out(infoset: Infoset, mine: Callable[[str], Path]) -> None:

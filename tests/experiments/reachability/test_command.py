@@ -343,7 +343,7 @@ def test_what_the_exact_route_and_vertices_cannot_do_is_said(infoset: Infoset) -
     assert "--route exact: for thrust in a ball" in err
     code, _, err = infoset("approach-cone", "--select", "vertices")
     assert code == 2
-    assert "choose samples" in err
+    assert "choose for example --select samples:20" in err
 
 
 def test_a_tube_that_cannot_be_drawn_ends_in_a_message(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,6 +51,12 @@ def test_the_published_problem_with_less_thrust(reach: Infoset, tmp_path: Path, 
         assert json.loads(out)["optimal_miss"] == pytest.approx(1.62757318, abs=1e-8)
 
 
+def test_a_frozen_model_that_amplifies_rounding_is_refused(reach: Infoset) -> None:
+    code, out, err = reach("rendezvous-2021", "--set", "orbit.eccentricity=0.9", "--set", "periods=40")
+    assert (code, out) == (2, "")
+    assert "the frozen linear model multiplies deviations by over 1e+10" in err
+
+
 def test_too_many_vertices(reach: Infoset) -> None:
     code, out, err = reach(CASES / "s4_1_59.toml", "--select", "vertices", "--quiet")
     assert (code, out) == (2, "")

@@ -257,6 +257,15 @@ def test_craft_that_agree_have_nothing_to_share() -> None:
     np.testing.assert_allclose(found.shapley, 0.0, atol=1e-12)
 
 
+def test_craft_that_almost_agree_share_a_cost_beside_an_expensive_craft() -> None:
+    solution = some(9, 1)
+    first = solution.encounter.craft[0]
+    near = replace(first, name="near", state=first.state * (1.0 + 1e-6))
+    late = replace(first, name="late", weight=0.0, start_s=solution.encounter.meeting_s * (1.0 - 1e-6))
+    craft = (first, near, late)
+    assert analyse_coalitions(solve_encounter(replace(solution.encounter, craft=craft))).core is Core.EMPTY
+
+
 def test_too_many_craft_for_coalitions() -> None:
     with pytest.raises(ValueError, match="13 craft have 8191 coalitions"):
         analyse_coalitions(some(0, 13))
