@@ -25,7 +25,7 @@ class GameNoise:
         rule for both axes, or two rules, for y and z.
     tie_draws : ndarray, shape (B, steps), or (2, B, steps) in space
         Uniform in [-1, 1], used by `TieRule.RANDOM`: the upper extreme where the draw is not negative.
-    shift_m : ndarray, shape (steps,), or None
+    shift_m : ndarray, shape (steps,), or (2, steps) in space, or None
         Shift of the measured position across x in each step with `TieRule.UPPER`, m, limited by the error bound; the
         last one holds for later steps. With `TieRule.LOWER` it has the other sign. These two rules then do not choose
         the angle by the set. None is no shift.
@@ -85,7 +85,7 @@ class GameNoise:
         signs = {TieRule.UPPER: 1.0, TieRule.LOWER: -1.0}
         rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
         sign = np.array([[signs.get(rule, 0.0)] for rule in rules]) if len(rules) > 1 else signs.get(rules[0], 0.0)
-        shift_m = self.shift_m[min(sight.step, len(self.shift_m) - 1)]
+        shift_m = self.shift_m[..., min(sight.step, self.shift_m.shape[-1] - 1), None]
         shifted = sensor.nearest(sight, sight.alpha_rad + sign * shift_m / sight.range_m)
         joined = np.where(sign == 0.0, chosen, shifted)
         # Components of two points of a disc can be outside the disc.

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from infoset import SetModel
 from infoset.arrays import Floats
 from sim.scenario import Scenario
 
@@ -63,7 +64,7 @@ def images_s(scenario: Scenario) -> tuple[float, float]:
 
 
 def worst_shift_m(scenario: Scenario) -> Floats | None:
-    """Return how far game noise shifts the measured position across x in each step, along each axis, m.
+    """Return how far game noise shifts the measured position across x in each step, m; in space by axis, (2, steps).
 
     None without a cut-off or times of impulses, or with fewer than two images before the last decision.
 
@@ -73,14 +74,20 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     (2 b0 + 2 b)/u + nu u, and its speed is possible at t = 0 if s is at most 2 w + 2 nu t, with the half-width w of the
     speeds of the initial set and the time t of the last image. With the greatest s the misses differ most; before its
     least value, at u = s/(2 nu), the difference is constant. If one of the motions is the true one, images in the
-    middle of both are shifted by half the difference. Bounds and speeds are those of z, also for the shift along y.
+    middle of both are shifted by half the difference.
     """
-    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
-    if thruster.impulse_steps(arrival_s, model.step_s) is None:
+    model = scenario.set_model
+    if scenario.thruster.impulse_steps(scenario.nominal_arrival_s, model.step_s) is None:
         return None
     before_s = np.array(_images_s(scenario))
     if before_s.size < 2:
         return None
+    shifts_m = [_worst_shift_along_m(model.axis(name), before_s, scenario.nominal_arrival_s) for name in model.axes]
+    return np.stack(shifts_m) if scenario.is_spatial else shifts_m[0]
+
+
+def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) -> Floats:
+    """Return `worst_shift_m` in the planar model of one axis, for images at these times before the arrival, s."""
     range_m = before_s * model.closing_speed_m_s
     bound_m, last_s = model.angle_sensor.error_bound(range_m) * range_m, before_s[-1]
     earlier_s, disturbance, (least, greatest) = before_s[:-1] - last_s, model.disturbance_m_s2, model.bounds.vz_m_s

@@ -243,7 +243,8 @@ class Items:
     def __call__(self, value: object) -> tuple[Any, ...]:
         """Check and return them."""
         if not isinstance(value, list) or not self.least <= len(value) <= self.most:
-            raise wrong(f"must be an array of {self.least} to {self.most} {self.noun}")
+            numbers = f"{self.least} to {self.most}" if self.least else f"at most {self.most}"
+            raise wrong(f"must be an array of {numbers} {self.noun}")
         return tuple(self._checked(number, item) for number, item in enumerate(value, start=1))
 
     def _checked(self, number: int, item: object) -> Any:

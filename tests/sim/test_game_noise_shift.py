@@ -51,8 +51,10 @@ def test_without_a_disturbance_the_shift_is_a_straight_line_between_the_bounds()
     """Its miss is that of the closed form."""
     settings = ["angle_sensor.centroid_error_m=3", "information_set.disturbance_m_s2=0", "target.manoeuvre=none"]
     scenario = load_scenario("dart-2022", settings)
-    shift_m, first_s, last_s, speed_m_s = worst_shift_m(scenario), scenario.nominal_arrival_s, 150.0, 6140.0
-    assert shift_m is not None
+    shifts_m, first_s, last_s, speed_m_s = worst_shift_m(scenario), scenario.nominal_arrival_s, 150.0, 6140.0
+    assert shifts_m is not None
+    shift_m, along_z_m = shifts_m
+    np.testing.assert_array_equal(shift_m, along_z_m)
     assert shift_m[0] == pytest.approx(-(3.0 + 5.4e-6 * speed_m_s * first_s))
     assert shift_m[-1] == pytest.approx(3.0 + 5.4e-6 * speed_m_s * last_s)
     assert np.diff(shift_m[:-1], 2) == pytest.approx(0.0, abs=1e-9)
@@ -76,3 +78,16 @@ def test_the_two_rules_have_opposite_errors() -> None:
     upper, lower = (simulate(replace(scenario, tie=tie), runs=RUNS) for tie in (TieRule.UPPER, TieRule.LOWER))
     across = [np.ma.getdata(results.lateral_miss) for results in (upper, lower)]
     assert (np.sign(across[0]) == -np.sign(across[1])).all()
+
+
+def test_each_axis_has_the_shift_of_its_own_bounds() -> None:
+    settings = ["thruster.last_impulse_s=15", "angle_sensor.error_at_nominal_range_y_rad=6e-4"]
+    scenario = load_scenario("asteroid-1997-space", [*settings, "angle_sensor.error_at_zero_range_y_rad=4e-4"])
+    shift_m, model = worst_shift_m(scenario), scenario.set_model
+    assert shift_m is not None
+    last_image_m = np.array([15.0 * model.closing_speed_m_s])
+    np.testing.assert_allclose(shift_m[:, -1:], model.angle_sensor.error_bounds(last_image_m) * last_image_m, rtol=2e-3)
+    along_z = worst_shift_m(load_scenario("asteroid-1997-space", settings[:1]))
+    assert along_z is not None
+    np.testing.assert_array_equal(shift_m[1], along_z[1])
+    assert (np.abs(shift_m[0]) > 1.5 * np.abs(shift_m[1])).mean() > 0.9

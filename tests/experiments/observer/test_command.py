@@ -178,6 +178,7 @@ def test_wrong_problems_are_refused(text: str, parts: list[str], infoset: Comman
         ("initial.lower=[1,true]", "initial.lower: number 2 of the array must be a number, found"),
         ("noise.half_width=[-1]", "noise.half_width: number 1 of the array must be at least 0, found"),
         ("noise.half_width=['1']", 'number 1 of the array must be a number, found ["1"]; write it without quotes'),
+        ("simulation.missing=3", "simulation.missing: must be an array of at most 10000 steps, found 3"),
         ("simulation.missing=[3,1.5]", "simulation.missing: number 2 of the array must be a whole number, found"),
     ],
 )
