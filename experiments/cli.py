@@ -162,8 +162,8 @@ def _out_of_memory(error: MemoryError) -> str:
 def _usage_message(error: Any) -> str:
     """Return the message of an error about options and arguments, in one line and with the command that has help."""
     message = " ".join(error.format_message().split()).rstrip(".")
-    hint = f"{'' if message.endswith('?') else ';'} see {error.ctx.command_path} --help" if error.ctx else ""
-    return f"error: {message[:1].lower()}{message[1:]}{hint}"
+    command = error.ctx.command_path if error.ctx else "infoset COMMAND"
+    return f"error: {message[:1].lower()}{message[1:]}{'' if message.endswith('?') else ';'} see {command} --help"
 
 
 def _ended(message: str, code: int) -> typer.Exit:

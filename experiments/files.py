@@ -83,11 +83,11 @@ def _problem_kind(file: str) -> str:
     if kind == SCENARIO:
         raise InputError(f"{file}: {taken_by(kind)}")
     if kind is None:
-        found = f"found {shown(document['kind'])}" if "kind" in document else "which is missing"
+        missing, found = ("", f", found {shown(document['kind'])}") if "kind" in document else ("is missing, ", "")
         guess = nearest(str(document.get("kind")), [*PROBLEMS])
         example = f'write for example kind = "{next(iter(PROBLEMS))}" above the first table'
         remedy = f"did you mean {guess}?" if guess else example
-        raise InputError(f"{file}: kind: must be one of {', '.join(PROBLEMS)}, {found}; {remedy}")
+        raise InputError(f"{file}: kind: {missing}must be one of {', '.join(PROBLEMS)}{found}; {remedy}")
     return kind
 
 

@@ -79,7 +79,7 @@ def problem_form(
     return Form(
         "problem",
         "infoset problems list",
-        f"infoset problems new {kind} FILE",
+        f"infoset problems new {kind or 'KIND'} FILE",
         tables,
         checks,
         ("name", *written),

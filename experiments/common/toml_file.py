@@ -104,10 +104,8 @@ def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str,
             f"{shown(schema)}; write schema = {form.schema} and the keys of `{form.begun_by}`, or update infoset"
         )
     if form.kind != SCENARIO and document.get("kind") != form.kind:
-        found = f"found {shown(document['kind'])}" if "kind" in document else "which is missing"
-        raise InputError(
-            f'{source}: kind: must be "{form.kind}", {found}; write kind = "{form.kind}" above the first table'
-        )
+        fault = f'must be "{form.kind}", found {shown(document["kind"])}' if "kind" in document else "is missing"
+        raise InputError(f'{source}: kind: {fault}; write kind = "{form.kind}" above the first table')
     tables = None
     problems: list[Problem] = []
     try:
@@ -180,7 +178,7 @@ def _table(document: dict[str, Any], path: Sequence[str], key: str) -> dict[str,
     for part, after in itertools.pairwise((*path, "")):
         if isinstance(table, list) and part.isdecimal():
             if not 1 <= int(part[:6]) <= len(table):
-                raise InputError(f"--set: {key}: the file has {len(table)} of these tables; give a number from 1")
+                raise InputError(f"--set: {key}: the file has {len(table)} of these tables, numbered from 1")
             table = table[int(part) - 1]
         elif isinstance(table, dict):
             table = table.setdefault(part, [] if after.isdecimal() else {})
@@ -219,6 +217,8 @@ def _text_of_file(form: Form[Tables], path: str) -> str:
     )
     if content.startswith(ZIP):
         raise InputError(f"{path}: {use_of_content(content)}")
+    if not content.strip():
+        raise InputError(f"{path}: is empty; start from `{form.begun_by}`")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -271,7 +271,7 @@ def _written(path: KeyPath) -> str:
 def _problem(form: Form[Tables], details: Any) -> Problem:
     path = tuple(str(part) for part in details["loc"])
     if details["type"] == "missing":
-        return Problem(path, MISSING, _remedy_of_missing(form.tables, path))
+        return Problem(path, MISSING, _remedy_of_missing(form, path))
     if details["type"] == "extra_forbidden":
         return Problem(path, *_unknown(form, path, details["input"]))
     found = shown(details["input"])
@@ -292,11 +292,14 @@ def _example(tables: type[BaseModel], path: KeyPath) -> str:
     return f"for example {path[-1]} = {keys_of(tables, path[:-1])[path[-1]].examples[0]}"
 
 
-def _remedy_of_missing(tables: type[BaseModel], path: KeyPath) -> str:
+def _remedy_of_missing(form: Form[Tables], path: KeyPath) -> str:
+    tables = form.tables
     if len(path) > 1:
         return f"add it under {heading(tables, path[0])}, {_example(tables, path)}"
     if path[0] in tables_of(tables):
-        return f"add the table {heading(tables, path[0])} with its keys {', '.join(keys_of(tables, path))}"
+        keys = keys_of(tables, path).items()
+        needed = [name for name, field in keys if field.is_required() or f"{path[0]}.{name}" in form.written]
+        return f"add the table {heading(tables, path[0])} with its keys {', '.join(needed)}"
     return f"add it above the first table, {_example(tables, path)}"
 
 

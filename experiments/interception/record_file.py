@@ -354,7 +354,8 @@ def _read_header(header: NDArray[Any]) -> dict[str, Any]:
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise ValueError(f"its header has no format {FORMAT}: another program wrote it")
     if values.get("schema") != SCHEMA or isinstance(values["schema"], bool):
-        raise ValueError(f"it has the schema {shown(values.get('schema'))}, and this version of infoset reads {SCHEMA}")
+        found = shown(values.get("schema"))
+        raise ValueError(f"it has the schema {found}, this version of infoset reads {SCHEMA}; update infoset")
     return values
 
 

@@ -237,7 +237,9 @@ def read_manifest(folder: Path) -> Manifest:
     try:
         return _parsed(content)
     except (ValueError, RecursionError) as error:
-        raise ManifestError(f"{file}: is not a readable manifest: {str(error)[:300]}") from None
+        raise ManifestError(
+            f"{file}: is not a readable manifest: {str(error)[:300]}; restore it from a copy, or simulate in a new folder"
+        ) from None
 
 
 def _parsed(content: bytes) -> Manifest:
@@ -247,7 +249,9 @@ def _parsed(content: bytes) -> Manifest:
     if not isinstance(value, dict) or value.get("format") != FORMAT:
         raise ValueError(f"format: must be {FORMAT}")
     if value.get("schema") != SCHEMA:
-        raise ValueError(f"schema: must be {SCHEMA}, the only one this version reads, found {value.get('schema')}")
+        raise ValueError(
+            f"schema: must be {SCHEMA}, the only one this version reads, found {value.get('schema')}; update infoset"
+        )
     manifest = from_json(Manifest, {key: inner for key, inner in value.items() if key not in _DERIVED})
     if value.get("kind") != manifest.kind:
         raise ValueError("kind: must be sweep with axes, and campaign without")
@@ -269,8 +273,8 @@ def need_same(stored: Manifest, wanted: Manifest, folder: Path) -> None:
     if len(lines) > MOST_DIFFERENCES:
         lines = [*lines[:MOST_DIFFERENCES], f"and {len(lines) - MOST_DIFFERENCES} more"]
     raise ManifestError(
-        f"{folder}: contains a campaign with different settings; resume it with its own, or choose another folder:"
-        + "".join(f"\n  {line}" for line in lines)
+        f"{folder}: contains a campaign with different settings; repeat the command with those of the folder, or "
+        "choose another folder:" + "".join(f"\n  {line}" for line in lines)
     )
 
 

@@ -76,7 +76,7 @@ def test_help_names_the_arguments(command: str, arguments: str, infoset: Command
         (["experiment", "--zzz"], "error: no such option: --zzz; see infoset experiment --help\n"),
         (["scenarios", "zzz"], "error: no such command 'zzz'; see infoset scenarios --help\n"),
         (["campaign"], "error: missing option '--runs'; see infoset campaign --help\n"),
-        (["experiment", "--runs"], "error: option '--runs' requires an argument\n"),
+        (["experiment", "--runs"], "error: option '--runs' requires an argument; see infoset COMMAND --help\n"),
         (
             ["experiment", "--runs", "many"],
             'error: --runs: must be a whole number, found "many"; for example --runs 50\n',

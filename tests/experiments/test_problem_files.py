@@ -80,7 +80,8 @@ def test_all_faults_of_a_file_are_listed_one_a_line(infoset: Infoset, tmp_path: 
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("", ["kind: must be one of pareto-encounter", "which is missing", 'kind = "pareto-encounter"']),
+        ("", ["is empty; start from `infoset problems new KIND FILE`"]),
+        ("schema = 1", ["kind: is missing, must be one of pareto-encounter", 'kind = "pareto-encounter"']),
         ('kind = "multipint"', ['found "multipint"', "did you mean multipoint?"]),
         ("kind = [1]", ["found [1]"]),
         ("kind = ", ["is not valid TOML"]),

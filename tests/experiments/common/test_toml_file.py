@@ -75,7 +75,7 @@ def test_values_come_as_they_were_written() -> None:
         ('name = "B"', "", "craft #2.name: is missing; add it under [[craft]], for example name"),
         ("rate_rad_s = 1e-3", "", "orbit.rate_rad_s: is missing; add it under [orbit], for example rate_rad_s = 1e-3"),
         ("bound = 2", "rate_rad_s = 2", "craft #2.rate_rad_s: is not a key of [[craft]]; move rate_rad_s to [orbit]"),
-        ('kind = "meeting"', "", 'kind: must be "meeting", which is missing'),
+        ('kind = "meeting"', "", 'kind: is missing; write kind = "meeting" above the first table'),
         ('kind = "meeting"', 'kind = "tour"', 'kind: must be "meeting", found "tour"'),
         ('kind = "meeting"', 'kind = "meeting"\ncraft = 3', "is not valid TOML"),
     ],
