@@ -238,7 +238,7 @@ def read_manifest(folder: Path) -> Manifest:
         return _parsed(content)
     except (ValueError, RecursionError) as error:
         raise ManifestError(
-            f"{file}: is not a readable manifest: {str(error)[:300]}; restore it from a copy, or simulate in a new folder"
+            f"{file}: is not a readable manifest: {str(error)[:300]}; restore it from a copy, or use a new folder"
         ) from None
 
 
