@@ -304,8 +304,7 @@ class _Approach:
         """Last common steps that may be the best: those before a measurement, and the end."""
         measured = np.logical_or.reduce([program.is_measured for program in self._programs.values()])
         last = np.append(np.flatnonzero(measured) - 1, len(self.ranges_m) - 1).astype(np.int64)
-        thruster = self.scenario.thruster
-        steps = thruster.impulse_steps(self.scenario.nominal_arrival_s, self.scenario.set_model.step_s)
+        thruster, steps = self.scenario.thruster, self.scenario.impulse_steps
         if steps is None:
             return last
         # Between two decisions, more common measurements only bring the motions nearer to each other.
@@ -314,8 +313,7 @@ class _Approach:
 
     def correction_m(self, last_common_step: int) -> float:
         """Return the greatest change of the miss by impulses that are decided after a step, within the budget, m."""
-        thruster, step_s = self.scenario.thruster, self.scenario.set_model.step_s
-        steps = thruster.impulse_steps(self.scenario.nominal_arrival_s, step_s)
+        thruster, steps = self.scenario.thruster, self.scenario.impulse_steps
         given = np.arange(thruster.delay_steps, len(self.ranges_m)) if steps is None else np.array(steps)
         later = (given > last_common_step + thruster.delay_steps) & (given < len(self.ranges_m))
         arms_s = self.ranges_m[given[later]] / -self.vx_m_s

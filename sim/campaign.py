@@ -222,7 +222,7 @@ class Campaign:
             chunk=self.chunk or (self._default_chunk() if stored is None else stored.chunk),
             seed=self.seed,
             noise=noise,
-            strategy=getattr(self.strategy, "version", None) or strategy_name(self.scenario, self.strategy),
+            strategy=self._strategy_name,
             guarantee=self.guarantee,
             versions=dict(calculating_versions()),
             axes=self.axes,
@@ -256,6 +256,10 @@ class Campaign:
     @property
     def _noise(self) -> CampaignNoise:
         return CampaignNoise(self.scenario.noise.value) if self.noise is None else self.noise
+
+    @property
+    def _strategy_name(self) -> str:
+        return getattr(self.strategy, "version", None) or strategy_name(self.scenario, self.strategy)
 
     def _stored(self) -> Manifest | None:
         """Return the manifest in the folder, if there is one."""

@@ -41,7 +41,7 @@ def possible_miss_m(
 def _images_s(scenario: Scenario) -> list[float]:
     """Return the times before the nominal arrival of the images until the last decision of an impulse, s."""
     model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
-    steps = thruster.impulse_steps(arrival_s, model.step_s)
+    steps = scenario.impulse_steps
     end_s = arrival_s - model.least_range_m / model.closing_speed_m_s
     last_step = int(end_s / model.step_s) if steps is None else int(max(steps))
     camera = model.angle_sensor
@@ -77,7 +77,7 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     middle of both are shifted by half the difference.
     """
     model = scenario.set_model
-    if scenario.thruster.impulse_steps(scenario.nominal_arrival_s, model.step_s) is None:
+    if scenario.impulse_steps is None:
         return None
     before_s = np.array(_images_s(scenario))
     if before_s.size < 2:

@@ -119,7 +119,7 @@ class Engagements:
         self._budget = np.full(batch, float(scenario.thruster.budget_m_s))
         self._impulse = np.zeros(lateral)
         self._spent = np.zeros(batch, dtype=bool)
-        steps = scenario.thruster.impulse_steps(scenario.nominal_arrival_s, model.step_s)
+        steps = scenario.impulse_steps
         self._impulse_times_s = None if steps is None else np.array(steps) * model.step_s
         self._number_of_burn = {step: i for i, step in enumerate(steps or ()) if scenario.thruster.impulses_s}
         self._burns_m_s = np.zeros((batch, len(self._number_of_burn)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Annotated
@@ -145,7 +146,7 @@ class Scenario:
         for name, sensor in self.sensors.items():
             self.set_model.check_period(f"{name}_sensor", sensor)
         self._check_axes()
-        self.thruster.impulse_steps(self.nominal_arrival_s, self.set_model.step_s)
+        _ = self.impulse_steps  # raises ValueError if the thruster can give no impulse
         self.set_model.check_start("dispersion", self.dispersion)
         greatest = max(self.dispersion.x_m[1], self.set_model.bounds.x_m[1])
         if self.sun is not None and self.sun.distance_m <= greatest:
@@ -183,6 +184,11 @@ class Scenario:
     def nominal_arrival_s(self) -> float:
         """Time from the start to x = 0 at the nominal range and closing speed, s."""
         return self.nominal_range_m / self.set_model.closing_speed_m_s
+
+    @property
+    def impulse_steps(self) -> Sequence[int] | None:
+        """Steps in which impulses can be given (`Thruster.impulse_steps`); None is every step from the delay on."""
+        return self.thruster.impulse_steps(self.nominal_arrival_s, self.set_model.step_s)
 
     @property
     def is_spatial(self) -> bool:

@@ -1,18 +1,21 @@
-"""A Dask cluster as an executor, after checks of its address, its scheduler, its workers and their versions."""
+"""Workers of a campaign: threads, processes, or a Dask cluster whose address, workers and versions are checked."""
 
 from __future__ import annotations
 
 import contextlib
 import ipaddress
 import logging
+import os
 import re
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError, shown
+from sim.flights import worker_processes
 from sim.versions import CALCULATING, calculating_versions, differences, install_command
 
 if TYPE_CHECKING:
@@ -23,6 +26,37 @@ PATIENCE_S = 8.0
 
 RETRIES = 3
 _ADDRESS = re.compile(r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})/?")
+
+
+@dataclass(frozen=True)
+class Workers:
+    """An executor, or None for threads; its chunks at a time, or the threads; and the number of cores."""
+
+    executor: Executor | None
+    at_once: int | None
+    cores: int
+
+
+@contextlib.contextmanager
+def workers_of(options: Flight, note: Callable[[str], None]) -> Iterator[Workers]:
+    """Start the workers that the options choose; `note` prints a line."""
+    if sum(option is not None for option in (options.dask, options.workers, options.processes)) > 1:
+        raise InputError("--workers, --processes and --dask (a cluster) cannot be combined; give only one of them")
+    if options.dask is not None:
+        if is_open(options.dask):
+            note(
+                f"warning: --dask: the connection to {options.dask} is not encrypted, and everyone who reaches that "
+                "address can run programs there: use a private network, or tls:// (see the documentation, campaigns)"
+            )
+        with connected(options.dask) as cluster:
+            note(f"{cluster.workers} Dask workers, {cluster.threads} threads")
+            # With two chunks per thread all threads have work while results are sent, and workers can join later.
+            yield Workers(cluster.executor, max(2 * cluster.threads, 16), cluster.threads)
+    elif options.processes is not None:
+        with worker_processes(options.processes) as pool:
+            yield Workers(pool, 2 * options.processes, options.processes)
+    else:
+        yield Workers(None, options.workers, options.workers or os.cpu_count() or 1)
 
 
 @dataclass(frozen=True)

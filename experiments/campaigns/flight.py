@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, Executor
+from concurrent.futures import BrokenExecutor, CancelledError
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as ProgressBars
 
-from experiments.campaigns.cluster import connected, is_open
+from experiments.campaigns.cluster import workers_of
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
 from experiments.common.screen import LINE_EVERY_S, NOT_FINITE, number, say
@@ -26,7 +25,7 @@ from experiments.interception.choices import study_scenario
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from sim import Campaign, CampaignNoise, CampaignResult, Scenario
 from sim.campaign import Progress
-from sim.flights import fly_on_threads, worker_processes
+from sim.flights import fly_on_threads
 from sim.simulate import ENGAGEMENTS_AT_ONCE
 from sim.storage import MANIFEST, StorageError, need_free, read_manifest
 from sim.versions import VersionError
@@ -72,12 +71,13 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
         note(line)
     for warning in warnings[: MOST_WARNINGS if campaign.cells else None]:
         note(f"warning: {warning}")
-    with _workers(options, note) as (executor, workers, cores):
+    with workers_of(options, note) as workers, campaign_progress(campaign.kind, options.quiet) as progress:
         if campaign.engagements >= ESTIMATED_FROM:
-            note(_estimate(campaign, cores))
+            note(_estimate(campaign, workers.cores))
         began_s = time.perf_counter()
-        with campaign_progress(campaign.kind, options.quiet) as progress:
-            result = campaign.run(executor, workers=workers, resume=options.resume, progress=progress, beside=files)
+        result = campaign.run(
+            workers.executor, workers=workers.at_once, resume=options.resume, progress=progress, beside=files
+        )
     for damage in result.redone:
         note(f"{damage.file}: {damage.reason}; its runs were simulated again")
     return Flown(result, warnings, time.perf_counter() - began_s)
@@ -111,28 +111,6 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
         if not type(error).__module__.startswith(("distributed.", "dask.")):
             raise
         raise InputError(f"--dask: the cluster failed: {str(error)[:300]}{resume_hint}") from None
-
-
-@contextlib.contextmanager
-def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[tuple[Executor | None, int | None, int]]:
-    """Start threads, processes or a cluster: executor or None, its chunks at a time or threads, and cores."""
-    if sum(option is not None for option in (options.dask, options.workers, options.processes)) > 1:
-        raise InputError("--workers, --processes and --dask (a cluster) cannot be combined; give only one of them")
-    if options.processes is not None:
-        with worker_processes(options.processes) as pool:
-            yield pool, 2 * options.processes, options.processes
-    elif options.dask is not None:
-        if is_open(options.dask):
-            note(
-                f"warning: --dask: the connection to {options.dask} is not encrypted, and everyone who reaches that "
-                "address can run programs there: use a private network, or tls:// (see the documentation, campaigns)"
-            )
-        with connected(options.dask) as cluster:
-            note(f"{cluster.workers} Dask workers, {cluster.threads} threads")
-            # With two chunks per thread all threads have work while results are sent, and workers can join later.
-            yield cluster.executor, max(2 * cluster.threads, 16), cluster.threads
-    else:
-        yield None, options.workers, options.workers or os.cpu_count() or 1
 
 
 def _estimate(campaign: Campaign, cores: int) -> str:

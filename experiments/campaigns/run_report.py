@@ -10,14 +10,11 @@ from experiments.campaigns.command import Report
 from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
 from experiments.campaigns.samples import (
     Sample,
-    game_notes,
     heading,
     noises_of,
     sample_json,
+    sample_parts,
     samples,
-    samples_table,
-    stop_notes,
-    title,
     worst_runs,
 )
 from experiments.campaigns.sweep_report import SweepReport, default_requirement, figure_names, quantile_options
@@ -27,6 +24,7 @@ from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, progress_bar, say, show
 from experiments.interception.scenario_file import scenario_to_toml
+from experiments.interception.study import study_title
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
 
@@ -137,11 +135,10 @@ def _parts(
 ) -> Iterator[Part]:
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
-    table, notes = samples_table(by_noise, manifest.scenario)
-    yield title(folder)
+    yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
     yield f"{folder.finished_runs} runs{stopped}"
-    yield table
-    yield from (*notes, *game_notes(folder), *stop_notes(manifest), "")
+    yield from sample_parts(folder, by_noise)
+    yield ""
     runs = ", ".join(f"{sample.runs} runs of {sample.noise} noise" for sample in by_noise)
     yield f"correlation of the miss with the initial state ({runs}; CI by Fisher's z):"
     table = number_table("noise", "component", "Pearson", "95 % CI", "Spearman", "95 % CI", left=2)

@@ -12,9 +12,9 @@ from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_report import SweepReport, default_requirement, quantile_options
 from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
-from experiments.common.output import Output, output_of, to_json
+from experiments.common.output import output_of, to_json
 from experiments.common.screen import say, show
-from experiments.interception.choices import own_strategy
+from experiments.interception.own_strategy import own_strategy
 from sim import CampaignNoise, Sweep
 from sim.storage import need_arrow, need_free
 
@@ -60,11 +60,9 @@ def run(options: Options) -> None:
         flown = fly(swept, options, notes)
         report = SweepReport(flown.result.folder, sweep_table(flown.result.folder, required, shown), shown)
         summary = to_json(report.to_json(flown.elapsed_s))
-        folder = Output(options.out, {}, overwrite=True)
-        report.save(folder)
-        folder.save("summary.json", summary)
-        written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]
-        written.deliver("--json", summary)
+        written.enter(options.out, "shards", SCENARIO_FILE)
+        report.save(written)
+        written.save("summary.json", summary, "--json")
     show(report.parts(), options.quiet, stdout_taken=written.stdout_taken)
     if not report.is_drawn:
         say("no figure: a figure can show one or two keys only", options.quiet)

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from experiments.common.output import hit_key, library_version
-from experiments.common.screen import number, number_table, quantile_notes
+from experiments.common.screen import Part, number, number_table, quantile_notes
 from experiments.interception.runs.shared import bound_name
-from experiments.interception.study import SetCounts, game_note, hit_text, scenario_title, set_counts, set_warnings
+from experiments.interception.study import SetCounts, game_note, hit_text, set_counts, set_warnings
 from guidance import NoiseKind
 from infoset.arrays import Flags, Integers
-from sim import HitEstimate, Outcome, QuantileEstimate, Scenario, estimate_hits, estimate_quantiles
+from sim import HitEstimate, Outcome, QuantileEstimate, estimate_hits, estimate_quantiles
 from sim.statistics import level_name, shows
 from sim.stopping_rule import QUANTITIES
-from sim.storage import CampaignFolder, Manifest, scenario_hash
+from sim.storage import CampaignFolder, scenario_hash
 
 LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
 WORST = 10
@@ -156,13 +155,6 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
     }
 
 
-def title(folder: CampaignFolder) -> str:
-    """Return what the numbers of a folder rest on: scenario, model, strategy and seed, and a line with its settings."""
-    manifest = folder.manifest
-    head = f"{scenario_title(manifest.scenario)}, strategy {manifest.strategy}, seed {manifest.seed}"
-    return "\n".join(line for line in (head, manifest.scenario.description) if line)
-
-
 def game_notes(folder: CampaignFolder) -> list[str]:
     """Return a line about what results with game noise are; no line without game noise."""
     return [game_note(folder.manifest.scenario)] if NoiseKind.GAME.value in noises_of(folder) else []
@@ -222,21 +214,12 @@ def shown_value(sample: Sample, quantity: str, estimate: QuantileEstimate) -> fl
     return estimate.value if shows(sample.known[quantity], estimate.level) else None
 
 
-def stop_notes(manifest: Manifest) -> list[str]:
-    """Return a line about the confidence of the intervals of a campaign that a rule stopped; no line for others."""
-    if manifest.stopped_after is None:
-        return []
-    return [
-        "the intervals are computed with 95 % confidence for a fixed number of runs; the campaign stopped when an "
-        "interval was narrow, so their confidence is about 92 to 95 %"
-    ]
-
-
-def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table, list[str]]:
-    """Return the quantiles with their intervals, a block for each noise, and lines about hits, sets and outcomes.
+def sample_parts(folder: CampaignFolder, by_noise: Sequence[Sample]) -> Iterator[Part]:
+    """Yield the quantiles with their intervals, a block for each noise, and lines about hits, sets and outcomes.
 
     There must be at least one sample.
     """
+    scenario = folder.manifest.scenario
     phi = bound_name(scenario)
     names = {"miss_m": "miss, m", "impulse_m_s": "impulse, m/s", "guaranteed_miss_m": phi}
     table = number_table("noise", "quantity", "quantile", "value", "95 % CI", left=2)
@@ -258,4 +241,12 @@ def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table
         notes += [
             f"{sample.noise} noise: {text}" for text in (hits, f"{sample.sets}{held}; outcomes: {outcomes}") if text
         ]
-    return table, notes + set_warnings(scenario.set_model.kind, sum((sample.sets for sample in by_noise), SetCounts()))
+    yield table
+    yield from notes
+    yield from set_warnings(scenario.set_model.kind, sum((sample.sets for sample in by_noise), SetCounts()))
+    yield from game_notes(folder)
+    if folder.manifest.stopped_after is not None:
+        yield (
+            "the intervals are computed with 95 % confidence for a fixed number of runs; the campaign stopped when an "
+            "interval was narrow, so their confidence is about 92 to 95 %"
+        )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.campaigns.samples import game_notes, heading, sample_json, title
+from experiments.campaigns.samples import game_notes, heading, sample_json
 from experiments.campaigns.sweep_axes import unit_of
 from experiments.campaigns.sweep_table import (
     QUANTITY_NAMES,
@@ -25,7 +25,7 @@ from experiments.campaigns.sweep_table import (
 from experiments.common.errors import InputError, input_errors
 from experiments.common.output import Output, hit_key
 from experiments.common.screen import Part, number, number_table
-from experiments.interception.study import SetCounts, set_warnings
+from experiments.interception.study import SetCounts, set_warnings, study_title
 from guidance import NoiseKind
 from sim import QuantileName, Requirement
 from sim.requirement import CONFIDENCE, AnyRequirement, Decision, Verdict, parse_requirement
@@ -108,7 +108,7 @@ class SweepReport:
         watched = " although runs were added" if manifest.is_watched else ""
         if manifest.until:
             watched = " although runs are added until it is made"
-        yield title(folder)
+        yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
         yield f"{len(table.cells)} cells, {folder.finished_runs} runs"
         yield (
             f"the decision in each cell has a confidence of at least 95 %{watched}; "

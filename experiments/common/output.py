@@ -43,6 +43,7 @@ class Output:
         self.files = files
         self.written: list[Path] = []
         self._overwrite = overwrite
+        self._replaces = overwrite
 
     @property
     def stdout_taken(self) -> bool:
@@ -56,7 +57,7 @@ class Output:
     def save(self, name: str, content: str | bytes, option: str | None = None) -> None:
         """Write a file of the folder under its name, and the file of an option with the same content."""
         if self.folder is not None:
-            self._write(self.folder / name, content)
+            self._write(self.folder / name, content, self._replaces)
         if option is not None:
             self.deliver(option, content)
 
@@ -68,7 +69,7 @@ class Output:
         if str(file) == STDOUT:
             typer.echo(content, nl=False)
         else:
-            self._write(file, content)
+            self._write(file, content, self._overwrite)
 
     def figure(self, name: str, figure: Figure) -> None:
         """Write a figure into the folder, as PDF and PNG."""
@@ -76,7 +77,7 @@ class Output:
 
         if self.folder is not None:
             for kind, content in figure_bytes(figure):
-                self._write(self.folder / f"{name}.{kind}", content)
+                self._write(self.folder / f"{name}.{kind}", content, self._replaces)
 
     def draw(self, names: Sequence[str], figures: Iterable[Figure | None], progress: Callable[[float], None]) -> None:
         """Write figures under their names, each as soon as it is drawn; None is a figure that a result lacks."""
@@ -85,12 +86,17 @@ class Output:
                 self.figure(name, figure)
             progress(done / len(names))
 
+    def enter(self, folder: Path, *names: str) -> None:
+        """Continue in a folder into which another function has written these files; files there are replaced."""
+        self.folder, self._replaces = folder, True
+        self.written += [folder / name for name in names]
+
     def add(self, file: Path) -> None:
         """List a file that another function has written."""
         self.written.append(file)
 
-    def _write(self, file: Path, content: str | bytes) -> None:
-        write_file(file, content, overwrite=self._overwrite)
+    def _write(self, file: Path, content: str | bytes, overwrite: bool) -> None:
+        write_file(file, content, overwrite=overwrite)
         self.written.append(file)
 
 

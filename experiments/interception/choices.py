@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from experiments.common.errors import InputError, input_errors
+from experiments.common.errors import InputError
 from experiments.common.options import choice
-from experiments.interception.own_strategy import is_own_strategy, load_strategy
-from experiments.interception.scenario_file import default_initial_set, load_scenario, read_scenario, scenario_to_toml
+from experiments.interception.own_strategy import is_own_strategy, own_strategy
+from experiments.interception.scenario_file import load_scenario, with_model
 from guidance import Strategy, TieRule, strategy_names
 from guidance.registry import COMPARED
-from guidance.strategy import check_axes
 from infoset import Model
 from infoset.model import MOST_SECTIONS
 from sim import Scenario
@@ -55,16 +54,6 @@ def scenario_with(options: Any) -> Scenario:
     return replace(scenario, set_model=set_model)
 
 
-def with_model(scenario: Scenario, model: Model) -> Scenario:
-    """Return a scenario with a set model; a model other than the scenario's starts from its default initial set."""
-    set_model = scenario.set_model
-    if model is set_model.kind:
-        return scenario
-    changed = replace(scenario, set_model=replace(set_model, kind=model, initial_set=default_initial_set(model)))
-    read_scenario(scenario_to_toml(changed), f"{scenario.name} with --model {model.value}")
-    return changed
-
-
 def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario, list[str]]:
     """Return the scenario of a study, whose default model is the guaranteed one, whatever the scenario file says.
 
@@ -84,20 +73,6 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
     if resumed:
         return changed, [f"model: {default.value}, the model of the resumed folder; the scenario file has {of_file}"]
     return changed, [f"model: {default.value}, the default of studies; to use that of the file, add --model {of_file}"]
-
-
-def own_strategy(text: str | None, scenario: Scenario, option: str = "--strategy") -> Strategy | None:
-    """Return the strategy that ``--strategy FILE.py:CLASS`` names; None for a built-in name.
-
-    Raise `InputError` if the file has no such strategy, its code raises an exception, or it decides for both lateral
-    axes and the scenario is in a plane.
-    """
-    if text is None or not is_own_strategy(text):
-        return None
-    own = load_strategy(text, option)
-    with input_errors(f"{option}: {text}"):
-        check_axes(own, scenario.set_model.axes)
-    return own
 
 
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:

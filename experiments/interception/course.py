@@ -169,7 +169,7 @@ class Courses:
         self.steps = every
         if len(every) > MOST_STEPS:
             places = -np.log(len(every) - every)
-            fired = scenario.thruster.impulse_steps(scenario.nominal_arrival_s, scenario.set_model.step_s) or ()
+            fired = scenario.impulse_steps or ()
             scheduled = fired if scenario.thruster.impulses_s else ()
             half = MOST_STEPS // 2
             self.steps = np.unique([*evenly(places, half), *evenly(every, half), *scheduled]).astype(np.int64)

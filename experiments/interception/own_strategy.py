@@ -13,9 +13,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from experiments.common.errors import InputError, nearest, shown
+from experiments.common.errors import InputError, input_errors, nearest, shown
 from guidance import Situation, Strategy
-from guidance.strategy import checked_impulses
+from guidance.strategy import check_axes, checked_impulses
+from sim import Scenario
 
 METHODS = ("start", "decide")
 _hashes: dict[Path, str] = {}
@@ -25,6 +26,20 @@ _hashes: dict[Path, str] = {}
 def is_own_strategy(text: str) -> bool:
     """Whether the value of ``--strategy`` names a Python file, not a built-in strategy."""
     return ":" in text or text.endswith(".py")
+
+
+def own_strategy(text: str | None, scenario: Scenario, option: str = "--strategy") -> Strategy | None:
+    """Return the strategy that ``--strategy FILE.py:CLASS`` names; None for a built-in name.
+
+    Raise `InputError` if the file has no such strategy, its code raises an exception, or it decides for both lateral
+    axes and the scenario is in a plane.
+    """
+    if text is None or not is_own_strategy(text):
+        return None
+    own = load_strategy(text, option)
+    with input_errors(f"{option}: {text}"):
+        check_axes(own, scenario.set_model.axes)
+    return own
 
 
 def load_strategy(text: str, option: str = "--strategy") -> Strategy:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from dataclasses import replace
+from typing import TypeVar
 
 from pydantic import BaseModel
 
-from experiments.common.display_units import split_unit
 from experiments.common.errors import InputError, shown
 from experiments.common.toml_file import load_tables, read_tables
 from experiments.common.toml_form import Form, keys_of, template
@@ -77,16 +77,16 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
     lines = []
     model, thruster, target = scenario.set_model, scenario.thruster, scenario.target
     uncertainty, dispersion, speed = model.bounds, scenario.dispersion, model.closing_speed_m_s
-    axes = [*model.axes, "x"]
-    for name in [f"{axis}_km" for axis in axes] + [f"v{axis}_km_s" for axis in axes]:
-        known, true = getattr(uncertainty, si_name(name)), getattr(dispersion, si_name(name))
-        _, unit = split_unit(name)
-        for excess, side in ((known[0] - true[0], "below"), (true[1] - known[1], "above")):
-            if excess > 0:
-                lines.append(
-                    f"dispersion.{name} reaches {excess / 1000:.6g} {unit} {side} uncertainty.{name}: "
-                    "the true state may start outside the uncertainty on board, and the set may lose it"
-                )
+    for prefix, per_s, unit in (("", "", "km"), ("v", "_s", "km/s")):
+        for axis in (*model.axes, "x"):
+            name = f"{prefix}{axis}_km{per_s}"
+            known, true = (getattr(box, f"{prefix}{axis}_m{per_s}") for box in (uncertainty, dispersion))
+            for excess, side in ((known[0] - true[0], "below"), (true[1] - known[1], "above")):
+                if excess > 0:
+                    lines.append(
+                        f"dispersion.{name} reaches {excess / 1000:.6g} {unit} {side} uncertainty.{name}: "
+                        "the true state may start outside the uncertainty on board, and the set may lose it"
+                    )
     outside = max(-uncertainty.vx_m_s[1] - speed, speed + uncertainty.vx_m_s[0])
     if outside > 0:
         lines.append(
@@ -144,7 +144,7 @@ def _timing_warnings(scenario: Scenario) -> list[str]:
     """Return a line if the times before the nominal arrival leave no measured angle before the last decision."""
     model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
     sensor, delay_s = model.angle_sensor, thruster.delay_steps * model.step_s
-    steps = thruster.impulse_steps(arrival_s, model.step_s)
+    steps = scenario.impulse_steps
     last_step = int(arrival_s / model.step_s) if steps is None else steps[-1]
     decided = last_step - thruster.delay_steps
     if decided < 0:
@@ -188,6 +188,16 @@ def _along(axis: str, owner: Target | SetModel | None, name: str) -> tuple[str, 
 def default_initial_set(model: Model) -> InitialSet:
     """Return the default section at t0: the paper's rectangle in the model `paper`, else the box."""
     return {Model.PAPER: InitialSet.RECTANGLE}.get(model, InitialSet.BOX)
+
+
+def with_model(scenario: Scenario, model: Model) -> Scenario:
+    """Return a scenario with a set model; a model other than the scenario's starts from its default initial set."""
+    set_model = scenario.set_model
+    if model is set_model.kind:
+        return scenario
+    changed = replace(scenario, set_model=replace(set_model, kind=model, initial_set=default_initial_set(model)))
+    read_scenario(scenario_to_toml(changed), f"{scenario.name} with --model {model.value}")
+    return changed
 
 
 def scenario_template() -> str:
@@ -261,7 +271,11 @@ def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
 
 def _composed(tables: ScenarioTables) -> Scenario:
     chosen, step, nominal = si_values(tables.information_set), si_values(tables.guidance), si_values(tables.nominal)
-    fewest = chosen.pop("fewest_sections")
+    fewest, angle_sensor = chosen.pop("fewest_sections"), si_values(tables.angle_sensor)
+    pixel_error_rad = angle_sensor.pop("pixel_error_rad")
+    if pixel_error_rad is not None:  # a camera; otherwise the bound is linear in the range
+        angle_sensor |= dict.fromkeys(("error_at_nominal_range_rad", "error_at_zero_range_rad"), pixel_error_rad)
+        angle_sensor["centroid_error_m"] = angle_sensor["centroid_error_m"] or 0.0
     return Scenario(
         name=tables.name,
         description=tables.description,
@@ -272,7 +286,7 @@ def _composed(tables: ScenarioTables) -> Scenario:
             closing_speed_m_s=nominal["closing_speed_m_s"],
             step_s=step["step_s"],
             bounds=StateBox(**si_values(tables.uncertainty)),
-            angle_sensor=_angle_sensor(si_values(tables.angle_sensor), nominal["range_m"]),
+            angle_sensor=AngleSensor(**angle_sensor, nominal_range_m=nominal["range_m"]),
             range_threshold_m=step["range_threshold_m"],
             fewest_sections=min(DEFAULT_FEWEST_SECTIONS, chosen["sections"]) if fewest is None else fewest,
             initial_set=chosen.pop("initial_set") or default_initial_set(chosen["model"]),
@@ -287,15 +301,6 @@ def _composed(tables: ScenarioTables) -> Scenario:
         tie=tables.noise.tie,
         **{table: _fitted(kind, getattr(tables, table)) for table, kind in OPTIONAL_SENSORS.items()},
     )
-
-
-def _angle_sensor(values: dict[str, Any], nominal_range_m: float) -> AngleSensor:
-    """Return the angle sensor of a table: with the pixel error a camera, otherwise with a linear bound."""
-    pixel_error_rad = values.pop("pixel_error_rad")
-    if pixel_error_rad is not None:
-        values |= dict.fromkeys(("error_at_nominal_range_rad", "error_at_zero_range_rad"), pixel_error_rad)
-        values["centroid_error_m"] = values["centroid_error_m"] or 0.0
-    return AngleSensor(**values, nominal_range_m=nominal_range_m)
 
 
 def _fitted(owner: type[Part], table: BaseModel | None) -> Part | None:

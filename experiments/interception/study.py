@@ -65,6 +65,12 @@ def scenario_title(scenario: Scenario) -> str:
     return f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"
 
 
+def study_title(scenario: Scenario, strategy: str, seed: int) -> str:
+    """Return what the numbers of a study rest on: scenario, model, strategy and seed, and a line with its settings."""
+    head = f"{scenario_title(scenario)}, strategy {strategy}, seed {seed}"
+    return "\n".join(line for line in (head, scenario.description) if line)
+
+
 def game_note(scenario: Scenario, rule: str | None = None) -> str:
     """Return a line about what a result with game noise is; `rule` is its tie rule, None that of the scenario."""
     bound = "; no errors within the bounds give a miss above Phi" if scenario.set_model.is_guaranteed else ""

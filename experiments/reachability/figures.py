@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -110,10 +111,8 @@ def _shadows(report: Report, axes: Sequence[int], most_times: int, tolerance: fl
 
 def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
-    yield draw_space(report, first=0)
-    yield draw_space(report, first=3)
-    yield draw_planes(report)
-    yield draw_controls(report)
+    for draw in (partial(draw_space, first=0), partial(draw_space, first=3), draw_planes, draw_controls):
+        yield draw(report)
 
 
 @style()

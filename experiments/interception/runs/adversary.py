@@ -12,8 +12,9 @@ from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, say_warnings, show
-from experiments.interception.choices import own_strategy, study_scenario
+from experiments.interception.choices import study_scenario
 from experiments.interception.command import Adversary
+from experiments.interception.own_strategy import own_strategy
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import steps_csv
 from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, need_times, read_times
@@ -35,7 +36,8 @@ def run(options: Adversary) -> None:
     times_s = read_times(options.times, options.out)
     names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(*FIGURES))
     with output_of(options, names, {"--record": options.record}) as written, progress_bar(options.quiet) as begin:
-        say_warnings(scenario_warnings(scenario), options.quiet, notes)
+        warnings = scenario_warnings(scenario)
+        say_warnings(warnings, options.quiet, notes)
         began_s = perf_counter()
         worst = find_worst_misses(scenario, own, budget=options.budget, seed=options.seed, begin=begin)
         elapsed_s = perf_counter() - began_s
@@ -50,7 +52,7 @@ def run(options: Adversary) -> None:
         records = [chosen.record(own)] if any(files) else []
         if records:
             need_times(options.times, times_s, records)
-        summary = {**summary_head(scenario), **_summary(scenario, worst, chosen, options, elapsed_s)}
+        summary = {**summary_head(scenario, warnings), **_summary(scenario, worst, chosen, options, elapsed_s)}
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         for record in records:

@@ -77,7 +77,8 @@ def run(options: Bound) -> None:
     strategies = chosen_strategies(scenario, options.strategies)
     names = ("scenario.toml", "results.json", *figure_files(FIGURE))
     with output_of(options, names) as written, progress_bar(options.quiet) as begin:
-        say_warnings(scenario_warnings(scenario), options.quiet, notes)
+        warnings = scenario_warnings(scenario)
+        say_warnings(warnings, options.quiet, notes)
         began_s = perf_counter()
         try:
             lower = lower_bound(scenario, progress=begin("lower bound"))
@@ -89,7 +90,7 @@ def run(options: Bound) -> None:
             ) from None
         worst = _simulate(scenario, lower, strategies, options, begin)
         summary = {
-            **summary_head(scenario),
+            **summary_head(scenario, warnings),
             "model": scenario.set_model.kind.value,
             "elapsed_s": perf_counter() - began_s,
             **_summary(scenario, lower, nominal, worst),

@@ -46,12 +46,13 @@ def run(options: Compare) -> None:
     figures = [FIGURE, *b_plane_figures(scenario)]
     names = ("scenario.toml", "results.json", "results.csv", *figure_files(*figures))
     with output_of(options, names) as written, progress_bar(options.quiet) as begin:
-        say_warnings(scenario_warnings(scenario), options.quiet, notes)
+        warnings = scenario_warnings(scenario)
+        say_warnings(warnings, options.quiet, notes)
         began_s = perf_counter()
         reports = {name: begin(name) for name in strategies}
         compared = _simulate(scenario, strategies, options.runs, options.seed, reports)
         result = {
-            **summary_head(scenario),
+            **summary_head(scenario, warnings),
             "model": scenario.set_model.kind.value,
             "range_meter": scenario.range_sensor is not None,
             "seed": options.seed,

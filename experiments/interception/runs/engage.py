@@ -8,8 +8,9 @@ from time import perf_counter
 
 from experiments.common.output import Cell, library_version, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, show
-from experiments.interception.choices import own_strategy, scenario_with
+from experiments.interception.choices import scenario_with
 from experiments.interception.command import Engage
+from experiments.interception.own_strategy import own_strategy
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engagement_table import (
     FIGURES,
@@ -45,7 +46,8 @@ def run(options: Engage) -> None:
         output_of(options, names, {f"--record ({file.name})": file for file in record_files.values()}) as written,
         progress_bar(options.quiet) as begin,
     ):
-        say_warnings(scenario_warnings(scenario), options.quiet)
+        warnings = scenario_warnings(scenario)
+        say_warnings(warnings, options.quiet)
         records, summaries = [], {}
         for noise in noises:
             began_s = perf_counter()
@@ -55,7 +57,10 @@ def run(options: Engage) -> None:
             )
             need_finite(record.result)
             records.append(record)
-            summaries[noise.value] = {**summary_head(flown, own), **_summary(record, perf_counter() - began_s)}
+            summaries[noise.value] = {
+                **summary_head(flown, warnings, own),
+                **_summary(record, perf_counter() - began_s),
+            }
         need_times(options.times, times_s, records)
         head = {"version": library_version(), "scenario_hash": scenario_hash(scenario)}
         summary = {**head, **summaries} if both else summaries[noises[0].value]

@@ -19,10 +19,11 @@ from experiments.common.screen import (
     say_warnings,
     show,
 )
-from experiments.interception.choices import own_strategy, scenario_with
+from experiments.interception.choices import scenario_with
 from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
 from experiments.interception.curves import Curve, curve_scenarios
+from experiments.interception.own_strategy import own_strategy
 from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
 from experiments.interception.runs.shared import (
     allowance,
@@ -49,7 +50,8 @@ def run(options: Experiment) -> None:
     figures = [FIGURE, CORRIDOR, *b_plane_figures(scenario)]
     names = ("scenario.toml", "results.json", "results.csv", *figure_files(*figures))
     with output_of(options, names) as written, progress_bar(options.quiet) as begin:
-        say_warnings(scenario_warnings(scenario), options.quiet)
+        warnings = scenario_warnings(scenario)
+        say_warnings(warnings, options.quiet)
         if scenario.range_sensor is None:
             say(f"{scenario.name} has no [range_sensor]: curves 1 and 3 only", options.quiet)
         began_s = perf_counter()
@@ -66,7 +68,7 @@ def run(options: Experiment) -> None:
             for (curve, flown, _), result in zip(slowest_first, results, strict=True)
         ][::-1]
         summary = {
-            **summary_head(scenario, own),
+            **summary_head(scenario, warnings, own),
             "seed": options.seed,
             "runs": options.runs,
             "elapsed_s": elapsed_s,
@@ -164,7 +166,6 @@ def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, 
         return {}
     whole = float(results.burns_m_s.sum())
     arrival_s, step_s = scenario.nominal_arrival_s, scenario.set_model.step_s
-    steps = scenario.thruster.impulse_steps(arrival_s, step_s) or []
     return {
         "burns": [
             {
@@ -172,7 +173,7 @@ def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, 
                 **dict(zip(LEVELS, shown_quantiles(sizes, [*LEVELS.values()]), strict=True)),
                 "share": float(sizes.sum()) / whole if whole > 0.0 else None,
             }
-            for step, sizes in zip(steps, results.burns_m_s.T, strict=True)
+            for step, sizes in zip(scenario.impulse_steps or [], results.burns_m_s.T, strict=True)
         ]
     }
 

@@ -14,7 +14,7 @@ from experiments.common.errors import InputError
 from experiments.common.output import library_version
 from experiments.common.screen import NOT_FINITE, BeginProgress
 from experiments.interception.course import Courses
-from experiments.interception.scenario_file import scenario_hash, scenario_warnings
+from experiments.interception.scenario_file import scenario_hash
 from experiments.interception.study import set_counts
 from guidance import NoiseKind, Strategy
 from sim import Results, Scenario, simulate
@@ -63,9 +63,8 @@ def need_finite(results: Results) -> None:
         raise InputError(NOT_FINITE)
 
 
-def summary_head(scenario: Scenario, own: Strategy | None = None) -> dict[str, object]:
+def summary_head(scenario: Scenario, warnings: Sequence[str], own: Strategy | None = None) -> dict[str, object]:
     """Return the first keys of a summary; ``strategy`` only if it is not the scenario's."""
-    warnings = scenario_warnings(scenario)
     return {
         "version": library_version(),
         "scenario": scenario.name,

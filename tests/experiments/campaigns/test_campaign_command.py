@@ -22,9 +22,8 @@ import sim
 from experiments.campaigns.flight import duration, size
 from experiments.campaigns.samples import replay_line
 from experiments.common.errors import InputError
-from experiments.interception.choices import with_model
 from experiments.interception.own_strategy import load_strategy
-from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
+from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml, with_model
 from guidance import NoiseKind
 from infoset import Model
 from sim import Campaign, CampaignNoise, Scenario, fly_one

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.interception.choices import with_model
-from experiments.interception.scenario_file import load_scenario, scenario_to_toml
+from experiments.interception.scenario_file import load_scenario, scenario_to_toml, with_model
 from guidance import NoiseKind
 from infoset import Model
 from sim import Scenario, simulate

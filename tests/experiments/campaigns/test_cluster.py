@@ -140,7 +140,7 @@ def test_an_open_scheduler_is_warned_of(
 
     assert is_open(address) == warned
     (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
-    monkeypatch.setattr("experiments.campaigns.flight.connected", refuse)
+    monkeypatch.setattr("experiments.campaigns.cluster.connected", refuse)
     code, _, err = infoset("campaign", "brief.toml", "--runs", 8, "--out", "runs", "--dask", address)
     assert code == 2
     assert f"asked for {address}" in err

@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 
 from experiments.common.screen import number
-from experiments.interception.choices import with_model
 from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
+from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml, with_model
 from infoset import ErrorShape, Model
 from sim import Scenario
 from sim.adversary import find_worst

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from experiments.interception.choices import with_model
 from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario, scenario_to_toml
+from experiments.interception.scenario_file import load_scenario, scenario_to_toml, with_model
 from experiments.interception.terminal import frame
 from infoset import Convention, InformationSet, Model
 from sim import Scenario, fly_one, simulate

@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from experiments.interception.choices import with_model
 from experiments.interception.comparison import Comparison, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
-from experiments.interception.scenario_file import load_scenario, scenario_hash
+from experiments.interception.scenario_file import load_scenario, scenario_hash, with_model
 from guidance import NoiseKind, TieRule, strategy_names
 from guidance.registry import COMPARED
 from infoset import Model

@@ -11,8 +11,8 @@ import pytest
 
 from experiments.cli import main
 from experiments.common.errors import InputError
-from experiments.interception.choices import chosen_strategies, own_strategy
-from experiments.interception.own_strategy import load_strategy
+from experiments.interception.choices import chosen_strategies
+from experiments.interception.own_strategy import load_strategy, own_strategy
 from experiments.interception.scenario_file import load_scenario
 from guidance import SymmetricMiss
 from sim import Scenario, simulate

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from experiments.common.errors import InputError
 from experiments.interception import scenario_file
-from experiments.interception.choices import with_model
 from experiments.interception.scenario_file import (
     default_initial_set,
     load_scenario,
@@ -23,6 +22,7 @@ from experiments.interception.scenario_file import (
     scenario_template,
     scenario_to_toml,
     scenario_warnings,
+    with_model,
 )
 from guidance import strategy_names
 from guidance.noise import NoiseKind, TieRule

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from experiments import load_scenario
-from experiments.interception.choices import with_model
-from experiments.interception.scenario_file import scenario_to_toml
+from experiments.interception.scenario_file import scenario_to_toml, with_model
 from experiments.interception.study import SetCounts, hit_text, percent, set_counts, set_warnings
 from infoset import Model
 from sim import Body, Scenario, estimate_hits, quantiles, simulate
