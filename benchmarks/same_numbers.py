@@ -21,7 +21,9 @@ COMMANDS = (
     "experiment asteroid-1997 --model guaranteed",
     "experiment asteroid-1997-single --model guaranteed",
     "experiment comet-fast --model guaranteed",
+    "experiment asteroid-1997-space --runs 5",
     "engage asteroid-1997-single --noise both",
+    "engage dart-2022",
     "compare asteroid-1997 --runs 20 --model guaranteed",
     "bound asteroid-1997 --model paper",
     "adversary --strategy symmetric-miss --budget 200 --model paper",
@@ -38,6 +40,7 @@ COMMANDS = (
     "pursuit geo-pursuit --certify --feedback coast",
     "pursuit leo-pursuit",
     "pursuit-map geo-pursuit --x phase_deg=-60:60:5 --y thrust_ratio=0:0.9:3",
+    "observe observer-2005 --smooth",
     "reproduce",
 )
 IGNORED = ("elapsed_s", "version", "versions", "made_by", "python", "duration_s")

@@ -95,9 +95,8 @@ def draw_sets(report: Report) -> Figure:
     panel.add_collection(fill)
     if outlines:
         panel.update_datalim(np.vstack(outlines))
-        for first in (0, len(outlines) - 1):
-            at = outlines[first].mean(axis=0)
-            panel.annotate(f"step {shown[first].step}", at, fontsize=7.0, ha="center", va="center")
+        title = f"possible states, from step {shown[0].step} (light) to step {shown[-1].step} (dark)"
+        panel.set_title(title, loc="left")
     if report.data.states is not None:
         states = report.data.states
         panel.plot(
@@ -106,5 +105,4 @@ def draw_sets(report: Report) -> Figure:
         panel.legend(loc="best")
     panel.autoscale_view()
     panel.set(xlabel=plain(report.problem.names[0]), ylabel=plain(report.problem.names[1]))
-    panel.set_title("possible states, light (first step) to dark (last step)", loc="left")
     return figure

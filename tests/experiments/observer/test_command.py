@@ -13,7 +13,7 @@ import pytest
 from experiments.common.file_kinds import built_in_files
 from experiments.observer.command import Errors
 from experiments.observer.data import data_of, simulate
-from experiments.observer.figures import draw_bounds
+from experiments.observer.figures import draw_bounds, draw_sets
 from experiments.observer.file import load_observer
 from experiments.observer.report import Report
 from tests.experiments.command_line import Command, strict
@@ -83,6 +83,12 @@ def test_all_files_are_written(infoset: Command) -> None:
     again = infoset.json("observe", "o/problem.toml", "--smooth")
     assert again["steps"] == results["steps"]
     assert again["problem_hash"] == results["problem_hash"]
+
+
+def test_no_label_covers_the_sets() -> None:
+    (panel,) = draw_sets(observed("vehicle")).axes
+    assert panel.get_title(loc="left") == "possible states, from step 0 (light) to step 39 (dark)"
+    assert not panel.texts
 
 
 def test_a_csv_file_gives_the_same_as_the_problem_file(infoset: Command) -> None:
