@@ -12,9 +12,9 @@ from experiments.common.options import AsJson, Overwrite, Quiet
 
 MODULE = "experiments.files"
 
-BuiltInName = Annotated[str, typer.Argument(help="A built-in name.")]
-FileName = Annotated[str, typer.Argument(help="A file, or a built-in name.")]
-NewFile = Annotated[Path, typer.Argument(help="The file to write; - is stdout.")]
+BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
+FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
+NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
 
 
 def _commands(noun: str, built_in: str, text: str, example: str) -> typer.Typer:

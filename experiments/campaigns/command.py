@@ -99,7 +99,7 @@ class Campaign(Flight):
     A shard is written as soon as its runs are complete. After any interruption, the same command with --resume
     continues the campaign; with a greater --runs it extends the campaign. The numbers depend only on the scenario, the
     seed and the run, not on workers, shards or interruptions. Run K with a noise is the same engagement as in:
-    infoset engage DIR/scenario.toml --noise NOISE --run K. To see the results: infoset report DIR.
+    infoset engage DIR/scenario.toml --noise NOISE --seed SEED --run K. To see the results: infoset report DIR.
     """
 
     until: Annotated[

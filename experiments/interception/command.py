@@ -52,11 +52,15 @@ StudyModel = Annotated[
     ),
 ]
 TieName = Annotated[
-    Literal["upper", "lower", "alternate", "random"] | None, typer.Option("--tie", help="How game noise breaks ties.")
+    Literal["upper", "lower", "alternate", "random"] | None,
+    typer.Option("--tie", help="How game noise breaks ties. Default: that of the scenario."),
 ]
 RangeMeter = Annotated[
     bool | None,
-    typer.Option("--range-meter/--no-range-meter", help="Simulate with or without the scenario's range meter."),
+    typer.Option(
+        "--range-meter/--no-range-meter",
+        help="Simulate with or without the scenario's range meter. Default: with it, if there is one.",
+    ),
 ]
 SetTimes = Annotated[
     str | None,
@@ -210,7 +214,10 @@ class Replay:
         Path | None, typer.Option(metavar="FILE.mp4", help="Write the animation as a video; needs the program ffmpeg.")
     ] = None
     frames: Annotated[
-        int, typer.Option(metavar="N", min=2, max=1000, help="Most frames of an animation; fewer make a smaller file.")
+        int,
+        typer.Option(
+            metavar="N", min=2, max=1000, help="Greatest number of frames of an animation; fewer make a smaller file."
+        ),
     ] = 40
     width: Annotated[
         int | None,

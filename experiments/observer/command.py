@@ -39,8 +39,8 @@ class Observe(FileOptions):
         typer.Option(
             "--data",
             metavar="FILE.csv",
-            help="Measurements: a row a step, columns y1, y2, .. and u1, u2, ..; an empty cell of y is a missing "
-            "measurement. The u of a row acts after its measurement.",
+            help="Measurements: one row for each step, columns y1, y2, .. and u1, u2, ..; an empty cell of y is a "
+            "missing measurement. The u of a row acts after its measurement.",
         ),
     ] = None
     errors: Annotated[
