@@ -13,8 +13,11 @@ MOMENTS = 301
 _DEGREES = ("deg", 180.0 / np.pi)
 
 
-def pursuit_page(name: str, description: str, solution: Solution) -> str:
-    """Return the page of a game as HTML; raise `ValueError` if the solution has neither a capture nor a fallback."""
+def pursuit_page(name: str, description: str, solution: Solution, claim: str = "") -> str:
+    """Return the page of a game as HTML, with what its certificate claims.
+
+    Raise `ValueError` if the solution has neither a capture nor a fallback.
+    """
     sampled = history(solution, MOMENTS)
     pursuer, evader = sampled.pursuer, sampled.evader
     players = (("pursuer", 0, pursuer), ("evader", 1, evader))
@@ -47,7 +50,7 @@ def pursuit_page(name: str, description: str, solution: Solution) -> str:
         Graph("Thrust out of the orbital plane", "out of plane", _DEGREES, out_of_plane),
         Graph("Mass", "mass", ("kg", 1.0), masses),
     ]
-    about = [line for line in (description, _verdict(solution)) if line]
+    about = [line for line in (description, _verdict(solution), claim) if line]
     return motion_page(f"Pursuit {name}", about, sampled.time_s, views, graphs)
 
 

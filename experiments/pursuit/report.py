@@ -231,12 +231,12 @@ def _capture_parts(capture: Capture, solution: Solution) -> Iterator[Part]:
     for axis, components in zip("xyz", zip(*vectors, strict=True), strict=True):
         table.add_row(axis, *(f"{value:.{digits}f}" for value, digits in zip(components, (6, 9, 9, 9), strict=True)))
     yield table
-    least, greatest = capture.curvature
+    curvatures = " and ".join(f"{value:.5f}" if value >= 1e-3 else f"{value:.3g}" for value in capture.curvature)
     spent = f"pursuer {capture.pursuer.propellant_kg:.8f}, evader {capture.evader.propellant_kg:.8f}"
     yield f"propellant spent, kg: {spent}"
     yield f"closing speed {capture.closing_speed_m_s / M_PER_KM:.10f} km/s"
     yield (
-        f"curvatures of the distance over the direction: {least:.5f} and {greatest:.5f} times "
+        f"curvatures of the distance over the direction: {curvatures} times "
         f"{solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)"
     )
     yield f"method: {_METHODS[solution.route]}"
@@ -284,15 +284,21 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
             f"directions: {certificate.directions_found} of {certificate.directions_tried} compared; {largest}, "
             f"tolerance {certificate.excess_tolerance_m:.2g} m"
         )
+    yield saddle_point(certificate)
+
+
+def saddle_point(certificate: Certificate | None) -> str:
+    """Return what a certificate says of the saddle point; nothing without a certificate."""
+    if certificate is None:
+        return ""
     if certificate.failures:
-        yield f"saddle point: not claimed: {'; '.join(certificate.failures)}"
-    elif certificate.undecided:
-        why = "no farthest extremal was found for one craft or both"
-        if not certificate.directions_tried:
-            why = "add --certify"
-        yield f"saddle point: no check failed; {'; '.join(certificate.undecided)} ({why})"
-    else:
-        yield "saddle point: all checks hold"
+        return f"saddle point: not claimed: {'; '.join(certificate.failures)}"
+    if certificate.undecided:
+        why = (
+            "no farthest extremal was found for one craft or both" if certificate.directions_tried else "add --certify"
+        )
+        return f"saddle point: no check failed; {'; '.join(certificate.undecided)} ({why})"
+    return "saddle point: all checks hold"
 
 
 def _feedback_lines(feedback: Feedback) -> Iterator[str]:

@@ -12,7 +12,7 @@ from experiments.pursuit.command import Pursuit
 from experiments.pursuit.evader import EvaderPolicy, evader_policy
 from experiments.pursuit.file import PursuitProblem, load_pursuit
 from experiments.pursuit.page import pursuit_page
-from experiments.pursuit.report import Feedback, Report, report_json, report_parts, trajectories
+from experiments.pursuit.report import Feedback, Report, report_json, report_parts, saddle_point, trajectories
 from rendezvous.pursuit_evasion import Observation, PathError, Solution, certify, fly_many, solve
 
 FIGURES = ("figure-orbits", "figure-relative", "figure-control", "figure-distance", "figure-feedback")
@@ -41,7 +41,8 @@ def run(options: Pursuit) -> None:
                 )
             written.save("results.json", to_json(report_json(report)), "--json")
             if options.html is not None:
-                written.deliver("--html", pursuit_page(problem.name, problem.tables.description, solution))
+                claim = saddle_point(report.certificate)
+                written.deliver("--html", pursuit_page(problem.name, problem.tables.description, solution, claim))
             if written.wants("--csv") and has_trajectory:
                 written.save(TRAJECTORIES, trajectories(solution), "--csv")
             if options.out is not None:

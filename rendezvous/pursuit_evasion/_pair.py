@@ -329,8 +329,11 @@ class Pair:
                 return None
         return _Linear(p, e, plane, time_free, at_distance, at_time[:, 3])
 
-    def begin(self, latest: float) -> Node | None:
-        """Return the extremal of a short duration, at most `latest`, from the line of sight as a guess, or None."""
+    def begin(self, latest: float, radius: float) -> Node | None:
+        """Return the extremal of a short duration, at most `latest`, from the line of sight as a guess, or None.
+
+        Its distance is greater than the capture radius: there is no earlier capture.
+        """
         duration = min(_FIRST_DURATION, 0.5 * latest)
         while duration > _LEAST_OF_FIRST:
             still = np.zeros(3)
@@ -339,7 +342,8 @@ class Pair:
             nu = sight / distance
             guess = np.concatenate([self.pursuer.ballistic(duration, nu), self.evader.ballistic(duration, nu), nu])
             node = self.solve(guess, duration, distance, time_free=False, tolerance=COARSE, close=ROUGH)
-            if node is not None and node.is_saddle and float(np.abs(node.vector - guess).max()) < _NEAR:
+            close = node is not None and float(np.abs(node.vector - guess).max()) < _NEAR
+            if node is not None and close and node.is_saddle and node.distance > radius:
                 return node
             duration *= 0.25
         return None

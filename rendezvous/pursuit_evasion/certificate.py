@@ -208,7 +208,7 @@ def _followed(
 ) -> tuple[float | None, bool, float]:
     """Return the earliest capture or None, whether the branch reached its end, and the remaining work."""
     pair = Pair(pursuer, evader)
-    first = pair.begin(latest)
+    first = pair.begin(latest, radius)
     if first is None:
         return None, False, left
     branch = follow(pair, first, radius, latest, left)

@@ -223,7 +223,7 @@ class _Pursuit:
                 return node
         if float(np.linalg.norm(evader.start[:3] - self._pursuer.start[:3])) <= self._radius:
             return kept
-        first = pair.begin(latest)
+        first = pair.begin(latest, self._radius)
         branch = None if first is None else follow(pair, first, self._radius, latest, self._work)
         self._work -= 0.0 if branch is None else branch.work
         afresh = branch.last if branch is not None and branch.ending is Ending.CAPTURE else None

@@ -41,7 +41,7 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     """
     scaled = scaled_game(game)
     units, pair, radius, latest = scaled.units, scaled.pair, scaled.radius, scaled.latest
-    first = pair.begin(latest)
+    first = pair.begin(latest, radius)
     if first is None:
         empty = DistanceCurve(np.zeros(0), np.zeros(0), np.zeros(0))
         return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, Route.CONTINUATION, empty, 0.0)
@@ -146,7 +146,7 @@ def solve_by_homotopy(game: Game) -> Capture | None:
     """
     units = units_of(game)
     still = scaled_game(_with_thrust(game, 0.0), units)
-    first = still.pair.begin(still.latest)
+    first = still.pair.begin(still.latest, still.radius)
     if first is None:
         return None
     branch = follow(still.pair, first, still.radius, still.latest, 0.25 * MOST_WORK)

@@ -81,10 +81,19 @@ def test_a_greater_radius_is_reached_earlier_by_the_closing_speed(slides: MakeGa
     assert (near.time_s - point.time_s) / 10.0 == pytest.approx(-1.0 / point.closing_speed_m_s, rel=1e-5)
 
 
+def test_a_capture_within_seconds_is_found(slides: MakeGame) -> None:
+    game = slides()
+    x, y, z = game.pursuer.position_m
+    evader = replace(game.pursuer, position_m=(x, y, z + 0.1), thrust_n=10.0)
+    near = captured(solve(replace(game, evader=evader)))
+    # (a_P - a_E) t^2 / 2 = 0.1 m, with 20 N and 10 N on 2000 kg.
+    assert near.time_s == pytest.approx(math.sqrt(0.2 / 0.005), rel=1e-4)
+
+
 def test_a_coasting_evader_is_captured_the_first_time_it_can_be(slides: MakeGame) -> None:
     game = slides(0.0)
     capture, units, pair = captured(solve(game)), units_of(game), scaled_game(game).pair
-    first = pair.begin(10.0)
+    first = pair.begin(10.0, 0.0)
     assert first is not None
     # There is another extremal at 138928 s; before and after the first capture l changes its sign.
     branch = follow(pair, first, -math.inf, capture.time_s / units.time_s * 1.02)
