@@ -86,7 +86,7 @@ def frame_of(points: Floats, flat: float = FLAT) -> Frame:
     # With fewer points than coordinates all right singular vectors are needed, and the left ones are few.
     directions = np.linalg.svd(centred, full_matrices=len(points) < points.shape[1])[2]
     extents = np.abs(centred @ directions.T).max(axis=0)
-    least = max(flat * float(extents.max()), ROUNDING * float(np.abs(points).max(initial=0.0)))
+    least = max(flat * float(extents.max(initial=0.0)), ROUNDING * float(np.abs(points).max(initial=0.0)))
     wide = extents > least
     return Frame(centre, directions[wide].T, extents[wide], directions[~wide].T)
 
@@ -122,13 +122,14 @@ def relative_interior(
     *,
     bounded: bool = False,
     member: Floats | None = None,
+    rounding: float = 0.0,
 ) -> RelativeInterior:
     """Return the affine hull of {x: normals x <= offsets, across x = levels}, of shapes (m, n), (m,), (e, n) and (e,).
 
     A set that is known to be `bounded` saves a linear program. `member`, shape (n,), is a point that is known to be in
-    the set: the rows are relaxed by its rounding. If the radius of a largest ball is zero, some half-spaces imply
-    equations; linear programs (HiGHS) find the rows that are always tight. A set is flat in a direction in which it is
-    thinner than 1e-9 of its width.
+    the set: the rows are relaxed by its rounding. `rounding` is an error of all offsets. If the radius of a largest
+    ball is zero, some half-spaces imply equations; linear programs (HiGHS) find the rows that are always tight. A set
+    is flat in a direction in which it is thinner than 1e-9 of its width.
 
     Raises
     ------
@@ -137,16 +138,17 @@ def relative_interior(
     """
     lengths = np.linalg.norm(normals, axis=1)
     long = lengths > ROUNDING * float(lengths.max(initial=0.0))
-    size = float(np.abs(offsets).max(initial=0.0))
     if member is not None:
-        size = max(size, float(np.abs(member).max(initial=0.0)))
         offsets = np.maximum(offsets, normals @ member)
     # A row whose length is rounding has no direction.
-    void = np.flatnonzero(~long & (offsets < -ROUNDING * size))
+    void = np.flatnonzero(~long & (offsets < -ROUNDING * float(np.abs(offsets).max(initial=0.0))))
     if len(void):
         raise EmptyPolytopeError(float(-offsets[void].min()))
     used = np.flatnonzero(long)
     normals, offsets = normals[used] / lengths[used, None], offsets[used] / lengths[used]
+    size = max(
+        float(np.abs(offsets).max(initial=0.0)), 0.0 if member is None else float(np.abs(member).max(initial=0.0))
+    )
     for _ in range(len(normals) + 1):
         point, basis = solutions(across, levels)
         slack = FLAT * max(1.0, float(np.abs(point).max(initial=0.0)))
@@ -163,7 +165,7 @@ def relative_interior(
             _need_bounded(rows, limits, slack, basis)
         centre, radius = chebyshev_ball(rows, limits)
         width = max(float(np.abs(limits - rows @ centre).max()), float(np.abs(centre).max()))
-        flat = max(FLAT * width, ROUNDING * size, 1e-300)
+        flat = max(FLAT * width, ROUNDING * size, rounding, 1e-300)
         if radius < -flat:
             raise EmptyPolytopeError(-radius)
         tight = np.zeros(0, dtype=np.int64) if radius > flat else _always_tight(rows, limits, flat)

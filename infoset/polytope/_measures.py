@@ -1,6 +1,6 @@
 """Volume, division into simplices and largest ball of polytopes, and the shortest difference between two hulls.
 
-`stretch`, shape (n,), are scales of the axes of a set with an interior, None if they do not differ much.
+`axes` are coordinates in which the set is about one wide, None if its own do not differ much.
 """
 
 from __future__ import annotations
@@ -10,24 +10,25 @@ from scipy.spatial import ConvexHull, Delaunay
 
 from infoset.arrays import Floats
 from infoset.polytope._affine_hull import chebyshev_ball, frame_of
+from infoset.polytope._scaling import LocalAxes
 
 _MOST_STEPS = 1000
 _PRECISION = 1e-14
 
 
-def volume_of(vertices: Floats, stretch: Floats | None) -> float:
+def volume_of(vertices: Floats, axes: LocalAxes | None) -> float:
     """Return the volume within the affine hull of vertices, shape (v, n); 1 for a point."""
-    frame = frame_of(vertices if stretch is None else vertices / stretch)
-    scale = float(np.prod(frame.extents)) * (1.0 if stretch is None else float(np.prod(stretch)))
+    frame = frame_of(vertices if axes is None else axes.inward(vertices))
+    scale = float(np.prod(frame.extents)) if axes is None else axes.volume(frame.basis * frame.extents)
     if frame.dimension < 2:
         return scale * 2.0 if frame.dimension else 1.0
-    inner = frame.inward(vertices if stretch is None else vertices / stretch)
+    inner = frame.inward(vertices if axes is None else axes.inward(vertices))
     return float(ConvexHull(inner).volume) * scale
 
 
-def simplices_of(vertices: Floats, stretch: Floats | None) -> tuple[Floats, Floats]:
+def simplices_of(vertices: Floats, axes: LocalAxes | None) -> tuple[Floats, Floats]:
     """Return simplices that divide the hull, shape (k, d + 1, n), and their shares of the volume, shape (k,)."""
-    scaled = vertices if stretch is None else vertices / stretch
+    scaled = vertices if axes is None else axes.inward(vertices)
     frame = frame_of(scaled)
     if len(vertices) == frame.dimension + 1:
         return vertices[None], np.ones(1)
@@ -37,18 +38,18 @@ def simplices_of(vertices: Floats, stretch: Floats | None) -> tuple[Floats, Floa
     return vertices[corners], sizes / sizes.sum()
 
 
-def largest_ball(vertices: Floats, normals: Floats, offsets: Floats, stretch: Floats | None) -> tuple[Floats, float]:
+def largest_ball(vertices: Floats, normals: Floats, offsets: Floats, axes: LocalAxes | None) -> tuple[Floats, float]:
     """Return the centre, shape (n,), and the radius of a largest ball within the affine hull."""
-    if stretch is not None:  # in units of the axes, and of the shortest axis for the radius
-        least = float(stretch.min())
-        middle, rows = vertices.mean(axis=0), normals * stretch
-        sizes = np.abs(rows).max(axis=1)
-        limits = (offsets - normals @ middle) / sizes
-        inner, radius = chebyshev_ball(rows / sizes[:, None], limits, least / sizes)
-        return middle + stretch * inner, least * max(0.0, radius)
-    frame = frame_of(vertices)
+    frame = frame_of(vertices if axes is None else axes.inward(vertices))
     if not frame.dimension:
-        return frame.centre, 0.0
+        return vertices[0], 0.0
+    if axes is not None:  # in coordinates of the frame; the unit of the radius is the least distance of a facet
+        steps = axes.spread((frame.basis * frame.extents).T)
+        middle, rows = vertices.mean(axis=0), normals @ steps.T
+        sizes = np.abs(rows).max(axis=1)
+        least = float(sizes.min())
+        inner, radius = chebyshev_ball(rows / sizes[:, None], (offsets - normals @ middle) / sizes, least / sizes)
+        return middle + inner @ steps, least * max(0.0, radius)
     scale = float(frame.extents.max())
     rows = normals @ frame.basis
     sizes = np.linalg.norm(rows, axis=1)

@@ -45,13 +45,19 @@ def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
 
 
 def intersection_of_halfspaces(
-    normals: Floats, offsets: Floats, across: Floats, levels: Floats, *, bounded: bool = False
+    normals: Floats,
+    offsets: Floats,
+    across: Floats,
+    levels: Floats,
+    *,
+    bounded: bool = False,
+    rounding: float = 0.0,
 ) -> Description:
-    """Return both representations of {x: normals x <= offsets, across x = levels}.
+    """Return both representations of {x: normals x <= offsets, across x = levels}; `rounding` is that of the offsets.
 
     The errors of `relative_interior` are raised if the set is empty, is unbounded, or depends on rounding.
     """
-    inside = relative_interior(normals, offsets, across, levels, bounded=bounded)
+    inside = relative_interior(normals, offsets, across, levels, bounded=bounded, rounding=rounding)
     if not inside.dimension:
         return _single(inside.point)
     corners, sides, ends = _corners(inside.rows, inside.limits, inside.centre)
@@ -143,7 +149,7 @@ def _met(points: Floats, rows: Floats, limits: Floats) -> Floats:
             continue
         on = (np.abs(limits - points[members] @ rows.T) <= _ON_PLANE).any(axis=0)
         common = np.linalg.lstsq(rows[on], limits[on], rcond=_LEAST_RANK)[0]
-        if np.abs(rows[on] @ common - limits[on]).max() <= _ON_PLANE:
+        if on.any() and np.abs(rows[on] @ common - limits[on]).max() <= _ON_PLANE:
             joined[members] = common
     return joined
 

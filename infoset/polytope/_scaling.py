@@ -1,13 +1,15 @@
-"""Scales of coordinates whose sizes differ much."""
+"""Coordinates in which a set is about one wide along each axis, for sets in mixed units or far from the origin."""
 
 from __future__ import annotations
 
 import contextlib
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import qr, solve_triangular
 from scipy.optimize import linprog
 
-from infoset.arrays import Floats
+from infoset.arrays import Flags, Floats, Integers
 from infoset.polytope._affine_hull import (
     FLAT,
     HIGHS,
@@ -15,35 +17,155 @@ from infoset.polytope._affine_hull import (
     EmptyPolytopeError,
     UnboundedPolytopeError,
     UncertainHullError,
+    chebyshev_ball,
+    null_space_basis,
 )
-from infoset.polytope._qhull import Description, intersection_of_halfspaces
+from infoset.polytope._qhull import Description, hull_of_points, intersection_of_halfspaces
 
-MOST_RATIO = 1e6
-"""Greatest ratio of widths along the axes without scaling."""
+MOST_RATIO = 100.0
+"""Greatest ratio of widths along the axes, and of coordinates to widths, for which no local axes are needed."""
 _LEAST = 3e-12
 """A width along an axis that is less than this part of the width along another one may be rounding: the set is flat,
 unless it is known to be solid."""
+_MOST_PASSES = 5
 
 
-def scale_of(points: Floats, *, solid: bool = False) -> Floats | None:
-    """Return a power of two near the width along each axis, shape (n,); None if the widths do not differ much.
+@dataclass(frozen=True, eq=False)
+class LocalAxes:
+    """Coordinates u = (x - middle) / scale along the axes that are `wide`; along the other axes x is `middle`.
 
-    A set that is known to be `solid` has an interior: no width is rounding.
+    All three arrays have the shape (n,). The scales are powers of two.
     """
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    return scale_of_box(lower, upper, upper - lower if solid else None)
+
+    middle: Floats
+    scale: Floats
+    wide: Flags
+
+    @classmethod
+    def of_box(cls, lower: Floats, upper: Floats, solid: Floats | None = None) -> LocalAxes:
+        """Return axes for a set with these bounds, in sets that have an interior and the widths `solid`, if known."""
+        widths, sizes = np.abs(upper - lower), np.maximum(np.abs(lower), np.abs(upper))
+        least = _LEAST * (widths.max() if solid is None else solid)
+        wide = (widths > 10.0 * ROUNDING * sizes) & (widths > least)
+        return cls(0.5 * lower + 0.5 * upper, powers_of_two(np.where(wide, widths, 1.0)), wide)
+
+    @classmethod
+    def needed(
+        cls, lower: Floats, upper: Floats, solid: Floats | None = None, around: Floats | None = None
+    ) -> LocalAxes | None:
+        """Return axes as `of_box`, or None if the coordinates of the set itself have similar sizes.
+
+        `around` are widths of larger sets whose half-spaces bound this one.
+        """
+        axes = cls.of_box(lower, upper, solid)
+        sizes = np.maximum(np.abs(lower), np.abs(upper))
+        widths = np.where(axes.wide, axes.scale, 0.0 if around is None else around)
+        widths = widths[widths > 0.0] if widths.any() else sizes[sizes > 0.0]
+        if not len(widths) or max(widths.max(), sizes.max()) < MOST_RATIO * widths.min():
+            return None
+        return axes
+
+    @property
+    def rounding(self) -> float:
+        """Rounding of coordinates of the set, relative to its widths."""
+        return ROUNDING * float((np.abs(self.middle) / self.scale)[self.wide].max(initial=1.0))
+
+    def inward(self, points: Floats) -> Floats:
+        """Return points, shape (k, n), in these coordinates, shape (k, d)."""
+        return np.asarray(((points - self.middle) / self.scale)[:, self.wide])
+
+    def outward(self, points: Floats) -> Floats:
+        """Return points in these coordinates, shape (k, d), in R^n."""
+        return self.middle + self.spread(points)
+
+    def spread(self, vectors: Floats) -> Floats:
+        """Return differences of points in these coordinates, shape (k, d), in R^n."""
+        result = np.zeros((len(vectors), len(self.middle)))
+        result[:, self.wide] = vectors * self.scale[self.wide]
+        return result
+
+    def volume(self, steps: Floats) -> float:
+        """Return the volume of the parallelepiped of columns in these coordinates, shape (d, k), in R^n."""
+        return float(np.prod(np.abs(np.diag(_triangle(self.spread(steps.T).T)[0])))) if steps.size else 1.0
+
+    def hull(self, points: Floats, flat: float) -> Description:
+        """Return both representations of the convex hull of points in R^n."""
+        return self.described(*hull_of_points(self.inward(points), max(flat, self.rounding))[:4])
+
+    def intersection(
+        self, normals: Floats, offsets: Floats, across: Floats, levels: Floats, widths: Floats
+    ) -> Description:
+        """Return both representations of {x: normals x <= offsets, across x = levels}, a bounded set.
+
+        `widths`, shape (n,), are those of a larger set: along an axis that is not wide, 1e-9 of them is no distance.
+        """
+        sides = []
+        for rows, ends, equal in ((normals, offsets, False), (across, levels, True)):
+            inner, rest = rows[:, self.wide] * self.scale[self.wide], ends - rows @ self.middle
+            units, terms = np.linalg.norm(inner, axis=1), np.abs(rows) @ np.abs(self.middle) + np.abs(ends)
+            kept = units > ROUNDING * terms
+            slack = ROUNDING * terms + FLAT * np.abs(rows) @ np.where(self.wide, 0.0, widths)
+            if ((np.abs(rest) > slack) if equal else rest < -slack)[~kept].any():
+                raise EmptyPolytopeError(self._relaxation(normals, offsets, across, levels))
+            sides += [inner[kept] / units[kept, None], rest[kept] / units[kept]]
+        half = np.ones(int(self.wide.sum()))
+        if not len(half):
+            return self.described(half[None], np.zeros((0, 0)), half, np.zeros((0, 0)))
+        try:
+            near = without_far(sides[0], sides[1], -half, half)
+            return self.described(
+                *intersection_of_halfspaces(*near, *sides[2:], bounded=True, rounding=self.rounding)[:4]
+            )
+        except EmptyPolytopeError:
+            raise EmptyPolytopeError(self._relaxation(normals, offsets, across, levels)) from None
+
+    def _relaxation(self, normals: Floats, offsets: Floats, across: Floats, levels: Floats) -> float:
+        """Return the least relaxation of constraints that no point satisfies, their normals of unit length in R^n."""
+        rows, limits = np.vstack([normals, across, -across]), np.concatenate([offsets, levels, -levels])
+        limits, units = limits - rows @ self.middle, np.linalg.norm(rows * self.scale, axis=1)
+        used = units > 0.0
+        sizes = np.linalg.norm(rows[used], axis=1) / units[used]
+        least = float(1.0 / sizes.max())
+        inner = rows[used] * self.scale / units[used, None]
+        with contextlib.suppress(UncertainHullError):
+            return max(0.0, -least * chebyshev_ball(inner, limits[used] / units[used], sizes * least)[1])
+        return 0.0
+
+    def described(self, points: Floats, normals: Floats, _offsets: Floats, across: Floats) -> Description:
+        """Return the set in R^n of vertices, facets and an affine hull in these coordinates."""
+        basis = null_space_basis(across)
+        steps, wanted, facets = self.spread(basis.T).T, normals @ basis, np.zeros((len(normals), len(self.middle)))
+        for _ in range(2):  # the second pass corrects rounding
+            columns, rows = _orthonormal(steps, wanted - facets @ steps)
+            facets = facets + rows @ columns.T
+        facets /= np.linalg.norm(facets, axis=1)[:, None]
+        equations = np.zeros((len(across), len(self.middle)))
+        equations[:, self.wide] = across / self.scale[self.wide]
+        equations = np.vstack([_orthonormal(equations.T, across)[0].T, np.eye(len(self.middle))[~self.wide]])
+        vertices = self.outward(points)
+        # Offsets follow from the vertices, so that both agree.
+        levels = equations @ self.outward(points.mean(axis=0)[None])[0]
+        return vertices, facets, (vertices @ facets.T).max(axis=0), equations, levels
 
 
-def scale_of_box(lower: Floats, upper: Floats, solid: Floats | None = None) -> Floats | None:
-    """Return scales as `scale_of` for a set with these bounds, in sets that have an interior and the widths `solid`."""
-    return _scales(upper - lower, np.maximum(np.abs(lower), np.abs(upper)), solid)
+def _triangle(columns: Floats) -> tuple[Floats, Integers]:
+    """Return the triangle and the order of columns of a QR factorization; the sizes of the rows may differ much."""
+    order = np.argsort(-np.abs(columns).max(axis=1))
+    triangle, pivots = qr(columns[order], mode="r", pivoting=True)
+    return triangle[: columns.shape[1]], pivots
 
 
-def _scales(widths: Floats, sizes: Floats, solid: Floats | None) -> Floats | None:
-    wide = (widths > FLAT * sizes) & (widths > _LEAST * (widths.max() if solid is None else solid))
-    if wide.sum() < 2 or widths[wide].max() < MOST_RATIO * widths[wide].min():
-        return None
-    return powers_of_two(np.where(wide, widths, np.where(sizes > 0.0, sizes, 1.0)))
+def _orthonormal(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
+    """Return an orthonormal basis of the span of columns, shape (n, d), and linear functions for its coefficients.
+
+    `rows`, shape (k, d), are such functions for the coefficients of the columns. Each row of the basis is exact to
+    rounding of itself: the sizes of the rows may differ much.
+    """
+    if columns.shape[1]:
+        for _ in range(2):  # the second pass corrects angles
+            triangle, pivots = _triangle(columns)
+            columns, rows = (solve_triangular(triangle.T, part[:, pivots].T, lower=True).T for part in (columns, rows))
+    return columns, rows
 
 
 def powers_of_two(sizes: Floats) -> Floats:
@@ -51,54 +173,53 @@ def powers_of_two(sizes: Floats) -> Floats:
     return np.asarray(np.exp2(np.rint(np.log2(sizes))))
 
 
-def scale_of_constraints(
-    normals: Floats, offsets: Floats, across: Floats, levels: Floats
-) -> tuple[Floats, Floats, Floats] | None:
-    """Return scales as `scale_of` for {x: normals x <= offsets, across x = levels}, and the bounds of x that give them.
+def bounds_of_constraints(
+    normals: Floats, offsets: Floats, across: Floats, levels: Floats, guess: Floats | None = None
+) -> Floats | None:
+    """Return bounds of {x: normals x <= offsets, across x = levels}, and scales to which they are exact, shape (3, n).
 
-    None without linear programs if neither the offsets of the rows, of unit length, nor the columns differ much.
+    None if they are not found.
+
+    Linear programs (HiGHS), repeated in the coordinates of the bounds until these are about one wide. `guess` are
+    perhaps inexact bounds.
     """
-    rows = np.vstack([normals, across])
-    columns = np.ones(1)
-    if rows.any(axis=0).all():
-        columns = np.exp(np.mean(np.log(np.where(rows != 0.0, np.abs(rows), 1.0)), axis=0, where=rows != 0.0))
-    bounds = _bounds_of_axes(normals, offsets)
-    box = None
-    if np.isfinite(bounds).all() and (bounds[0] < bounds[1]).all():
-        lower, upper = tightened(normals, offsets, *bounds)
-        box = scale_of_box(lower, upper, upper - lower)
-    columns = columns if box is None else 1.0 / box
-    lengths = np.linalg.norm(normals, axis=1)
-    sizes = np.abs(offsets[(lengths > 0.0) & (offsets != 0.0)] / lengths[(lengths > 0.0) & (offsets != 0.0)])
-    if columns.max() < 1e3 * columns.min() and (not len(sizes) or sizes.max() < MOST_RATIO * sizes.min()):
-        return None
-    if box is None and columns.size > 1:
-        # The sizes of coordinates at which a row is tight.
-        tight = (normals != 0.0) & (offsets != 0.0)[:, None]
-        sizes = (
-            np.log(np.where(tight, np.abs(normals), 1.0))
-            - np.log(np.where(offsets != 0.0, np.abs(offsets), 1.0))[:, None]
-        )
-        columns = np.where(
-            tight.any(axis=0), np.exp(sizes.sum(axis=0, where=tight) / np.maximum(tight.sum(axis=0), 1)), columns
-        )
-    rows = normals / columns
-    lengths = np.linalg.norm(rows, axis=1)
-    rows, limits = rows[lengths > 0.0] / lengths[lengths > 0.0, None], offsets[lengths > 0.0] / lengths[lengths > 0.0]
-    equal = (across / columns, levels) if len(across) else (None, None)
-    ends = np.zeros((2, normals.shape[1]))
-    for axis in range(normals.shape[1]):
-        for side, sign in enumerate((1.0, -1.0)):
-            cost = sign * np.eye(normals.shape[1])[axis]
-            optimum = linprog(cost, rows, limits, *equal, bounds=(None, None), method="highs", options=HIGHS)
+    rows, space = np.vstack([normals, across]), normals.shape[1]
+    ends = np.abs(np.concatenate([offsets, levels]))[:, None]
+    # The sizes of coordinates at which a row is tight, or of one unit if no row is tight away from zero.
+    tight = (rows != 0.0) & (ends != 0.0)
+    logarithms = np.log(np.where(tight, ends, 1.0)) - np.log(np.where(rows != 0.0, np.abs(rows), 1.0))
+    tight = np.where(tight.any(axis=0), tight, rows != 0.0)
+    scale = np.exp((logarithms * tight).sum(axis=0) / np.maximum(tight.sum(axis=0), 1))
+    middle, bounds = np.zeros(space), _bounds_of_axes(normals, offsets) if guess is None else guess
+    if np.isfinite(bounds).all() and (bounds[0] <= bounds[1]).all():
+        bounds = np.array(tightened(normals, offsets, *bounds)) if guess is None else bounds
+        axes = LocalAxes.of_box(bounds[0], bounds[1], np.zeros(space))
+        middle, scale = np.where(axes.wide, axes.middle, middle), np.where(axes.wide, axes.scale, scale)
+    known: Floats | None = None
+    for _ in range(_MOST_PASSES):
+        parts = []
+        for part, limits in ((normals, offsets), (across, levels)):
+            units = np.linalg.norm(part * scale, axis=1)
+            units = np.where(units > 0.0, units, 1.0)
+            parts += [part * scale / units[:, None], (limits - part @ middle) / units]
+        equal = parts[2:] if len(across) else (None, None)
+        inner = np.zeros((2, space))
+        for side, axis in np.ndindex(2, space):
+            cost = np.zeros(space)
+            cost[axis] = 1.0 - 2.0 * side
+            optimum = linprog(cost, *parts[:2], *equal, bounds=(None, None), method="highs", options=HIGHS)
             if optimum.status != 0:
-                return None
-            ends[side, axis] = sign * optimum.fun
+                return known if known is None else np.vstack([known, scale])
+            inner[side, axis] = cost[axis] * optimum.fun
+        known, width = middle + scale * inner, inner[1] - inner[0]
+        rounding = 10.0 * ROUNDING * np.abs(known).max(axis=0)
+        width = np.where(scale * width > rounding, width, 0.0)
+        if ((width > 1e-2) | (rounding >= 1e-6 * scale)).all():
+            break
+        middle = known.mean(axis=0)
+        scale = scale * np.maximum(width, 1e-6)
     # Widths that may be rounding of the linear programs count as zero.
-    widths = np.where(ends[1] - ends[0] > 1e-8 * np.abs(ends).max(), ends[1] - ends[0], 0.0)
-    scale = _scales(widths / columns, np.abs(ends).max(axis=0) / columns, widths / columns)
-    lower, upper = ends / columns
-    return np.ones_like(lower) if scale is None else scale, lower, upper
+    return known if known is None else np.vstack([np.where(width > 1e-7, known, known.mean(axis=0)), scale])
 
 
 def _bounds_of_axes(rows: Floats, limits: Floats) -> Floats:
@@ -119,13 +240,6 @@ def tightened(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tup
     return np.where(rows < 0.0, ends, -np.inf).max(axis=0, initial=-np.inf).clip(lower), most.clip(max=upper)
 
 
-def scaled_rows(rows: Floats, limits: Floats, scale: Floats) -> tuple[Floats, Floats]:
-    """Return half-spaces of x / scale with normals of unit length, except those whose normal is rounding."""
-    lengths = np.linalg.norm(rows, axis=1)
-    units = np.where(lengths > ROUNDING * lengths.max(initial=0.0), np.linalg.norm(rows * scale, axis=1), 1.0)
-    return rows * scale / units[:, None], limits / units
-
-
 def without_far(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
     """Return half-spaces without those 1e3 times farther away than a box that contains the set; a larger box if any.
 
@@ -142,37 +256,34 @@ def without_far(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> t
     return np.vstack([rows[near], unit, -unit]), np.concatenate([limits[near], middle + half, half - middle])
 
 
-def stretched(description: Description, scale: Floats) -> Description:
-    """Return the set whose coordinates are those of a description times a scale."""
-    vertices, normals, offsets, across, levels = description
-    rows = normals / scale
-    if len(across):
-        q, r = np.linalg.qr((across / scale).T)
-        across, levels = q.T, np.linalg.solve(r.T, levels)
-        offsets = offsets - rows @ across.T @ levels
-        rows = rows - rows @ across.T @ across
-    lengths = np.linalg.norm(rows, axis=1)
-    return vertices * scale, rows / lengths[:, None], offsets / lengths, across, levels
+def described(
+    rows: Floats, limits: Floats, across: Floats, levels: Floats, *, bounded: bool, box: Floats | None = None
+) -> Description:
+    """Return both representations as `intersection_of_halfspaces`, by `LocalAxes` if coordinates differ much.
 
-
-def described(rows: Floats, limits: Floats, across: Floats, levels: Floats, *, bounded: bool) -> Description:
-    """Return both representations as `intersection_of_halfspaces`, in scaled coordinates if their sizes differ much."""
+    `box`, shape (3, n), are bounds of the set, for which local axes are not needed, and widths of larger sets.
+    """
     result: Description | None = None
     failure: ValueError | ArithmeticError | None = None
+    axes, bounds = None, box
     try:
         result = intersection_of_halfspaces(rows, limits, across, levels, bounded=bounded)
-        if not len(result[3]):
-            return result
+        lower, upper = result[0].min(axis=0), result[0].max(axis=0)
+        bounds = np.array([lower, upper, upper - lower if box is None else box[2]])
+        axes = LocalAxes.needed(lower, upper, upper - lower)
+        flat = len(result[3]) and (axes is not None or len(result[0]) == 1 or _mixed(rows, limits, across))
     except (EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError) as error:
-        failure = error
-    known = scale_of_constraints(rows, limits, across, levels)
-    if known is not None:
-        scale, lower, upper = known
-        with contextlib.suppress(EmptyPolytopeError, UncertainHullError):
-            near, ends = without_far(*scaled_rows(rows, limits, scale), lower / scale, upper / scale)
-            return stretched(intersection_of_halfspaces(near, ends, across * scale, levels, bounded=True), scale)
-        # The bounds exist, so the set is not emptier than their rounding.
-        if isinstance(failure, EmptyPolytopeError) and failure.relaxation > 1e-6 * np.abs(known[1:]).max():
+        failure, flat = error, True
+    if flat and box is None:  # a flat set, or none at all, can be a mistake of coordinates that differ much
+        better = bounds_of_constraints(rows, limits, across, levels, None if bounds is None else bounds[:2])
+        bounds = bounds if better is None else better
+    if flat and bounds is not None and not (box is not None and isinstance(failure, EmptyPolytopeError)):
+        find = LocalAxes.of_box if result is None else LocalAxes.needed
+        axes = find(bounds[0], bounds[1], bounds[1] - bounds[0])
+    if axes is not None and bounds is not None:
+        with contextlib.suppress(UncertainHullError):
+            return axes.intersection(rows, limits, across, levels, bounds[2])
+        if isinstance(failure, EmptyPolytopeError):
             failure = UncertainHullError(
                 "the half-spaces have common points, but their sizes differ too much for a hull: scale the coordinates"
             )
@@ -180,3 +291,14 @@ def described(rows: Floats, limits: Floats, across: Floats, levels: Floats, *, b
         assert failure is not None
         raise failure
     return result
+
+
+def _mixed(rows: Floats, limits: Floats, across: Floats) -> bool:
+    """Return whether the sizes of offsets or of columns differ much."""
+    lengths = np.linalg.norm(rows, axis=1)
+    sizes = np.abs(limits[(lengths > 0.0) & (limits != 0.0)] / lengths[(lengths > 0.0) & (limits != 0.0)])
+    table = np.vstack([rows, across])
+    columns = np.ones(1)
+    if table.any(axis=0).all():
+        columns = np.exp(np.mean(np.log(np.where(table != 0.0, np.abs(table), 1.0)), axis=0, where=table != 0.0))
+    return bool(columns.max() >= 1e3 * columns.min() or (len(sizes) and sizes.max() >= MOST_RATIO * sizes.min()))

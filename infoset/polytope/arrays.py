@@ -14,7 +14,7 @@ from infoset.arrays import Floats
 from infoset.limits import COUNT
 from infoset.polytope._affine_hull import FLAT, EmptyPolytopeError
 from infoset.polytope._qhull import hull_of_points, together
-from infoset.polytope._scaling import MOST_RATIO, described, powers_of_two, scale_of, stretched
+from infoset.polytope._scaling import LocalAxes, described
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -57,10 +57,9 @@ class PolytopeArrays:
     @classmethod
     def _hull(cls, points: Floats, flat: float = FLAT, *, solid: bool = False) -> Self:
         """Return the convex hull of points, which is `solid` if it surely has an interior."""
-        scale = scale_of(points, solid=solid)
-        if scale is None:
-            return cls(*hull_of_points(points, flat))
-        return cls(*stretched(hull_of_points(points / scale, flat), scale))
+        lower, upper = points.min(axis=0), points.max(axis=0)
+        axes = LocalAxes.needed(lower, upper, upper - lower if solid else None)
+        return cls(*(hull_of_points(points, flat) if axes is None else axes.hull(points, flat)))
 
     @classmethod
     def from_constraints(
@@ -142,12 +141,10 @@ class PolytopeArrays:
         middle = finite_values("centre", centre, "n")
         rows = finite_values("generators", generators, "g", len(middle))
         widths = np.abs(rows).sum(axis=0)
-        known = widths[widths > 0.0]
-        if len(known) and known.max() > MOST_RATIO * known.min():
-            scale = powers_of_two(np.where(widths > 0.0, widths, 1.0))
-            thin = cls.from_zonotope(0.0 * middle, rows / scale)._stretched(scale)
-            offsets, levels = thin.offsets + thin.normals @ middle, thin.levels + thin.across @ middle
-            return cls(thin.vertices + middle, thin.normals, offsets, thin.across, levels)
+        axes = LocalAxes.needed(middle - widths, middle + widths, widths)
+        if axes is not None and axes.wide.any():
+            inner = cls.from_zonotope(np.zeros(int(axes.wide.sum())), (rows / axes.scale)[:, axes.wide])
+            return cls(*axes.described(inner.vertices, inner.normals, inner.offsets, inner.across))
         zonotope = cls.from_vertices(middle[None, :])
         for row in rows:
             zonotope = cls.from_vertices(np.vstack([zonotope.vertices - row, zonotope.vertices + row]))
@@ -166,11 +163,6 @@ class PolytopeArrays:
         from infoset.polygon_arrays import PolygonArrays
 
         return PolygonArrays.from_points(self._of_plane().vertices).to_shapely()
-
-    def _stretched(self, scale: Floats) -> Self:
-        """Return the set whose coordinates are those of this one times a scale, shape (n,)."""
-        parts = self.vertices, self.normals, self.offsets, self.across, self.levels
-        return self.empty(self.space) if self.is_empty else type(self)(*stretched(parts, scale))
 
     @property
     def space(self) -> int:

@@ -21,8 +21,9 @@ from infoset._set_arguments import (
 )
 from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, real_values
+from infoset.polytope._affine_hull import EmptyPolytopeError
 from infoset.polytope._measures import largest_ball, nearest_difference, simplices_of, volume_of
-from infoset.polytope._scaling import scale_of, scale_of_box, scaled_rows, tightened, without_far
+from infoset.polytope._scaling import LocalAxes, described, tightened, without_far
 from infoset.polytope.arrays import PolytopeArrays
 from infoset.renamed import renamed
 
@@ -37,8 +38,8 @@ class Polytope(PolytopeArrays):
     points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
     rows of `across` are orthonormal. Construct it with `from_vertices`, `from_constraints`, `from_box`, `from_ball` or
     `from_zonotope`. A set that is 1e9 times thinner than it is long counts as flat. The units of the axes do not
-    matter for sets with an interior, except that points whose width along one axis is 3e-12 times that along another
-    one, or less, count as flat.
+    matter, except that points whose width along one axis is 3e-12 times that along another one, or less, count as flat.
+    Rounding of the coordinates limits sets far from the origin: a thickness below 1e-13 of a coordinate counts as flat.
 
     An empty set has no vertices; `relaxation` is then the least relaxation of all constraints, their normals of unit
     length, with which a point satisfies them, if it is known. Operations on it give the empty set; points such as its
@@ -109,6 +110,8 @@ class Polytope(PolytopeArrays):
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
 
+        If the difference is flat, rounding decides whether it is empty.
+
         Raises
         ------
         ValueError
@@ -122,12 +125,12 @@ class Polytope(PolytopeArrays):
         rows, limits = self.constraints()
         limits = limits - other.support_function(rows)
         most, least = np.split(limits[len(self.normals) :], 2)
-        size = max(float(np.abs(one.vertices).max()) for one in (self, other))
-        if (most + least < -_FLAT_WIDTH * size).any():
+        sizes = np.maximum(np.abs(self.vertices).max(axis=0), np.abs(other.vertices).max(axis=0))
+        if (most + least < -_FLAT_WIDTH * np.abs(self.across) @ sizes).any():
             return self.empty(self.space, -0.5 * float((most + least).min()))
-        return self.from_constraints(
-            self.normals, limits[: len(self.normals)], self.across, 0.5 * (most - least), bounded=True
-        )
+        (lower, upper), (start, end) = self.bounding_box(), other.bounding_box()
+        sides = self.normals, limits[: len(self.normals)], self.across, 0.5 * (most - least)
+        return self._in_box(sides, lower - start, upper - end, upper - lower, solid=self.dimension == self.space)
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes, from the facets of all."""
@@ -136,23 +139,29 @@ class Polytope(PolytopeArrays):
             if one.is_empty:
                 return one
         boxes = np.array([one.bounding_box() for one in sets])
-        solid = np.min(boxes[:, 1] - boxes[:, 0], axis=0) if all(one.dimension == one.space for one in sets) else None
+        widths = np.min(boxes[:, 1] - boxes[:, 0], axis=0)
         names = ("normals", "offsets", "across", "levels")
         sides = tuple(np.concatenate([getattr(one, name) for one in sets]) for name in names)
-        return self._in_box(sides, boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0), solid)
+        solid = all(one.dimension == one.space for one in sets)
+        return self._in_box(sides, boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0), widths, solid=solid)
 
     @classmethod
-    def _in_box(cls, sides: tuple[Floats, ...], lower: Floats, upper: Floats, solid: Floats | None) -> Polytope:
+    def _in_box(
+        cls, sides: tuple[Floats, ...], lower: Floats, upper: Floats, widths: Floats, *, solid: bool
+    ) -> Polytope:
         """Return {x: rows x <= limits, across x = levels}, which is known to lie between `lower` and `upper`.
 
-        `solid` are widths of sets with an interior that contain it, None if one of these is flat.
+        `widths` are those of sets that contain it; `solid` is whether these have an interior.
         """
         rows, limits, across, levels = sides
-        scale = None if (lower > upper).any() else scale_of_box(lower, upper, solid)
-        if scale is None:
-            return cls.from_constraints(*without_far(rows, limits, lower, upper), across, levels, bounded=True)
-        rows, limits = without_far(*scaled_rows(rows, limits, scale), lower / scale, upper / scale)
-        return cls.from_constraints(rows, limits, across * scale, levels, bounded=True)._stretched(scale)
+        axes = LocalAxes.needed(lower, upper, widths if solid else None, widths)
+        try:
+            if axes is not None:
+                return cls(*axes.intersection(rows, limits, across, levels, widths))
+            near, box = without_far(rows, limits, lower, upper), np.array([lower, upper, widths])
+            return cls(*described(*near, across, levels, bounded=True, box=box))
+        except EmptyPolytopeError as error:
+            return cls.empty(len(lower), error.relaxation)
 
     def convex_hull(self, *others: Polytope) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
@@ -193,9 +202,9 @@ class Polytope(PolytopeArrays):
             return self.empty(self.space, 0.5 * float(np.max(least - most)))
         lower, upper = self.bounding_box()
         sides = np.vstack([self.normals, rows[cuts]]), np.concatenate([self.offsets, limits[cuts]])
-        solid = upper - lower if self.dimension == self.space else None
         ends = tightened(rows[cuts], limits[cuts], lower, upper)
-        return self._in_box((*sides, self.across, self.levels), *ends, solid)
+        solid = self.dimension == self.space
+        return self._in_box((*sides, self.across, self.levels), *ends, upper - lower, solid=solid)
 
     def project(self, axes: ArrayLike) -> Polytope:
         """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
@@ -209,16 +218,7 @@ class Polytope(PolytopeArrays):
         numbers = axis_numbers(axes, self.space, self.space - 1)
         fixed = finite_values("values", values, *[len(numbers)] * min(np.ndim(values), 1))
         rest = np.delete(np.arange(self.space), numbers)
-        if self.is_empty:
-            return self.empty(len(rest), self.relaxation)
-        point = np.broadcast_to(fixed, len(numbers))
-        return self.from_constraints(
-            self.normals[:, rest],
-            self.offsets - self.normals[:, numbers] @ point,
-            self.across[:, rest],
-            self.levels - self.across[:, numbers] @ point,
-            bounded=True,
-        )
+        return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(rest)
 
     def reduce_outward(self, cap: int) -> Polytope:
         """Return a polytope with at most `cap` (>= 2n) facets that contains the set.
@@ -279,9 +279,10 @@ class Polytope(PolytopeArrays):
         return beyond, away
 
     @cached_property
-    def _stretch(self) -> Floats | None:
-        """Scales of the axes of a set with an interior if they differ much, shape (n,)."""
-        return scale_of(self.vertices, solid=True) if self.dimension == self.space else None
+    def _axes(self) -> LocalAxes | None:
+        """Coordinates in which the set is about one wide, if its own differ much."""
+        lower, upper = self.bounding_box()
+        return LocalAxes.needed(lower, upper, upper - lower if self.dimension == self.space else None)
 
     def excess(self, points: ArrayLike) -> Floats:
         """Return the greatest distance of `points`, shape (..., n), beyond a facet or from the affine hull.
@@ -326,7 +327,7 @@ class Polytope(PolytopeArrays):
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
-        return 0.0 if self.is_empty else volume_of(self.vertices, self._stretch)
+        return 0.0 if self.is_empty else volume_of(self.vertices, self._axes)
 
     def area(self) -> float:
         """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
@@ -334,13 +335,13 @@ class Polytope(PolytopeArrays):
 
     def centroid(self) -> Floats:
         """Return the centroid within the affine hull, shape (n,), from a division into simplices."""
-        simplices, shares = simplices_of(self.needed().vertices, self._stretch)
+        simplices, shares = simplices_of(self.needed().vertices, self._axes)
         return np.asarray(shares @ simplices.mean(axis=1))
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
         """Return points distributed uniformly over the set, shape (count, n), from a division into simplices."""
         random = random_source(count, seed)
-        simplices, shares = simplices_of(self.needed().vertices, self._stretch)
+        simplices, shares = simplices_of(self.needed().vertices, self._axes)
         weights = random.dirichlet(np.ones(simplices.shape[1]), count)
         return np.asarray(np.einsum("ij,ijk->ik", weights, simplices[random.choice(len(shares), count, p=shares)]))
 
@@ -349,7 +350,7 @@ class Polytope(PolytopeArrays):
 
         A linear program (HiGHS) in coordinates about the centre of the vertices.
         """
-        return largest_ball(self.needed().vertices, self.normals, self.offsets, self._stretch)
+        return largest_ball(self.needed().vertices, self.normals, self.offsets, self._axes)
 
     def diameter(self) -> float:
         """Return the greatest distance between two vertices; 0 for the empty set. O(v^2 n)."""

@@ -13,7 +13,6 @@ from infoset.polytope import (
     EmptyPolytopeError,
     Polytope,
     UnboundedPolytopeError,
-    UncertainHullError,
     _qhull,
     product,
     relative_interior,
@@ -342,11 +341,78 @@ def test_units_of_the_axes_do_not_matter(units: list[float], seed: int) -> None:
         assert got.volume() / scale.prod() == pytest.approx(wanted.volume(), rel=1e-9)
 
 
-def test_a_set_whose_sizes_differ_too_much_is_not_called_empty() -> None:
+def test_units_that_differ_by_1e30() -> None:
+    """Formerly an error: the sizes differed too much for a hull."""
     units, row = np.array([1e15, 1.0, 1e-15]), np.array([0.5, -0.7, -0.2])
-    box = Polytope.from_box(np.zeros(3), units)
-    with pytest.raises(UncertainHullError, match="their sizes differ too much for a hull: scale the coordinates"):
-        box.cut(row / units, upper=-0.2)
+    plain = Polytope.from_box(np.zeros(3), np.ones(3)).cut(row, upper=-0.2)
+    cut = Polytope.from_box(np.zeros(3), units).cut(row / units, upper=-0.2)
+    assert len(cut.vertices) == len(plain.vertices)
+    assert np.sort(cut.vertices / units, axis=0) == pytest.approx(np.sort(plain.vertices, axis=0), abs=1e-12)
+
+
+FLAT_SETS = {
+    "triangle": [[0.0, 0.0, 0.0], [4.0, 0.0, 8.0], [0.0, 4.0, -4.0]],
+    "parallel to axes": [[0.0, 3.0, 0.0], [4.0, 3.0, 8.0], [0.0, 3.0, -4.0], [8.0, 3.0, 0.0]],
+    "segment": [[-4.0, 8.0, 2.0], [4.0, 0.0, -6.0]],
+    "point": [[1.0, 2.0, 3.0]],
+    "solid": [[0.0, 0.0, 0.0], [8.0, 0.0, 4.0], [0.0, 8.0, 0.0], [4.0, 0.0, -8.0], [3.0, 5.0, 7.0]],
+}
+
+
+@pytest.mark.parametrize("name", FLAT_SETS)
+def test_flat_sets_in_mixed_units_and_far_from_the_origin(name: str) -> None:
+    """Formerly most operations on flat sets whose units differ by 1e8 lost vertices, or gave points or no set."""
+    points, scale, far = np.array(FLAT_SETS[name]), np.array([2.0**13, 1.0, 2.0**-13]), 1e6
+    origin = far * np.array([1.0, -2.0, 1.0])
+    # The same set at the origin with equal units is the reference.
+    plain, other = Polytope.from_vertices(points), Polytope.from_vertices((points + origin) * scale)
+    centre = points.mean(axis=0).round(2)
+    cube, box = (Polytope.from_box(-size, size) for size in (np.full(3, 2.0), 2.0 * scale))
+    around = (centre + origin) * scale
+    normal, matrix = np.array([1.0, 2.0, -1.0]), np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
+    unscaled = scale[:, None] * matrix / scale
+    level, far_level = float(normal @ centre), float(normal @ (centre + origin))
+    pairs = [
+        (plain, other),
+        (plain, Polytope.from_constraints(*other.constraints())),
+        (plain, Polytope.from_constraints(other.normals, other.offsets, other.across, other.levels)),
+        (plain, other & other),
+        (plain & cube.translate(centre), other & box.translate(around)),
+        (plain + cube, other + box),
+        (plain, (other + box).minkowski_difference(box)),
+        (plain.cut(normal, upper=level), other.cut(normal / scale, upper=far_level)),
+        (plain.cut(normal, level, level), other.cut(normal / scale, far_level, far_level)),
+        (plain, other.affine_map(unscaled).preimage(unscaled)),
+    ]
+    for wanted, got in pairs:
+        assert got.dimension == wanted.dimension
+        vertices = (got.vertices / scale - origin)[:, None]
+        apart = np.abs(vertices - wanted.vertices).max(axis=2)
+        # A cut at a vertex may leave two vertices near each other.
+        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-9 + 1e-13 * far
+        assert got.contains(got.vertices).all()
+        assert not got.contains((2.0 * points.max(axis=0) + 1.0 + origin) * scale)
+    for axes in ([0], [1, 2]):
+        rest = np.delete(np.arange(3), axes)
+        section = other.slice(axes, around[axes])
+        assert section.dimension == plain.slice(axes, centre[axes]).dimension
+        ends = (np.array(section.bounding_box()) / scale[rest] - origin[rest]) if not section.is_empty else 0.0
+        wanted_ends = np.array(plain.slice(axes, centre[axes]).bounding_box()) if not section.is_empty else 0.0
+        assert ends == pytest.approx(wanted_ends, abs=1e-9 + 1e-13 * far)
+    edges = np.array(other.vertices[1 : plain.dimension + 1] - other.vertices[0])
+    if len(plain.vertices) == plain.dimension + 1:  # a simplex
+        volume = np.sqrt(max(np.linalg.det(edges @ edges.T), 0.0)) / [1.0, 1.0, 2.0, 6.0][plain.dimension]
+        assert other.volume() == pytest.approx(volume, rel=1e-7)
+    middle, radius = other.chebyshev_centre()
+    assert other.contains(middle, 1e-9 * float(scale.max()))
+    assert (radius > 0.0) == (plain.dimension > 0)
+    assert float((other.offsets - other.normals @ middle).min(initial=np.inf)) >= radius * (1.0 - 1e-6) - 1e-9 * far
+
+
+def test_a_row_of_another_length_does_not_hide_a_thin_set() -> None:
+    """Formerly a point: the rounding of the offsets was not divided by the lengths of the rows."""
+    rows = [[-1.0, 0.0], [8388609.0, -8388608.0], [-8388599.0, 8388608.0], [25165827.0, -25165824.0]]
+    assert len(Polytope.from_constraints(rows, [0.0, 32.0, 48.0, 251658399.0]).vertices) == 3
 
 
 def test_equations_in_mixed_units() -> None:
