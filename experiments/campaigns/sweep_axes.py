@@ -171,7 +171,7 @@ def _unknown(key: str, known: Mapping[str, bool]) -> str:
     table = key.partition(".")[0]
     is_missing = table not in {other.partition(".")[0] for other in known}
     if is_missing and table in ("sun", *OPTIONAL_SENSORS, "target", "body"):
-        return f"the scenario has no [{table}]; add that table to its file, or vary another key"
+        return f"the scenario has no [{table}]; add that table to its file or with --set, or vary another key"
     if f"{key}.least" in known:
         return f"{key} is a pair; vary {key}.least or {key}.greatest"
     if "uncertainty.y_km.least" not in known and tuple(key.split(".")[:2]) in SPACE_KEYS:

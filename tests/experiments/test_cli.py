@@ -60,7 +60,7 @@ def test_help_has_an_example(command: list[str], infoset: Command) -> None:
 
 @pytest.mark.parametrize(
     ("command", "arguments"),
-    [("scenarios show", "{name}"), ("scenarios new", "{file}"), ("problems new", "{KIND} {FILE}")],
+    [("scenarios show", "{NAME}"), ("scenarios new", "{FILE}"), ("problems new", "{KIND} {FILE}")],
 )
 def test_help_names_the_arguments(command: str, arguments: str, infoset: Command) -> None:
     code, out, _ = infoset(*command.split(), "--help")

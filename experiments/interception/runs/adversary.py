@@ -100,9 +100,9 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
         ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
         (f"initial {position}, km", lambda found: _texts(found.position_m / M_PER_KM)),
         (f"initial {velocity}, km/s", lambda found: _texts(found.velocity_m_s / M_PER_KM)),
-        ("errors of the first candidate", lambda found: found.construction),
-        ("rounds of changes to it", lambda found: str(found.changes)),
-        ("after half the budget, m", lambda found: number(_halfway_m(found))),
+        ("errors at the start of the search", lambda found: found.construction),
+        ("rounds of improvement", lambda found: str(found.changes)),
+        ("greatest miss after half the budget, m", lambda found: number(_halfway_m(found))),
     ]
 
 

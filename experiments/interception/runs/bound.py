@@ -251,9 +251,7 @@ def _parts(
     searched_by = f"`infoset adversary` with --model {model} --budget {options.budget} --seed {options.seed}"
     found = f"greatest misses found by {searched_by}" if options.budget else "not searched"
     yield f"set never empty, also empty: {found}"
-    yield (
-        "miss / bound: greatest miss of pairs and search together, each with the set never empty, divided by the bound"
-    )
+    yield "miss / bound: greatest miss of pairs and search, without sets that became empty, divided by the bound"
     yield "guaranteed: greatest bound Phi on the miss, computed during these engagements"
     if any(strategy.results.set_emptied.any() for strategy in worst):
         hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"

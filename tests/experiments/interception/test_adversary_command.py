@@ -97,7 +97,7 @@ def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path)
         "greatest miss found, m",
         "set never empty, set also empty",
         "initial z, x, km",
-        "rounds of changes",
+        "rounds of improvement",
         "engagements, ",
     )
     for part in (*lines, "greater misses may exist"):

@@ -93,7 +93,7 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
     assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
     for title in ("pairs", "set never", "also", "closing speed", "equal measurements until", "guaranteed"):
         assert title in out
-    assert "miss / bound: greatest miss of pairs and search together, each with the set never empty" in out
+    assert "miss / bound: greatest miss of pairs and search, without sets that became empty" in out
     assert re.search(r"^guaranteed: ", out, re.MULTILINE)
 
 
