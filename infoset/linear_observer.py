@@ -99,11 +99,9 @@ class Estimate:
         Raises
         ------
         ValueError
-            If the matrix does not have the shape (m, n).
+            If the matrix does not have the shape (m, n), m at least 1, or is not finite.
         """
-        rows = real_values("matrix", matrix)
-        if rows.ndim != 2 or rows.shape[1] != self.states:
-            raise ValueError(f"matrix must have the shape (m, {self.states}): got {rows.shape}")
+        rows = finite_values("matrix", matrix, "m", self.states)
         ends = [np.array([self.sets.support(sign * row) for row in rows]).T for sign in (-1.0, 1.0)]
         lower, upper = (np.where(np.isinf(end), np.nan, end) for end in ends)
         return self._runs(0.0 - lower), self._runs(upper)
@@ -191,7 +189,9 @@ class LinearObserver:
         self.inputs = self._b.shape[-1]
         self._offset = np.zeros(self.states) if offset is None else finite_values("offset", offset, "...")
         if self._offset.ndim not in (1, 2) or self._offset.shape[-1] != self.states:
-            raise ValueError(f"offset must have the shape ({self.states},) or (K, {self.states})")
+            raise ValueError(
+                f"offset must have the shape ({self.states},) or (K, {self.states}): got {self._offset.shape}"
+            )
         if runs is not None:
             COUNT.need("runs", runs)
         self._single = runs is None
@@ -215,7 +215,8 @@ class LinearObserver:
         if space != self.states:
             raise ValueError(f"{name} must have {self.states} coordinates, one for each state: got {space}")
         if isinstance(value, ConvexPolygons) and value.shape not in ((), shape):
-            raise ValueError(f"{name} must be a single polygon, or a batch of shape (runs,): got {value.shape}")
+            batch = f" or a batch of shape {shape}" if shape else ""
+            raise ValueError(f"{name} must be a single polygon{batch}: got a batch of shape {value.shape}")
         if not isinstance(value, Zonotope) and np.any(value.is_empty):
             raise ValueError(f"{name} must not be empty")
 
@@ -293,7 +294,7 @@ class LinearObserver:
             As `predict` and `update`, or if there are too few inputs.
         """
         estimates = []
-        rows = real_values("measurements", measurements)
+        rows = np.atleast_1d(real_values("measurements", measurements))
         series = _series(inputs, len(rows) - 1)
         for k, measurement in enumerate(rows):
             if k:
@@ -372,6 +373,8 @@ class _Noise:
         if isinstance(noise, ConvexPolygons | Polytope | Zonotope):
             if not isinstance(noise, Zonotope) and np.any(noise.is_empty):
                 raise ValueError("noise must not be empty")
+            if isinstance(noise, ConvexPolygons) and noise.shape:
+                raise ValueError(f"noise must be a single polygon: got a batch of shape {noise.shape}")
             polytope = polytope_of(noise)
             if polytope.space != outputs:
                 raise ValueError(f"noise must have {outputs} coordinates, one for each output: got {polytope.space}")

@@ -270,9 +270,9 @@ class PolygonArrays:
         ValueError
             If the batch cannot be broadcast to this shape.
         """
+        _need_shape(shape)
         if shape == self.shape:
             return self
-        _need_shape(shape)
         try:
             counts = np.broadcast_to(self.counts, shape)
         except ValueError:

@@ -619,6 +619,16 @@ def test_too_few_inputs_and_an_empty_set_of_errors_are_refused() -> None:
         observer.smooth(estimates, [[0.0]])
     with pytest.raises(ValueError, match="noise must not be empty"):
         LinearObserver(**system, noise=Polytope.empty(1))
+    for matrix in ([[np.nan, 0.0]], np.zeros((0, 2))):  # formerly NaN without an error, and an IndexError
+        with pytest.raises(ValueError, match=r"matrix must (be finite|have the shape \(m, 2\))"):
+            observer.estimate().output_hull(matrix)
+    with pytest.raises(ValueError, match="measurement must have the shape"):
+        observer.run(1.0)
+    batch = ConvexPolygons.from_box([[0, 0], [0, 0]], [1, 1])
+    with pytest.raises(ValueError, match=r"disturbance must be a single polygon: got a batch of shape \(2,\)"):
+        LinearObserver(**system, noise=0.1, disturbance=batch)
+    with pytest.raises(ValueError, match=r"noise must be a single polygon: got a batch of shape \(2,\)"):
+        LinearObserver(**system | {"output_matrix": np.eye(2)}, noise=batch)
     assert not np.signbit(LinearObserver(**system, noise=0.1).estimate().lower[0])
 
 

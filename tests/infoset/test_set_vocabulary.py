@@ -191,7 +191,7 @@ ONE_CLASS: dict[str, tuple[Callable[[Any], object], list[Any]]] = {
     "ConvexPolygons.from_points": (ConvexPolygons.from_points, [*BAD_NUMBERS, 1.0, [1.0], [[1, 2], [3]], [[1, 2, 3]]]),
     "ConvexPolygons.from_ball sides": (lambda x: ConvexPolygons.from_ball([0, 0], 1, x), [2, 3.5, "4", None]),
     "ConvexPolygons.stack": (ConvexPolygons.stack, [[None], [SQUARE, CUBE], [SQUARE, SQUARE.broadcast_to((2,))]]),
-    "ConvexPolygons.broadcast_to": (SQUARE.broadcast_to((2,)).broadcast_to, [(3,), 5, "2", (-1,), None]),
+    "ConvexPolygons.broadcast_to": (SQUARE.broadcast_to((2,)).broadcast_to, [(3,), 5, "2", (-1,), None, np.eye(2)]),
     "ConvexPolygons.add_segment": (SQUARE.add_segment, BAD_VECTORS),
     "batches": (SQUARE.broadcast_to((2,)).intersection, [SQUARE.broadcast_to((3,))]),
     "batch to R^3": (SQUARE.broadcast_to((2,)).affine_map, [np.ones((3, 2))]),
