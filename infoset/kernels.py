@@ -134,11 +134,21 @@ def _typing_of(context: Any) -> _Typing:
     return _Typing(context)
 
 
+@cache
+def _internal_functions(_fastmath: frozenset[str]) -> dict[Any, Any]:
+    """Return Numba's store of the functions that it compiles for kernels with these fast-math options, such as powers.
+
+    Numba has one store for all options, so that the digits of a kernel would depend on the kernels compiled before.
+    """
+    return {}
+
+
 class _Compiler(CompilerBase):
     """Numba's compiler with faster typing."""
 
     def __init__(self, typing: Any, *arguments: Any) -> None:
         super().__init__(_typing_of(typing), *arguments)
+        self.state.targetctx.cached_internal_func = _internal_functions(frozenset(self.state.flags.fastmath.flags))
 
     def define_pipelines(self) -> list[Any]:
         """Return Numba's passes."""

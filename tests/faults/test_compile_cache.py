@@ -15,7 +15,7 @@ import pytest
 
 import infoset
 from infoset import _compile, kernels
-from infoset.kernels import VARIABLE, cache_folder
+from infoset.kernels import VARIABLE, Kernels, cache_folder
 from rendezvous import _compile as _compile_of_rendezvous
 from tests.faults.conftest import begin, ended
 
@@ -240,3 +240,14 @@ def test_two_processes_compile_at_once_into_one_cache(command: tuple[str, ...], 
 
 def without_times(text: str) -> list[str]:
     return [line for line in text.splitlines() if "elapsed" not in line and "_took_" not in line]
+
+
+def test_a_kernel_has_its_own_fast_math_options_whatever_was_compiled_before() -> None:
+    """Numba compiles a power as a function of its own, and had one for kernels with and without contraction."""
+    namespace: dict[str, Any] = {"__name__": __name__}
+    exec("def power(x):\n    return x**3", namespace)  # without a file, so that nothing is stored
+    loose, exact = (Kernels(*options).compiled(namespace["power"]) for options in (("contract",), ("nnan",)))
+    assert (loose(2.0), exact(2.0)) == (8.0, 8.0)
+    (code,) = exact.inspect_llvm().values()
+    assert "fmul nnan" in code
+    assert "contract" not in code
