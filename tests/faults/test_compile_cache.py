@@ -16,6 +16,7 @@ import pytest
 import infoset
 from infoset import _compile, kernels
 from infoset.kernels import VARIABLE, Kernels, cache_folder
+from infoset.limits import shown
 from rendezvous import _compile as _compile_of_rendezvous
 from tests.faults.conftest import begin, ended
 
@@ -37,11 +38,11 @@ def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def test_a_private_folder_is_used_without_a_home(nowhere: Path) -> None:
-    folder = cache_folder(twice)
+    folder = cache_folder(shown)
     assert folder is not None
     assert folder.parent.parent == nowhere
     assert folder.parent.stat().st_mode & 0o777 == 0o700
-    assert cache_folder(twice) == folder  # the same one next time
+    assert cache_folder(shown) == folder  # the same one next time
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="users and modes of POSIX")
@@ -50,17 +51,17 @@ def test_a_folder_that_others_may_write_is_not_believed(nowhere: Path) -> None:
     folder = nowhere / f"infoset-kernels-{os.getuid()}"
     folder.mkdir()
     folder.chmod(0o777)
-    assert cache_folder(twice) is None
+    assert cache_folder(shown) is None
     folder.rmdir()
     elsewhere = nowhere / "elsewhere"
     elsewhere.mkdir(mode=0o700)
     folder.symlink_to(elsewhere)
-    assert cache_folder(twice) is None
+    assert cache_folder(shown) is None
 
 
 def test_the_folder_of_the_environment_comes_first(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, str(nowhere / "mine"))
-    folder = cache_folder(twice)
+    folder = cache_folder(shown)
     assert folder is not None
     assert folder.parent == nowhere / "mine"
 
