@@ -21,7 +21,7 @@ import numpy as np
 
 from experiments import load_scenario
 from guidance import NoiseKind
-from infoset import information_set, replays, section_passes
+from infoset import replays, section_passes, set_state
 from sim import Scenario
 from sim.draws import draw
 from sim.engagement import Engagements
@@ -75,10 +75,10 @@ class Clock:
         """Add timers to the kernels and to the true motion."""
         section_passes.step_all = self.measured(section_passes.step_all)
         for owner, names, part in (
-            (section_passes, ("widest_all",), SECTION_STEPS),
+            (section_passes, ("widest_all", "extreme_angles_all", "keep_labels_all"), SECTION_STEPS),
             (replays, ("margins_all",), TRUTH_SECTION),
             (section_passes, ("make_room_all", "start_all"), REGRIDS),
-            (information_set, ("refine_all",), REGRIDS),
+            (set_state, ("refine_all",), REGRIDS),
             (section_passes, ("shift_all",), IMPULSES),
             (KeplerMotion, ("sight", "advance", "fire", "arrival_s"), TRUTH),
         ):
