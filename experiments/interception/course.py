@@ -108,8 +108,9 @@ def marks(scenario: Scenario) -> dict[str, float]:
 
 
 def duration_text(seconds: float) -> str:
-    """Return a time in the greatest unit of which it has at least one: ``2.5 min``."""
-    name, unit = next(((name, unit) for name, unit in UNITS if seconds >= unit), UNITS[-1])
+    """Return a time in the greatest unit of which it has exactly one or at least two: ``2.5 min``, ``100 s``."""
+    fitting = ((name, unit) for name, unit in UNITS if seconds == unit or seconds >= 2.0 * unit)
+    name, unit = next(fitting, UNITS[-1])
     return f"{seconds / unit:.3g} {name}"
 
 

@@ -144,7 +144,7 @@ class Report:
         if self.search.order == BEST:
             linear = isinstance(self.problem.tour, Tour)
             proved = linear and self.search.times == GIVEN and not self.best.lost
-            notes.append("no order that fits costs less" if proved else "the order is the best one found")
+            notes.append("no order that fits the times costs less" if proved else "the order is the best one found")
         return [*notes, "the times are a local minimum"] if self.search.times == BEST else notes
 
 
@@ -205,7 +205,7 @@ def report_parts(report: Report) -> Iterator[Part]:
     path, nodes = report.scene.path, report.scene.path.nodes
     yield f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"
     if report.problem.price_per_s > 0.0:
-        yield f"cost with the price of the time {report.best.objective:.8g} m^2/s^3"
+        yield f"cost including the price of time = {report.best.objective:.8g} m^2/s^3"
     unit, per_s = report.scene.time_unit
     table = number_table(
         "target", "meet", f"time\n{unit}", "relative speed\nm/s", "dI/dt\nm^2/s^4", "costate jump\nm/s^3", left=2

@@ -40,9 +40,9 @@ function truthAt(record, { step, stage }) {
 const DURATIONS = [["d", 86400], ["h", 3600], ["min", 60], ["s", 1]];
 const TICKS_S = [864000, 86400, 21600, 3600, 600, 60, 10, 1, 0.1];
 
-/** A time in the greatest unit of which it has at least one. */
+/** A time in the greatest unit of which it has exactly one or at least two. */
 function durationText(seconds) {
-  const [name, unit] = DURATIONS.find(([, size]) => seconds >= size) ?? ["s", 1];
+  const [name, unit] = DURATIONS.find(([, size]) => seconds === size || seconds >= 2 * size) ?? ["s", 1];
   return shown(seconds / unit, name, 3);
 }
 

@@ -370,8 +370,8 @@ def test_long_flights_and_schedules_have_a_logarithmic_time_axis(records: list[R
         f"({k}) random noise, range meter\nalong {axis}, 10 s before arrival"
         for k, axis in zip("ab", AXES, strict=True)
     ]
-    times = [duration_text(each) for each in (0.5, 59.0, 150.0, 14400.0, 86400.0)]
-    assert times == ["0.5 s", "59 s", "2.5 min", "4 h", "1 d"]
+    times = [duration_text(each) for each in (0.5, 59.0, 60.0, 100.0, 150.0, 14400.0, 86400.0)]
+    assert times == ["0.5 s", "59 s", "1 min", "100 s", "2.5 min", "4 h", "1 d"]
 
 
 def test_the_axis_of_impulses_extends_to_small_impulses(records: list[Record]) -> None:

@@ -112,7 +112,7 @@ def test_order_and_times_override_the_file(infoset: Infoset, mine: Callable[[str
     assert both["notes"] == ["the order is the best one found", "the times are a local minimum"]
     slots = told(infoset, "service-3", "--order", "best")
     assert slots["times_s"] == [1200.0, 2600.0, 4000.0]
-    assert slots["notes"] == ["no order that fits costs less"]
+    assert slots["notes"] == ["no order that fits the times costs less"]
     assert slots["cost_m2_s3"] <= 0.0211422802
     asked = mine(changed("optimise = false", "optimise = true"))
     assert told(infoset, asked)["cost_m2_s3"] == pytest.approx(best["cost_m2_s3"], rel=1e-12)
