@@ -14,6 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from rendezvous._arrays import Floats, Places
 
 MOST_PERIODS = 256
+_MOST_GROWTH = 1e10
+"""Growth of a deviation, relative to the bounds, from which rounding exceeds about 1e-9 of the bounds."""
 
 
 class ThrustShape(Enum):
@@ -64,7 +66,8 @@ class ReachabilityProblem:
     Raises
     ------
     ValueError
-        If shapes do not fit, a number is not finite, a bound is not positive, or there is no period.
+        If shapes do not fit, a number is not finite, a bound is not positive, there is no period, or A(T-1)...A(0)
+        multiplies deviations by over 1e10, relative to the bounds.
     InadmissibleStartError
         If x(0) breaks a constraint.
     """
@@ -107,6 +110,7 @@ class ReachabilityProblem:
         if self.thrust is ThrustShape.BALL and np.ptp(self.control_bounds) > 0.0:
             raise ValueError("for thrust in a ball the bounds on controls must be equal")
         self._check_more(periods, n, m)
+        self._check_growth()
         self._check_start()
 
     def _check_more(self, periods: int, n: int, m: int) -> None:
@@ -128,6 +132,18 @@ class ReachabilityProblem:
             self.between.ndim != 4 or self.between.shape[0] != periods or self.between.shape[2:] != (n, n + m)
         ):
             raise ValueError(f"matrices of states within periods must have the shape ({periods}, s, {n}, {n + m})")
+
+    def _check_growth(self) -> None:
+        moved = np.diag(self.state_bounds)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for matrix in self.transition:
+                moved = matrix @ moved
+            growth = float(np.abs(moved / self.state_bounds[:, None]).max())
+        if not growth <= _MOST_GROWTH:
+            raise ValueError(
+                f"the linear model multiplies deviations by over {_MOST_GROWTH:g}, so rounding decides the result; "
+                "use fewer or shorter periods, or a time-varying model in place of a frozen one"
+            )
 
     def _check_start(self) -> None:
         over = np.abs(self.initial) - self.state_bounds

@@ -185,6 +185,14 @@ def check(seed: int, *, precise_to: int = 0, members: bool = True) -> str:
     return told
 
 
+def test_a_model_that_amplifies_rounding_is_refused(paper: Paper) -> None:
+    problem = paper(periods=20)
+    growing = np.repeat([np.diag([4.0, 0.1, 0.1, 1.0, 1.0, 1.0])], 20, axis=0)
+    with pytest.raises(ValueError, match="multiplies deviations by over 1e\\+10"):
+        replace(problem, transition=growing)
+    replace(problem, transition=growing[::-1] / 4.0)
+
+
 def test_random_problems() -> None:
     told = Counter(check(seed) for seed in range(12))
     assert told["refused"] == 0
