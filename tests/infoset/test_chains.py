@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from fractions import Fraction
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -30,6 +29,7 @@ from numba import types
 from infoset import chain_steps, chains, location, replays, whole_chains
 from infoset.arrays import Floats
 from infoset.chains import CAPACITY, FIRST_RING, TAKEN
+from tests.rationals import Fraction
 
 Exact = tuple[Fraction, Fraction]
 Level = tuple[float, float, float]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from infoset.observer_steps import enlarge
 from infoset.polytope import HIGHS, Polytope
 from infoset.section_life import SUM_SLACK
 from tests.infoset.test_polygon_oracle import Exact, hull
+from tests.rationals import Fraction
 
 PUBLISHED: dict[str, Any] = json.loads(
     (Path(__file__).parents[1] / "data" / "observer" / "alamo-2005.json").read_text(encoding="utf-8")

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Sequence
-from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -20,11 +19,13 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from infoset import ConvexPolygons, to_shapely
+from tests.rationals import Fraction
 
 U = Fraction(1, 2**53)
 FEW = 8  # roundings of one coordinate in any one operation
 LEAST = Fraction(1, 2**1074)  # what underflow may take from a product
 Exact = tuple[Fraction, Fraction]
+ORIGIN: Exact = (Fraction(0), Fraction(0))
 Vertices = list[tuple[float, float]]
 SOME = settings(
     max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
@@ -170,7 +171,7 @@ class Case(NamedTuple):
         xs, ys = [p[0] for p in self.exact], [p[1] for p in self.exact]
         return max(xs) - min(xs), max(ys) - min(ys)
 
-    def box(self, more: Exact = (Fraction(0), Fraction(0)), few: int = FEW) -> Exact:
+    def box(self, more: Exact = ORIGIN, few: int = FEW) -> Exact:
         return few * U * (self.size[0] + more[0]), few * U * (self.size[1] + more[1])
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from hypothesis import strategies as st
 
 from infoset import polygon, polygon_hull, polygon_sum
 from infoset.arrays import Floats
+from tests.rationals import Fraction
 
 Exact = tuple[Fraction, Fraction]
 

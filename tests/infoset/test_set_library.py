@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -41,6 +40,7 @@ from tests.infoset.test_polygon_oracle import (
     probes,
     turn,
 )
+from tests.rationals import Fraction
 
 ZERO = Fraction(0)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from itertools import combinations
 
 import numpy as np
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 from infoset.arrays import Floats
 from infoset.polytope import Polytope
 from infoset.polytope.double_description import FacetsAndVertices
+from tests.rationals import Fraction
 
 small = st.integers(-3, 3).map(float)
 SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from fractions import Fraction
 from importlib.util import find_spec
 from typing import Any
 
@@ -21,6 +20,7 @@ from infoset.polytope import intersection as old_intersection
 from infoset.polytope import linear_image as old_linear_image
 from infoset.polytope import minkowski_sum as old_minkowski_sum
 from infoset.polytope import projection as old_projection
+from tests.rationals import Fraction
 from tests.rendezvous.reachability.rationals import RationalSet, polyhedron_of, rounded, vertices_of
 
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 
 from infoset.polytope import Polytope, UnboundedPolytopeError
+from tests.rationals import Fraction
 
 CASES: list[dict[str, Any]] = json.loads((Path(__file__).parent / "published_polytopes.json").read_text())["cases"]
 MOST_SUBSETS = 3000

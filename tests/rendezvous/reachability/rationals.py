@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from fractions import Fraction
 from math import lcm
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rendezvous.reachability.problem import Block
+from tests.rationals import Fraction
 
 with suppress(ModuleNotFoundError):  # tests that need it are skipped
     import ppl
