@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,11 +22,12 @@ class EmptyPolytopeError(ValueError):
     """No point satisfies the constraints.
 
     `relaxation` is the least relaxation of every constraint, its normal of unit length, with which a point satisfies
-    all.
+    all; 0 if it is not known.
     """
 
     def __init__(self, relaxation: float) -> None:
-        super().__init__(f"the polytope is empty; it is not if its constraints are relaxed by {relaxation:.3g}")
+        remedy = f"; it is not if its constraints are relaxed by {relaxation:.3g}" if relaxation else ""
+        super().__init__(f"the polytope is empty{remedy}")
         self.relaxation = relaxation
 
 
@@ -136,6 +138,26 @@ def relative_interior(
     EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
         If no point satisfies all rows, the set is unbounded, or a linear program was not solved.
     """
+    try:
+        return _relative_interior(normals, offsets, across, levels, bounded=bounded, member=member, rounding=rounding)
+    except EmptyPolytopeError as error:
+        if not len(across):
+            raise
+        rows, limits = np.vstack([normals, across, -across]), np.concatenate([offsets, levels, -levels])
+        relaxation = least_relaxation(rows, limits) or error.relaxation
+    raise EmptyPolytopeError(relaxation)
+
+
+def _relative_interior(
+    normals: Floats,
+    offsets: Floats,
+    across: Floats,
+    levels: Floats,
+    *,
+    bounded: bool,
+    member: Floats | None,
+    rounding: float,
+) -> RelativeInterior:
     lengths = np.linalg.norm(normals, axis=1)
     long = lengths > ROUNDING * float(lengths.max(initial=0.0))
     if member is not None:
@@ -191,8 +213,25 @@ def chebyshev_ball(rows: Floats, limits: Floats, sizes: Floats | float = 1.0) ->
     cost[-1] = -1.0
     optimum = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)
     if optimum.status != 0:
-        raise UncertainHullError("the linear program of a largest ball inside was not solved")
+        raise UncertainHullError("the linear program of a largest ball inside was not solved: is the set unbounded?")
     return optimum.x[:-1], float(optimum.x[-1])
+
+
+def least_relaxation(rows: Floats, limits: Floats) -> float:
+    """Return the least relaxation of half-spaces, rows of unit length, that has a point; 0 if it is not known.
+
+    One linear program (HiGHS).
+    """
+    lengths = np.linalg.norm(rows, axis=1)
+    used = lengths > 0.0
+    rows, limits = rows[used] / lengths[used, None], limits[used] / lengths[used]
+    size = float(np.abs(limits).max(initial=0.0))
+    if math.isinf(size):
+        return 0.0
+    try:
+        return max(0.0, -size * chebyshev_ball(rows, limits / max(size, 1e-300))[1])
+    except UncertainHullError:
+        return 0.0
 
 
 def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:

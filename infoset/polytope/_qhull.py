@@ -268,11 +268,12 @@ def _need_agreement(points: Floats, corners: Integers, on_facets: Flags) -> None
     outside = float((points @ hull.equations[:, :-1].T + hull.equations[:, -1]).max())
     if outside > _APART:
         raise UncertainHullError(f"a point is {outside:.2g} outside the hull of its vertices")
-    covered = np.ones((len(hull.simplices), on_facets.shape[1]), dtype=bool)
-    for corner in range(hull.simplices.shape[1]):
-        covered &= on_facets[corners[hull.simplices[:, corner]]]
-    if not covered.any(axis=1).all():
-        raise UncertainHullError("a part of the surface is in no facet")
+    for some in _chunks(len(hull.simplices), on_facets.shape[1]):
+        covered = np.ones((len(hull.simplices[some]), on_facets.shape[1]), dtype=bool)
+        for corner in hull.simplices[some].T:
+            covered &= on_facets[corners[corner]]
+        if not covered.any(axis=1).all():
+            raise UncertainHullError("a part of the surface is in no facet")
 
 
 def _surface(vertices: Floats) -> ConvexHull:
@@ -310,19 +311,24 @@ def _largest(on: Flags, least: int) -> Integers:
     """Return the planes whose points are not all on another plane; of planes with the same points, the first."""
     planes = np.flatnonzero(on.sum(axis=0) >= least)
     held = on[:, planes].astype(np.float32)
-    counts = held.sum(axis=0)
-    common = held.T @ held
-    order = np.arange(len(planes))
-    within = common >= counts[:, None]
-    beaten = within & ((counts[None, :] > counts[:, None]) | (order[None, :] < order[:, None]))
-    return np.asarray(planes[~beaten.any(axis=1)])
+    counts, order = held.sum(axis=0), np.arange(len(planes))
+    kept = np.ones(len(planes), dtype=bool)
+    for some in _chunks(len(planes), len(planes)):
+        within = held[:, some].T @ held >= counts[some, None]
+        kept[some] = ~(within & ((counts > counts[some, None]) | (order < order[some, None]))).any(axis=1)
+    return np.asarray(planes[kept])
 
 
 def _ranks(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Integers:
     """Return the ranks of matrices, which are built in batches."""
-    size = max(1, _ENTRIES // max(1, height))
     ranks = [np.zeros(0, np.int64)]
-    for start in range(0, count, size):
-        values = np.linalg.svd(stack(slice(start, start + size)), compute_uv=False)
+    for some in _chunks(count, height):
+        values = np.linalg.svd(stack(some), compute_uv=False)
         ranks.append((values > negligible * np.maximum(values[:, :1], 1e-300)).sum(axis=1))
     return np.concatenate(ranks)
+
+
+def _chunks(count: int, width: int) -> list[slice]:
+    """Return parts of `count` rows of a table with `width` columns, which is too large to be stored."""
+    size = max(1, _ENTRIES // max(1, width))
+    return [slice(start, start + size) for start in range(0, count, size)]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from infoset._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
 from infoset.arrays import Floats
 from infoset.limits import COUNT
-from infoset.polytope._affine_hull import FLAT, EmptyPolytopeError
+from infoset.polytope._affine_hull import FLAT, ROUNDING, EmptyPolytopeError
 from infoset.polytope._qhull import hull_of_points, together
 from infoset.polytope._scaling import LocalAxes, described
 
@@ -120,17 +120,25 @@ class PolytopeArrays:
         """Return a polytope around the ball with `centre`, shape (n,), and `radius`, or in it.
 
         Its facets, or its vertices if not `outer`, are in the 3^n - 1 directions whose components are in ratios of -1,
-        0 and 1: it extends beyond the ball, or stays inside it, by the factor 1.09 in two dimensions, 1.14 in three
-        and 1.23 in six at most.
+        0 and 1; it has 2^n n! vertices, or facets. It extends beyond the ball, or stays inside it, by the factor 1.09
+        in two dimensions, 1.13 in three and 1.21 in six at most.
         """
         middle, size = finite_values("centre", centre, "n"), float(radius_values(radius))
-        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=len(middle)) if any(row)])
+        space = len(middle)
+        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=space) if any(row)])
         rows /= np.linalg.norm(rows, axis=1)[:, None]
-        if not outer or size == 0.0:
-            return cls.from_vertices(middle + size * rows)
-        flat = np.zeros((0, len(middle)))
-        vertices, normals, offsets, *_ = described(rows, np.full(len(rows), size), flat, flat[:, 0], bounded=True)
-        return cls(vertices + middle, normals, offsets + normals @ middle, flat, flat[:, 0])
+        # The hyperplane through (1, 0, ..), (1, 1, 0, ..) / sqrt(2), .. is one side; symmetry gives the others.
+        side = np.diff(np.sqrt(np.arange(space + 1)))
+        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=space)))
+        sides = (np.array(list(itertools.permutations(side)))[:, None] * signs).reshape(-1, space)
+        if size <= ROUNDING * np.abs(middle).max():
+            return cls.from_vertices(middle + size * (sides if outer else rows))
+        flat = np.zeros((0, space))
+        if outer:
+            return cls(middle + size * sides, rows, size + rows @ middle, flat, flat[:, 0])
+        length = float(np.linalg.norm(side))
+        normals = sides / length
+        return cls(middle + size * rows, normals, size / length + normals @ middle, flat, flat[:, 0])
 
     @classmethod
     def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Self:

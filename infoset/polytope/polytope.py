@@ -21,7 +21,7 @@ from infoset._set_arguments import (
 )
 from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, real_values
-from infoset.polytope._affine_hull import EmptyPolytopeError
+from infoset.polytope._affine_hull import EmptyPolytopeError, least_relaxation
 from infoset.polytope._measures import largest_ball, nearest_difference, simplices_of, volume_of
 from infoset.polytope._scaling import LocalAxes, described, tightened, without_far
 from infoset.polytope.arrays import PolytopeArrays
@@ -41,9 +41,9 @@ class Polytope(PolytopeArrays):
     matter, except that points whose width along one axis is 3e-12 times that along another one, or less, count as flat.
     Rounding of the coordinates limits sets far from the origin: a thickness below 1e-13 of a coordinate counts as flat.
 
-    An empty set has no vertices; `relaxation` is then the least relaxation of all constraints, their normals of unit
-    length, with which a point satisfies them, if it is known. Operations on it give the empty set; points such as its
-    centroid do not exist, and an EmptyPolytopeError is raised.
+    An empty set has no vertices; `relaxation` is then the least relaxation of the constraints that made it empty, their
+    normals of unit length, with which a point satisfies them; 0 if it is not known. Operations on it give the empty
+    set; points such as its centroid do not exist, and an EmptyPolytopeError is raised.
 
     All arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
     (ValueError). Operations are exact up to rounding: about 1e-12 of the size of the set, and 2e-9 at most. Their cost
@@ -127,7 +127,7 @@ class Polytope(PolytopeArrays):
         most, least = np.split(limits[len(self.normals) :], 2)
         sizes = np.maximum(np.abs(self.vertices).max(axis=0), np.abs(other.vertices).max(axis=0))
         if (most + least < -_FLAT_WIDTH * np.abs(self.across) @ sizes).any():
-            return self.empty(self.space, -0.5 * float((most + least).min()))
+            return self.empty(self.space, least_relaxation(rows, limits))
         (lower, upper), (start, end) = self.bounding_box(), other.bounding_box()
         sides = self.normals, limits[: len(self.normals)], self.across, 0.5 * (most - least)
         return self._in_box(sides, lower - start, upper - end, upper - lower, solid=self.dimension == self.space)
@@ -199,7 +199,9 @@ class Polytope(PolytopeArrays):
         if not cuts.any():
             return self
         if np.isneginf(limits).any() or (least > most).any():
-            return self.empty(self.space, 0.5 * float(np.max(least - most)))
+            sides, ends = self.constraints()
+            rows, limits = np.vstack([sides, rows[cuts]]), np.concatenate([ends, limits[cuts]])
+            return self.empty(self.space, least_relaxation(rows, limits))
         lower, upper = self.bounding_box()
         sides = np.vstack([self.normals, rows[cuts]]), np.concatenate([self.offsets, limits[cuts]])
         ends = tightened(rows[cuts], limits[cuts], lower, upper)

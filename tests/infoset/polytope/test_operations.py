@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from infoset import ConvexPolygons
 from infoset.arrays import Floats
-from infoset.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError
+from infoset.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, _qhull
 from infoset.polytope import cut as old_cut
 from infoset.polytope import intersection as old_intersection
 from infoset.polytope import linear_image as old_linear_image
@@ -186,6 +186,29 @@ def test_an_empty_set_that_is_unbounded_by_its_directions_is_empty() -> None:
         Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [2.0, 10.0, 11.0])
 
 
+def test_the_relaxation_of_an_empty_set_is_the_least() -> None:
+    """Formerly it was wrong for reversed strips, normals of another length, and flat sets."""
+    cube = Polytope.from_box([0.0] * 3, [1.0] * 3)
+    for normal, lower, upper, wanted in (
+        ([1, 0, 0], 0.7, 0.5, 0.1),
+        ([1000, 0, 0], 700, 500, 0.1),
+        ([1, 0, 0], 2.7, 2.5, 0.85),
+        ([1, 0, 0], -np.inf, -np.inf, 0.0),
+        ([1, 0, 0], np.inf, np.inf, 0.0),
+    ):
+        empty = cube.cut(normal, lower, upper)
+        assert empty.is_empty
+        assert empty.relaxation == pytest.approx(wanted), normal
+    assert cube.cut([1, 0, 0], np.nextafter(0.5, 1.0), 0.5).is_empty
+    floor, tall = Polytope.from_box([0, 0, 0], [1, 1, 0]), Polytope.from_box([0, 0, 0], [1.5, 1, 0.2])
+    assert floor.minkowski_difference(tall).relaxation == pytest.approx(0.25)
+    # A segment along (1, 1) and a square: relaxed by r, the segment ends at 2 - r / sqrt(2), the square at 1 + r.
+    one, two = Polytope.from_vertices([[2, 2], [3, 3]]), Polytope.from_box([0, 0], [1, 1])
+    assert (one & two).relaxation == pytest.approx(np.sqrt(2.0) / (1.0 + np.sqrt(2.0)))
+    with pytest.raises(EmptyPolytopeError, match=r"the polytope is empty$"):
+        Polytope.empty(3).centroid()
+
+
 def test_operations_on_empty_sets() -> None:
     empty, box = Polytope.empty(3), Polytope.from_box([0.0] * 3, [1.0] * 3)
     made = [
@@ -223,17 +246,35 @@ def test_axes_of_very_different_sizes() -> None:
 
 
 def test_balls_and_zonotopes() -> None:
-    for space, most in ((2, 1.09), (3, 1.14)):
+    for space, most in ((1, 1.0), (2, 1.09), (3, 1.13), (4, 1.17), (6, 1.21)):
         outer, inner = (Polytope.from_ball(np.ones(space), 2.0, outer=outer) for outer in (True, False))
+        for one, depth in ((outer, 2.0), (inner, 2.0 / most)):
+            assert (one.offsets - one.normals.sum(axis=1)).min() >= depth - 1e-14
+            assert np.linalg.norm(one.normals, axis=1) == pytest.approx(1.0)
+            if space < 5:  # in R^6 a hull of 46080 facets takes minutes
+                hull = Polytope.from_vertices(one.vertices)
+                assert (len(hull.vertices), len(hull.normals)) == (len(one.vertices), len(one.normals))
+                assert hull.equals(one, 1e-12)
         assert outer.chebyshev_centre()[1] == pytest.approx(2.0)
         assert np.linalg.norm(inner.vertices - 1.0, axis=1) == pytest.approx(2.0)
         assert np.linalg.norm(outer.vertices - 1.0, axis=1).max() <= 2.0 * most
+    for outer in (True, False):
+        assert Polytope.from_ball([1e10, 1.0], 1e-8, outer=outer).dimension < 2
     generators = np.random.default_rng(0).normal(size=(5, 3))
     zonotope = Polytope.from_zonotope([1.0, 2.0, 3.0], generators)
     directions = np.random.default_rng(1).normal(size=(20, 3))
     wanted = directions @ [1.0, 2.0, 3.0] + np.abs(directions @ generators.T).sum(axis=1)
     np.testing.assert_allclose(zonotope.support_function(directions), wanted, rtol=1e-12)
     assert Polytope.from_zonotope([1.0, 2.0], []).dimension == 0
+
+
+def test_a_hull_is_the_same_if_its_tables_are_computed_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With 46080 facets the tables of pairs of facets did not fit into memory."""
+    points = np.random.default_rng(2).normal(size=(40, 4))
+    whole = Polytope.from_vertices(points)
+    monkeypatch.setattr(_qhull, "_ENTRIES", 1000)
+    for part in ("vertices", "normals", "offsets"):
+        np.testing.assert_array_equal(getattr(Polytope.from_vertices(points), part), getattr(whole, part))
 
 
 @pytest.mark.parametrize(
