@@ -21,6 +21,10 @@ OF_THE_CHECKOUT = ["docs", "test_architecture.py", "test_readme.py"]
 IN_A_CHECKOUT = (Path(__file__).parents[1] / "README.md").exists()
 collect_ignore = [] if IN_A_CHECKOUT else OF_THE_CHECKOUT
 
+# One thread for linear algebra, set before NumPy is imported: the matrices are small, and the threads of several
+# processes on the same cores would wait for each other by spinning.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 PROFILE = os.environ.get("INFOSET_HYPOTHESIS_PROFILE", "default")
 TIMES = 32
 
