@@ -20,6 +20,22 @@ def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 
 
 @pytest.fixture
+def unrendered(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw figures, but write empty files, in tests that do not look at these files; with `rendered`, write them.
+
+    Writing takes most of the time of a figure. Each kind of figure is written by some test.
+    """
+    if "rendered" not in request.fixturenames:
+        empty = [("pdf", b""), ("png", b"")]
+        monkeypatch.setattr("experiments.common.figure_style.figure_bytes", lambda _figure: empty)
+
+
+@pytest.fixture
+def rendered() -> None:
+    """Write the figures of a test in a module that otherwise does not write them."""
+
+
+@pytest.fixture
 def mine(tmp_path: Path) -> Callable[[str], Path]:
     """Write a problem file."""
 

@@ -27,6 +27,8 @@ from sim import Scenario, simulate
 from tests.built_in import scenario_text
 from tests.experiments.command_line import Command
 
+pytestmark = pytest.mark.usefixtures("unrendered")
+
 CURVE_KEYS = [
     "published_curve",
     "noise",
@@ -326,6 +328,7 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
     assert (tmp_path / "flight-random.npz").read_bytes() == (folder / "record-random.npz").read_bytes()
 
 
+@pytest.mark.usefixtures("rendered")
 def test_figures_of_a_record_are_those_of_its_flight(infoset: Command, brief_file: Path, tmp_path: Path) -> None:
     folder, again = tmp_path / "figures", tmp_path / "again"
     assert infoset("engage", brief_file, "--out", folder, "-q")[0] == 0

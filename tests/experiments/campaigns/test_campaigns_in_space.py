@@ -15,6 +15,8 @@ from sim.storage import CampaignFolder
 from tests.experiments.command_line import Command, strict
 from tests.space import in_space
 
+pytestmark = pytest.mark.usefixtures("unrendered")
+
 SWEPT = "uncertainty.y_km.greatest=0.1:0.2:2,angle_sensor.error_at_zero_range_y_rad=0.0001:0.0004:2"
 
 
@@ -25,6 +27,7 @@ def file(brief: Scenario, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("rendered")
 def test_a_campaign_in_space_is_resumed_and_reported(file: Path, infoset: Command) -> None:
     assert infoset("campaign", file, "--runs", 8, "--noise", "mixed", "--out", "runs", "--seed", 3)[0] == 0
     code, _, _ = infoset("campaign", file, "--runs", 12, "--noise", "mixed", "--out", "runs", "--seed", 3, "--resume")

@@ -15,6 +15,8 @@ from tests.experiments.command_line import Command
 
 pytest.importorskip("pyarrow")
 
+pytestmark = pytest.mark.usefixtures("unrendered")
+
 BOUND_M = 25.0
 FIRST_S = 1440.0
 IDEAL = [

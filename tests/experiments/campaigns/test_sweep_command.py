@@ -47,6 +47,8 @@ from sim.requirement import Decision, HitRequirement, Verdict, judge, parse_requ
 from sim.storage import Axis, CampaignFolder, read_manifest
 from tests.experiments.campaigns.figure_room import need_room
 
+pytestmark = pytest.mark.usefixtures("unrendered")
+
 Infoset = Callable[..., tuple[int, str, str]]
 FILES = [
     *(".lock", "figure-sweep.pdf", "figure-sweep.png", "manifest.json", "scenario.toml", "shards", "summary.json"),
@@ -72,6 +74,7 @@ def swept(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.usefixtures("rendered")
 def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "sweep"
     code, out, err = infoset(
@@ -118,6 +121,7 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
     assert all(each["met"] in out for each in found["answers"])
 
 
+@pytest.mark.usefixtures("rendered")
 def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_path: Path) -> None:
     asked = ("sweep", file, "--vary", "thruster.greatest_impulse_m_s=2:8:4", "--runs", 20, "--noise", "mixed")
     code, out, _ = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3")
@@ -770,7 +774,7 @@ def test_numbers_of_a_map_stay_off_its_lines_and_undecided_cells_have_no_limit()
     ]
     assert len(crossed) <= 1, crossed
     undecided = [{"game": replace(each["game"], decision=OPEN)} for each in table.verdicts]
-    few = draw_sweep(replace(table, verdicts=tuple(undecided)), SHOWN, "game")
+    few = draw_sweep(replace(table, verdicts=tuple(undecided)), [required.quantile], "game")
     assert not [line for line in few.axes[0].lines if line.get_color() == INK]
     assert [text.get_text() for text in few.legends[0].get_texts()] == ["undecided"]
 
@@ -801,10 +805,10 @@ def test_the_limit_of_two_keys_is_a_line(scale: Literal["linear", "log"]) -> Non
     assert names[-1] == "limit by interpolation of the estimates"
     combinations = itertools.product(*(axis.values for axis in axes))
     form = replace(table, closed_form_m=tuple(3e4 * error_rad * time_s for error_rad, time_s in combinations))
-    figure = draw_sweep(form, SHOWN, "game")
+    figure = draw_sweep(form, [required.quantile], "game")
     assert figure.legends[0].get_texts()[-1].get_text() == "closed form: worst errors, no disturbance, no later images"
     one_known = replace(table, closed_form_m=(None,) * 63 + (3.0,))
-    assert len(draw_sweep(one_known, SHOWN, "game").axes[0].lines) == len(first.lines)
+    assert len(draw_sweep(one_known, [required.quantile], "game").axes[0].lines) == len(first.lines)
 
 
 def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept: Path, tmp_path: Path) -> None:

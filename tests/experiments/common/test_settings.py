@@ -95,6 +95,7 @@ def test_a_key_is_set_once() -> None:
         load_tables(FORM, "pareto-2008", ["name=a", " name = b"])
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_recorded_scenario_is_the_changed_one(infoset: Infoset) -> None:
     options = ("--set", "thruster.greatest_impulse_m_s=3", "--json", "-", "--out", "runs", "--quiet")
     code, out, err = infoset("engage", "asteroid-1997", *options)

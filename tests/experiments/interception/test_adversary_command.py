@@ -19,6 +19,8 @@ from sim.adversary import find_worst
 from tests.experiments.command_line import Command
 from tests.space import in_space
 
+pytestmark = pytest.mark.usefixtures("unrendered")
+
 KEYS = [
     "version",
     "scenario",
@@ -130,8 +132,10 @@ def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Sc
         assert math.hypot(*errors) <= sensor.error_bound(step.true_range_m) * (1.0 + 1e-9)
 
 
-def test_both_greatest_misses_are_those_of_bound(infoset: Command) -> None:
+def test_both_greatest_misses_are_those_of_bound(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
+    monkeypatch.setattr("sim.bound.PERIODS_LOOKED_AT", 1)  # few pairs
+    monkeypatch.setattr("sim.bound.REFINEMENTS", 0)
     options = ("--budget", 12, "--model", "paper", "--json")
     table = infoset("bound", "--strategies", "symmetric-miss", *options, "bound.json")[1]
     shown = infoset("adversary", "--strategy", "symmetric-miss", *options, "adversary.json")[1]

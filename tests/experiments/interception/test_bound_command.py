@@ -47,6 +47,12 @@ def short() -> Scenario:
     return replace(published, name="short", set_model=nominal, dispersion=box, nominal_range_m=1745e3)
 
 
+@pytest.fixture(scope="module")
+def planar(short: Scenario) -> LowerBound:
+    """The bound of the short scenario."""
+    return lower_bound(short)
+
+
 @pytest.fixture
 def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
     file = tmp_path / "short.toml"
@@ -54,9 +60,11 @@ def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
     return file
 
 
-def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path, tmp_path: Path) -> None:
+def test_bound_into_a_folder(
+    infoset: Infoset, short: Scenario, planar: LowerBound, short_file: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "results"
-    code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed", "--budget", 8)
+    code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed", "--budget", 3)
     assert (code, err) == (0, f"wrote scenario.toml, results.json, figure-bound.pdf, figure-bound.png in {folder}\n")
     assert sorted(each.name for each in folder.iterdir()) == FILES
     found = json.loads((folder / "results.json").read_text())
@@ -65,7 +73,7 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
     assert found["version"] == version("infoset")
     assert (found["scenario"], found["model"]) == ("short", "guaranteed")
     assert found["scenario_hash"] == scenario_hash(flown)
-    expected = lower_bound(short)
+    expected = planar
     assert found["lower_bound_m"] == expected.bound_m
     assert [each["bound_m"] for each in found["by_label"]] == [each.bound_m for each in expected.by_label]
     assert max(each["bound_m"] for each in found["by_label"]) == found["lower_bound_m"]
@@ -113,15 +121,16 @@ def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path)
 
 
 @pytest.mark.parametrize("shape", ["box", "disc"])
-def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("unrendered")
+def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
     spatial = in_space(short, error_shape=ErrorShape(shape))
     file = tmp_path / "space.toml"
     file.write_text(scenario_to_toml(spatial))
-    options = ("--strategies", "symmetric-miss", "--budget", 4, "--model", "guaranteed", "--out", tmp_path / "results")
+    options = ("--strategies", "symmetric-miss", "--budget", 1, "--model", "guaranteed", "--out", tmp_path / "results")
     code, out, _ = infoset(file, *options)
     assert code == 0
     found = json.loads((tmp_path / "results" / "results.json").read_text())
-    planar, expected = lower_bound(short), lower_bound(spatial)
+    expected = lower_bound(spatial)
     assert (found["disturbance_y_m_s2"], found["error_shape"]) == (0.005, shape)
     assert found["lower_bound_m"] == expected.bound_m
     if shape == "disc":
@@ -153,7 +162,7 @@ def test_no_name_and_no_digit_is_cut_at_60_columns(
     infoset: Infoset, short_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "60")
-    code, out, _ = infoset(short_file, "--budget", 4)
+    code, out, _ = infoset(short_file, "--budget", 1)
     assert code == 0
     assert "…" not in out
     assert all(name in out for name in COMPARED)
@@ -219,8 +228,8 @@ def test_a_program_without_a_solution_is_one_message(
     assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")
 
 
-def test_figure_of_few_labels_and_of_many(short: Scenario) -> None:
-    few = lower_bound(short)
+def test_figure_of_few_labels_and_of_many(short: Scenario, planar: LowerBound) -> None:
+    few = planar
     left, right = draw_bound(short, few).axes
     assert [line.get_label() for line in left.get_lines()[:2]] == ["58 km/s", "57.5 km/s"]
     assert f"{few.bound_m:.1f} m" in {text.get_text() for text in left.texts}

@@ -45,6 +45,9 @@ def replay(*arguments: object) -> int:
 def test_a_page_is_written_whole_and_replaced_only_when_told(
     file: Path, record: Record, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    record = shortened(record, 20)
+    file.unlink()
+    write_record(record, file)
     assert replay(file, "--html", "page.html", "--quiet") == 0
     assert capsys.readouterr() == ("", "")
     assert (file.parent / "page.html").read_text(encoding="utf-8") == interception_page([record])
@@ -97,6 +100,7 @@ def test_frames_and_width_of_an_animation_make_it_small(record: Record, tmp_path
     assert sizes[1] < 0.4 * sizes[0]
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_figure_3_at_other_times(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert replay(file, "--out", "sets", "--times", "2, 40,60,90", "-q") == 0
     assert (tmp_path / "sets" / "figure-3-sets.png").is_file()

@@ -24,11 +24,12 @@ from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets, planes_at
 from experiments.interception.page import interception_page
-from experiments.interception.scenario_file import load_scenario
+from experiments.interception.scenario_file import load_scenario, scenario_to_toml
 from guidance import NoiseKind
 from infoset import Convention
-from sim import Record, Results, fly_one, simulate
+from sim import Record, Results, Scenario, fly_one, simulate
 from tests.experiments.command_line import Command
+from tests.space import in_space
 
 RUNS = 12
 AXES = ("y", "z")
@@ -101,9 +102,8 @@ def test_a_circle_of_a_quantile_does_not_hide_the_radius_of_the_body(results: Re
         (Convention.CONE, ["measured angle along y", "measured angle along z"]),
     ],
 )
-def test_the_page_names_the_measured_angles(convention: Convention, names: list[str]) -> None:
-    scenario = load_scenario("asteroid-1997-space", [f"angle_sensor.convention={convention.value}"])
-    text = interception_page([fly_one(scenario)])
+def test_the_page_names_the_measured_angles(convention: Convention, names: list[str], brief: Scenario) -> None:
+    text = interception_page([fly_one(in_space(brief, convention=convention))])
     assert re.findall(r'"measured_name": ?"([^"]*)"', text) == names
 
 
@@ -244,15 +244,16 @@ def test_an_animation_shows_both_axes(records: list[Record]) -> None:
 
 
 @pytest.mark.parametrize("name", ["experiment", "compare"])
-@pytest.mark.parametrize("scenario", ["asteroid-1997", "asteroid-1997-space"])
+@pytest.mark.parametrize("spatial", [False, True])
+@pytest.mark.usefixtures("unrendered")
 def test_commands_write_a_b_plane_of_each_noise_in_space_only(
-    infoset: Command, tmp_path: Path, name: str, scenario: str
+    infoset: Command, brief: Scenario, tmp_path: Path, name: str, spatial: bool
 ) -> None:
-    infoset(
-        name, scenario, "--runs", "2", "--out", tmp_path, *(("--strategies", "patient") if name == "compare" else ())
-    )
-    written = {file.stem for file in tmp_path.glob("figure-b-plane-*.png")}
-    assert written == ({"figure-b-plane-random", "figure-b-plane-game"} if scenario.endswith("space") else set())
+    (tmp_path / "brief.toml").write_text(scenario_to_toml(in_space(brief) if spatial else brief))
+    strategies = ("--strategies", "patient") if name == "compare" else ()
+    assert infoset(name, "brief.toml", "--runs", "2", "--out", "out", *strategies)[0] == 0
+    written = {file.stem for file in (tmp_path / "out").glob("figure-b-plane-*.png")}
+    assert written == ({"figure-b-plane-random", "figure-b-plane-game"} if spatial else set())
 
 
 def scheduled(record: Record) -> Record:

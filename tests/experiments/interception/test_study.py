@@ -18,6 +18,8 @@ from experiments.interception.study import SetCounts, hit_text, percent, set_cou
 from infoset import Model
 from sim import Body, Scenario, estimate_hits, quantiles, simulate
 
+pytestmark = pytest.mark.usefixtures("unrendered")
+
 Infoset = Callable[..., tuple[int, str, str]]
 KEYS = ["runs", "hits", "probability", "lower", "upper"]
 WARNING = "the quantiles include these failures of the model; for quantiles without them, use --model guaranteed"
@@ -75,7 +77,8 @@ def test_every_study_has_the_shares_of_its_sets(infoset: Infoset, sized: Path, c
         assert infoset("campaign", sized, "--runs", 3, "--out", "runs")[0] == 0
         asked: tuple[object, ...] = ("report", "runs")
     else:
-        asked = (command, sized, "--runs", 3, *(("--out", "runs") if command == "campaign" else ()))
+        others = {"campaign": ("--out", "runs"), "compare": ("--strategies", "patient")}
+        asked = (command, sized, "--runs", 3, *others.get(command, ()))
     code, out, _ = infoset(*asked)
     assert code == 0
     if command == "compare":
