@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 
+_STEPS = "--set guidance.step_s={0} --set angle_sensor.period_s={0}"
 REDUCED = (
     (r"^infoset experiment\b(?!.* --runs)", "infoset experiment --runs 2"),
     (r"--runs \d+", "--runs 2"),
@@ -36,6 +37,9 @@ REDUCED = (
         r"^infoset pursuit-map (\S+)(?!.* --x)",
         r"infoset pursuit-map \1 --x phase_deg=-20:20:3 --y thrust_ratio=0.2:0.5:2",
     ),
+    # The flights of the missions have thousands of steps.
+    (r"^infoset experiment (dart-2022|haiv-2013)\b", rf"infoset experiment \1 {_STEPS.format(30)}"),
+    (r"^infoset experiment deep-impact-2005\b", f"infoset experiment deep-impact-2005 {_STEPS.format(150)}"),
     # A narrow interval needs too many runs for a test.
     (r" --until \"[^\"]*\"", ""),
 )

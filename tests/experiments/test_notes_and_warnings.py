@@ -93,11 +93,16 @@ def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str], monkeyp
     assert capsys.readouterr().err == "progress: patient 50 %, kalman 0 %\n"
 
 
+LONG_STEPS = ("--set", "guidance.step_s=30", "--set", "angle_sensor.period_s=30")
+"""A third of the steps of haiv-2013."""
+
+
+@pytest.mark.usefixtures("unrendered")
 def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command) -> None:
     pytest.importorskip("pyarrow")
     arguments = ["sweep", "haiv-2013", "--set", "thruster.impulses_s=[5400, 180]", "--noise", "game", "--runs", "6"]
     arguments += ["--vary", "thruster.last_impulse_s=10:100:2", "--require", "miss_m p50<500", "--out", "out"]
-    _, out, _ = infoset(*arguments)
+    _, out, _ = infoset(*arguments, *LONG_STEPS)
     assert "thruster.last_impulse_s has no effect: all 2 cells have the same results" in out
     assert "miss_m p50<500 is met against this adversary in " in out
     assert "game noise (tie rule upper) is one adversary, not the worst case: infoset bound" in out
@@ -108,9 +113,9 @@ def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command
 
 
 def test_every_output_with_game_noise_names_its_tie_rule(infoset: Command) -> None:
-    _, out, _ = infoset("experiment", "haiv-2013", "--runs", "2", "--json", "out.json")
+    _, out, _ = infoset("experiment", "haiv-2013", *LONG_STEPS, "--runs", "1", "--json", "out.json")
     assert "game noise with the tie rule upper" in out.splitlines()[0]
     assert "is one adversary" in json.loads(Path("out.json").read_text())["notes"][0]
-    _, out, _ = infoset("compare", "haiv-2013", "--runs", "2", "--strategies", "patient")
+    _, out, _ = infoset("compare", "haiv-2013", *LONG_STEPS, "--runs", "1", "--strategies", "patient")
     assert "game noise: for each run, the worst of the four tie rules" in out.splitlines()[0]
     assert "is one adversary" in out

@@ -29,6 +29,7 @@ from infoset import AngleSensor, ExtremePoints, InformationSet, PredictedMiss, R
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
+from tests.long_steps import with_long_steps
 
 E = 58e3
 THRUSTER = Thruster(budget_m_s=1000.0, least_impulse_m_s=0.25, greatest_impulse_m_s=7.5)
@@ -304,7 +305,7 @@ def fly(scenario: Scenario, draws: Draws) -> Results:
 @pytest.mark.parametrize("name", strategy_names())
 @pytest.mark.parametrize("noise", list(NoiseKind))
 def test_a_mirrored_engagement_is_mirrored(name: str, noise: NoiseKind) -> None:
-    scenario = replace(load_scenario("asteroid-1997"), strategy=name, noise=noise)
+    scenario = replace(with_long_steps(load_scenario("asteroid-1997")), strategy=name, noise=noise)
     draws = draw(scenario, range(8), 3)
     there, back = fly(scenario, draws), fly(*mirrored(scenario, draws))
     np.testing.assert_allclose(back.miss_m, there.miss_m, rtol=1e-6)
@@ -313,7 +314,7 @@ def test_a_mirrored_engagement_is_mirrored(name: str, noise: NoiseKind) -> None:
 
 @pytest.mark.parametrize("name", strategy_names())
 def test_a_run_is_the_same_in_whatever_company(name: str) -> None:
-    scenario = replace(load_scenario("asteroid-1997"), strategy=name)
+    scenario = replace(with_long_steps(load_scenario("asteroid-1997")), strategy=name)
     together, alone = simulate(scenario, 5, seed=4), simulate(scenario, [3], seed=4)
     assert alone.miss_m[0] == pytest.approx(together.miss_m[3], rel=1e-9)
     assert alone.impulse_m_s[0] == pytest.approx(together.impulse_m_s[3], rel=1e-9)
@@ -322,7 +323,7 @@ def test_a_run_is_the_same_in_whatever_company(name: str) -> None:
 @pytest.mark.parametrize("name", strategy_names())
 @pytest.mark.parametrize("scenario", ["comet-fast", "asteroid-1997-single"])
 def test_other_scenarios_are_flown_as_well(name: str, scenario: str) -> None:
-    results = simulate(replace(load_scenario(scenario), strategy=name), 4)
+    results = simulate(replace(with_long_steps(load_scenario(scenario)), strategy=name), 4)
     assert np.median(results.miss_m) < 60.0
 
 

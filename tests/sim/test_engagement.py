@@ -14,6 +14,7 @@ from sim import Outcome, Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
 from sim.kepler import Passage, Sight
+from tests.long_steps import with_long_steps
 
 
 def fly(scenario: Scenario, draws: Draws, truth: object = None) -> Results:
@@ -57,7 +58,8 @@ def mirror(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
 def test_a_mirrored_engagement_is_mirrored(
     name: str, noise: NoiseKind, tie: TieRule, model: Model, request: pytest.FixtureRequest
 ) -> None:
-    scenario = replace(request.getfixturevalue(name), noise=noise, tie=tie)
+    scenario = with_long_steps(request.getfixturevalue(name), 3 if name == "comet" else 2)
+    scenario = replace(scenario, noise=noise, tie=tie)
     if model is Model.GUARANTEED:
         box = replace(scenario.set_model, kind=model, initial_set=InitialSet.BOX)
         scenario = replace(scenario, set_model=box)

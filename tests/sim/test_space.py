@@ -15,6 +15,7 @@ from infoset.sensors import Measurements
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements, Step
+from tests.long_steps import with_long_steps
 from tests.space import in_space
 
 NOISES = [(NoiseKind.RANDOM, TieRule.UPPER), *((NoiseKind.GAME, tie) for tie in TieRule)]
@@ -57,7 +58,7 @@ def test_the_plane_is_a_special_case(
     name: str, strategy: str, model: Model, noise: NoiseKind, tie: TieRule, request: pytest.FixtureRequest
 ) -> None:
     # Theory, section 9, item 1: y = V_y = 0, known exactly and measured without error; one code, so equal bits.
-    planar = of_model(request.getfixturevalue(name), model)
+    planar = of_model(with_long_steps(request.getfixturevalue(name)), model)
     planar = replace(planar, noise=noise, tie=tie, strategy=strategy)
     sensor = replace(planar.set_model.angle_sensor, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
     bounds = flat(planar.set_model.bounds)
@@ -130,7 +131,7 @@ def exchanged(scenario: Scenario) -> Scenario:
 def test_an_exchange_of_the_axes_changes_nothing(
     name: str, model: Model, noise: NoiseKind, tie: TieRule, request: pytest.FixtureRequest
 ) -> None:
-    scenario = replace(uneven(of_model(request.getfixturevalue(name), model)), noise=noise, tie=tie)
+    scenario = replace(uneven(of_model(with_long_steps(request.getfixturevalue(name)), model)), noise=noise, tie=tie)
     draws = draw(scenario, range(6), 3)
     there, steps = fly(scenario, draws)
     back, mirrored = fly(exchanged(scenario), exchanged_draws(draws))
@@ -146,7 +147,7 @@ def test_an_exchange_of_the_axes_and_of_the_sun_changes_nothing(asteroid: Scenar
         replace(asteroid.sun, direction_rad=angle, elevation_rad=elevation)
         for angle, elevation in ((0.7, 0.0), (0.0, 0.7))
     )
-    scenario = of_model(in_space(asteroid), Model.GUARANTEED)
+    scenario = of_model(in_space(with_long_steps(asteroid)), Model.GUARANTEED)
     draws = draw(scenario, range(6), 3)
     there, _ = fly(replace(scenario, sun=in_z), draws)
     back, _ = fly(replace(scenario, sun=in_y), exchanged_draws(draws))
@@ -162,7 +163,7 @@ def test_a_mirrored_engagement_is_mirrored(
     axes: tuple[bool, bool], model: Model, noise: NoiseKind, asteroid: Scenario
 ) -> None:
     # Mirror of both axes (theory, section 9, item 3), and of one axis, with random ties of opposite sign.
-    scenario = replace(uneven(of_model(asteroid, model)), noise=noise, tie=TieRule.RANDOM)
+    scenario = replace(uneven(of_model(with_long_steps(asteroid), model)), noise=noise, tie=TieRule.RANDOM)
     draws = draw(scenario, range(6), 3)
     flips = np.array([-1.0 if flip else 1.0 for flip in axes])
 
@@ -289,7 +290,7 @@ def extremal(scenario: Scenario, runs: int, seed: int) -> tuple[Draws, ScriptedN
 
 @pytest.mark.parametrize("convention", list(Convention))
 def test_the_true_state_is_kept_in_every_convention(convention: Convention, asteroid: Scenario) -> None:
-    scenario = of_model(in_space(asteroid, convention=convention), Model.GUARANTEED)
+    scenario = of_model(in_space(with_long_steps(asteroid), convention=convention), Model.GUARANTEED)
     draws, noise = extremal(scenario, 100, 7)
     flight = Engagements(scenario, draws, noise=noise)
     while flight.flying:

@@ -21,6 +21,7 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import LineOfSight, NoiseKind, Situation
 from infoset import Convention, InformationSetView, RateSensor
 from sim import Record, StepRecord, fly_one
+from tests.long_steps import with_long_steps
 from tests.space import in_space
 
 
@@ -110,7 +111,7 @@ def assert_same(one: Record, other: Record) -> None:
 @pytest.mark.parametrize("noise", NoiseKind)
 @pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-single", "comet-fast"])
 def test_a_record_comes_back_bit_for_bit(name: str, noise: NoiseKind, tmp_path: Path) -> None:
-    flown = fly_one(dataclasses.replace(load_scenario(name), noise=noise), 1, seed=2**70)
+    flown = fly_one(dataclasses.replace(with_long_steps(load_scenario(name)), noise=noise), 1, seed=2**70)
     write_record(flown, tmp_path / "x.npz")
     assert_same(load_record(tmp_path / "x.npz"), flown)
     assert [each.name for each in tmp_path.iterdir()] == ["x.npz"]
@@ -118,7 +119,8 @@ def test_a_record_comes_back_bit_for_bit(name: str, noise: NoiseKind, tmp_path: 
 
 @pytest.mark.parametrize("convention", Convention)
 def test_a_record_in_space_comes_back_bit_for_bit(convention: Convention, tmp_path: Path) -> None:
-    planar = dataclasses.replace(load_scenario("asteroid-1997"), rate_sensor=RateSensor(1.0, 1e-6))
+    planar = with_long_steps(load_scenario("asteroid-1997"))
+    planar = dataclasses.replace(planar, rate_sensor=RateSensor(1.0, 1e-6))
     flown = fly_one(in_space(planar, convention=convention), 1)
     assert {tuple(step.axes) for step in flown.steps} == {("y", "z")}
     ranges = [[axis.measured.get("range") for axis in step.axes.values()] for step in flown.steps]
