@@ -89,6 +89,14 @@ def figures_are_small() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def files_are_not_flushed() -> Iterator[None]:
+    """Do not wait for the disk. Flushes are for a machine that stops, and cost milliseconds for each file."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda _descriptor: None)
+        yield
+
+
 @pytest.fixture(scope="session")
 def brief() -> Scenario:
     """A short scenario with few sections: the last ten seconds of an approach with a known range."""

@@ -147,7 +147,7 @@ def test_a_strategy_of_a_file_in_threads_and_processes(
     (tmp_path / f"{module}.py").write_text(OWN)
     asked = [*command, file, "--runs", 12, "--chunk", 4, "--strategy", f"{module}.py:Half", "-q"]
     assert infoset(*asked, "--out", "threads") == (0, "", "")
-    assert infoset(*asked, "--out", "processes", "--processes", 2) == (0, "", "")
+    assert infoset(*asked, "--out", "processes", "--processes", 2 if command == ["campaign"] else 1) == (0, "", "")
     threads, processes = (CampaignFolder.read(tmp_path / name) for name in ("threads", "processes"))
     assert threads.table().equals(processes.table())
     digest = hashlib.sha256(OWN.encode()).hexdigest()[:16]
@@ -370,10 +370,15 @@ def test_the_rate_is_told_where_nobody_looks(
     ]
 
 
+def _command(file: Path, folder: Path, runs: int) -> list[object]:
+    """The command that begins or resumes a campaign."""
+    return ["campaign", file, "--runs", runs, "--chunk", 8, "--noise", "mixed", "--out", folder, "--resume", "-q"]
+
+
 def _begin(file: Path, folder: Path, runs: int) -> subprocess.Popen[bytes]:
     """Begin or resume a campaign in a process of its own."""
-    arguments = ["campaign", file, "--runs", runs, "--chunk", 8, "--noise", "mixed", "--out", folder, "--resume", "-q"]
-    return subprocess.Popen([sys.executable, "-m", "experiments", *map(str, arguments)], stderr=subprocess.PIPE)
+    arguments = map(str, _command(file, folder, runs))
+    return subprocess.Popen([sys.executable, "-m", "experiments", *arguments], stderr=subprocess.PIPE)
 
 
 def _killed_at_random_moments(file: Path, folder: Path, runs: int, kills: int, seed: int) -> list[int]:
@@ -403,6 +408,11 @@ def _finished(file: Path, folder: Path, runs: int) -> Any:
     with _begin(file, folder, runs) as process:
         _, errors = process.communicate(timeout=300)
     assert (process.returncode, errors) == (0, b"")
+    return _table(folder)
+
+
+def _table(folder: Path) -> Any:
+    """The table of a complete campaign, without temporary files."""
     there = CampaignFolder.read(folder)
     assert there.complete
     assert not list(folder.rglob("*.tmp"))
@@ -410,12 +420,13 @@ def _finished(file: Path, folder: Path, runs: int) -> Any:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="there is no kill -9")
-def test_killed_and_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
+def test_killed_and_resumed(infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path) -> None:
     stored = _killed_at_random_moments(file, tmp_path / "runs", 400, 1, seed=1)
     assert stored == sorted(stored)
     study = with_model(brief, Model.GUARANTEED)  # the default model of the command
     expected = Campaign(study, 400, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
-    assert _finished(file, tmp_path / "runs", 400).equals(expected)
+    assert infoset(*_command(file, tmp_path / "runs", 400)) == (0, "", "")
+    assert _table(tmp_path / "runs").equals(expected)
 
 
 @pytest.mark.slow

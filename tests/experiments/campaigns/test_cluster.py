@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.campaigns.cluster import connected, is_open
+from experiments.campaigns.cluster import PATIENCE_S, connected, is_open
 from experiments.cli import main
 from experiments.common.errors import InputError
 from experiments.interception.scenario_file import scenario_to_toml
@@ -105,7 +105,9 @@ def test_there_is_no_such_host() -> None:
 
 
 @pytest.mark.parametrize("answer", [None, b"HTTP/1.1 400 Bad Request\r\n\r\n" + b" " * 200, b"\x00" * 64])
-def test_something_else_listens(answer: bytes | None) -> None:
+def test_something_else_listens(answer: bytes | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert PATIENCE_S < 10.0
+    monkeypatch.setattr("experiments.campaigns.cluster.PATIENCE_S", PATIENCE_S / 4.0)
     with listening(answer) as address:
         said, after_s = refused(address)
     assert f"no Dask scheduler answers at {address}" in said
