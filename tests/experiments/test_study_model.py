@@ -36,7 +36,7 @@ def model_of(command: str, out: str, tmp_path: Path) -> str:
     "arguments",
     [
         ("campaign", "--runs", 4, "--out", "runs"),
-        ("sweep", *VARY, "--runs", 4, "--out", "runs"),
+        ("sweep", *VARY, "--runs", 1, "--out", "runs"),
         ("compare", "--strategies", "patient", "--runs", 2),
         ("adversary", "--budget", 8),
     ],

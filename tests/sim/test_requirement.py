@@ -76,8 +76,10 @@ def test_looks_after_every_run_are_wrong_in_at_most_5_percent(share: float) -> N
     counts = np.cumsum(np.random.default_rng(3).random((repeats, size)) < share, axis=1)
     fewest_met, most_missed = critical_counts(size, share, watched=True)
     assert ((counts >= fewest_met) | (counts <= most_missed)).any(axis=1).mean() < 0.05
-    fixed = np.minimum(*p_values(np.arange(1, size + 1), counts, share, watched=False))
-    assert (fixed <= 0.025).any(axis=1).mean() > 0.12
+    # Many samples have the same count after the same number of runs.
+    number, same = np.unique(counts + np.arange(1, size + 1) * (size + 1), return_inverse=True)
+    fixed = np.minimum(*p_values(number // (size + 1), number % (size + 1), share, watched=False))
+    assert (fixed <= 0.025)[same.reshape(counts.shape)].any(axis=1).mean() > 0.12
 
 
 def test_a_decision_is_final() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from experiments import load_scenario
 from experiments.interception.runs.experiment import burns_key
 from sim import simulate
 from sim.results import join
-from tests.experiments.command_line import Command
+from tests.experiments.command_line import Command, strict
 
 SETTINGS = ("thruster.impulses_s=[80.0, 40.0, 10.0]", "thruster.last_impulse_s=20.0")
 
@@ -18,10 +20,10 @@ def test_the_burns_of_a_schedule(infoset: Command) -> None:
     """Their shares add up to one, and no time after the cut-off is a burn."""
     options = [option for setting in SETTINGS for option in ("--set", setting)]
     arguments = ["experiment", "asteroid-1997", "--runs", 10, *options]
-    code, out, _ = infoset(*arguments)
+    code, out, _ = infoset(*arguments, "--json", "results.json")
     assert code == 0
     assert "burn, s before arrival" in out
-    curves = infoset.json(*arguments)["curves"]
+    curves = strict(Path("results.json").read_text())["curves"]
     assert len(curves) == 4
     for curve in curves:
         first, second = curve["burns"]
@@ -38,8 +40,8 @@ def test_the_burns_of_a_schedule(infoset: Command) -> None:
 
 def test_without_a_schedule_there_are_no_burns(infoset: Command) -> None:
     arguments = ["experiment", "asteroid-1997", "--runs", 2, "--set", "thruster.last_impulse_s=20.0"]
-    assert "burn" not in infoset(*arguments)[1]
-    assert not any("burns" in curve for curve in infoset.json(*arguments)["curves"])
+    assert "burn" not in infoset(*arguments, "--json", "results.json")[1]
+    assert not any("burns" in curve for curve in strict(Path("results.json").read_text())["curves"])
 
 
 def test_burns_are_columns_of_the_results() -> None:

@@ -81,8 +81,8 @@ def test_every_command_takes_a_strategy_of_a_file(
     few = {
         "experiment": ["--runs", 2],
         "compare": ["--runs", 2],
-        "bound": ["--budget", 20],
-        "adversary": ["--budget", 20],
+        "bound": ["--budget", 6],
+        "adversary": ["--budget", 6],
     }
     numbers: list[Any] = []
     for strategy in ("mine.py:Mine", "symmetric-miss"):
