@@ -199,8 +199,8 @@ class Polytope(PolytopeArrays):
         if not cuts.any():
             return self
         if np.isneginf(limits).any() or (least > most).any():
-            sides, ends = self.constraints()
-            rows, limits = np.vstack([sides, rows[cuts]]), np.concatenate([ends, limits[cuts]])
+            own_rows, own_limits = self.constraints()
+            rows, limits = np.vstack([own_rows, rows[cuts]]), np.concatenate([own_limits, limits[cuts]])
             return self.empty(self.space, least_relaxation(rows, limits))
         lower, upper = self.bounding_box()
         sides = np.vstack([self.normals, rows[cuts]]), np.concatenate([self.offsets, limits[cuts]])

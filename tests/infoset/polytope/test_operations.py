@@ -258,8 +258,8 @@ def test_balls_and_zonotopes() -> None:
         assert outer.chebyshev_centre()[1] == pytest.approx(2.0)
         assert np.linalg.norm(inner.vertices - 1.0, axis=1) == pytest.approx(2.0)
         assert np.linalg.norm(outer.vertices - 1.0, axis=1).max() <= 2.0 * most
-    for outer in (True, False):
-        assert Polytope.from_ball([1e10, 1.0], 1e-8, outer=outer).dimension < 2
+    for around in (True, False):
+        assert Polytope.from_ball([1e10, 1.0], 1e-8, outer=around).dimension < 2
     generators = np.random.default_rng(0).normal(size=(5, 3))
     zonotope = Polytope.from_zonotope([1.0, 2.0, 3.0], generators)
     directions = np.random.default_rng(1).normal(size=(20, 3))
