@@ -112,8 +112,11 @@ def is_slow(line: str) -> bool:
     return any(re.search(pattern, line) for pattern in SLOW)
 
 
-def run(line: str, folder: Path) -> None:
-    """Run a line in a folder, in this process if possible."""
+def run(line: str, folder: Path, written: set[str] | None = None) -> None:
+    """Run a line in a folder, in this process if possible.
+
+    Figures of the commands `written` are drawn, but not written; a command that writes figures is added to them.
+    """
     words = shlex.split(reduced(line.replace(".venv/bin/", "")))
     assert words, line
     if words[0] == "python":
@@ -130,8 +133,17 @@ def run(line: str, folder: Path) -> None:
     if "--out" in words and (folder / words[words.index("--out") + 1]).exists():
         words.append("--overwrite")  # another line of the page wrote there
     printed, complained = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(complained), pytest.raises(SystemExit) as left:
-        main(words[1:])
+    with pytest.MonkeyPatch.context() as patch:
+        if written is not None and "--out" in words:
+            if words[1] in written:
+                patch.setattr("experiments.common.figure_style.figure_bytes", lambda _: [("pdf", b""), ("png", b"")])
+            written.add(words[1])
+        with (
+            contextlib.redirect_stdout(printed),
+            contextlib.redirect_stderr(complained),
+            pytest.raises(SystemExit) as left,
+        ):
+            main(words[1:])
     assert not left.value.code, f"{line}\n{printed.getvalue()}\n{complained.getvalue()}"
     if into is not None:
         into.write_text(printed.getvalue(), encoding="utf-8")
@@ -163,6 +175,10 @@ def quick_lines(page: Page) -> list[str]:
     return [line for line in lines_to_run(page) if not is_slow(line)]
 
 
+WRITTEN: set[str] = set()
+"""Commands whose figures are written already: writing takes most of the time of a figure."""
+
+
 def test_the_quick_lines_run(page: Page, pages: list[Page], folder: Path) -> None:
     lines = quick_lines(page)
     for other in pages[: [each.name for each in pages].index(page.name)]:
@@ -172,7 +188,7 @@ def test_the_quick_lines_run(page: Page, pages: list[Page], folder: Path) -> Non
         tested = [line for line, _ in same]  # the other page begins with them
         lines = [line for line in lines if line not in tested]
     for line in lines:
-        run(line, folder)
+        run(line, folder, WRITTEN)
 
 
 @pytest.mark.slow

@@ -54,6 +54,12 @@ def planar(short: Scenario) -> LowerBound:
 
 
 @pytest.fixture
+def known(planar: LowerBound, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command gets the bound of the short scenario without computing it again."""
+    monkeypatch.setattr("experiments.interception.runs.bound.lower_bound", lambda *_, **__: planar)
+
+
+@pytest.fixture
 def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
     file = tmp_path / "short.toml"
     file.write_text(scenario_to_toml(short))
@@ -105,6 +111,7 @@ def test_bound_into_a_folder(
     assert re.search(r"^guaranteed: ", out, re.MULTILINE)
 
 
+@pytest.mark.usefixtures("known")
 def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
     code, out, err = infoset(
         short_file, "--strategies", "symmetric-miss", "--model", "paper", "--json", "-", "--budget", 0
@@ -158,6 +165,7 @@ def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, planar: L
     assert half == pytest.approx(0.5 * expected.pair.apart_m)
 
 
+@pytest.mark.usefixtures("known")
 def test_no_name_and_no_digit_is_cut_at_60_columns(
     infoset: Infoset, short_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -202,6 +210,7 @@ def test_what_is_wrong_is_said_before_the_work(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("known")
 def test_nothing_is_replaced_unless_told(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
     precious = tmp_path / "x.json"
     precious.write_text("precious")

@@ -76,8 +76,14 @@ def test_a_strategy_of_a_file_is_simulated_and_can_be_pickled(mine: Path, brief:
      ("adversary", "--strategy")],
 )  # fmt: skip
 def test_every_command_takes_a_strategy_of_a_file(
-    command: str, option: str, mine: Path, brief_file: Path, capsys: pytest.CaptureFixture[str]
+    command: str,
+    option: str,
+    mine: Path,
+    brief_file: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("sim.bound.REFINEMENTS", 0)
     few = {
         "experiment": ["--runs", 2],
         "compare": ["--runs", 2],
