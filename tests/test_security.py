@@ -56,11 +56,15 @@ def test_there_are_sources() -> None:
     assert all(SOURCES.values())
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_nothing_that_runs_what_a_file_says(package: str) -> None:
+@pytest.fixture(scope="module", params=PACKAGES)
+def trees(request: pytest.FixtureRequest) -> dict[Path, ast.Module]:
+    """The syntax trees of a package, by file."""
+    return {file: ast.parse(file.read_text()) for file in SOURCES[request.param]}
+
+
+def test_nothing_that_runs_what_a_file_says(trees: dict[Path, ast.Module]) -> None:
     found = []
-    for file in SOURCES[package]:
-        tree = ast.parse(file.read_text())
+    for file, tree in trees.items():
         for node in ast.walk(tree):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
@@ -73,9 +77,9 @@ def test_nothing_that_runs_what_a_file_says(package: str) -> None:
     assert not found
 
 
-def test_arrays_are_read_and_written_without_pickle() -> None:
-    for file in (file for files in SOURCES.values() for file in files):
-        for call in calls(ast.parse(file.read_text())):
+def test_arrays_are_read_and_written_without_pickle(trees: dict[Path, ast.Module]) -> None:
+    for file, tree in trees.items():
+        for call in calls(tree):
             of_numpy = isinstance(call.func, ast.Attribute) and ast.unparse(call.func).startswith(("np.", "numpy."))
             if of_numpy and name_of(call) in {"load", "read_array", "write_array"}:
                 given = {each.arg: each.value for each in call.keywords}

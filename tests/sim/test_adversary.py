@@ -136,7 +136,7 @@ def test_the_same_seed_finds_the_same_whatever_the_threads(worst: WorstEngagemen
     assert (again.miss_m, again.history) == (worst.miss_m, worst.history)
     assert np.array_equal(again.errors["angle"], worst.errors["angle"])
     assert np.array_equal(again.position_m, worst.position_m)
-    other = find_worst(coarse, budget=20, seed=2)
+    other = find_worst(coarse, budget=4, seed=2)
     assert other.history[0] != worst.history[0]
 
 

@@ -235,7 +235,8 @@ def test_the_sets_of_both_planes_are_side_by_side(records: list[Record]) -> None
         assert {text.get_text() for text in axes.texts} == {f"{section.range_m / 1e3:.0f} km" for section in chosen}
 
 
-def test_an_animation_shows_both_axes(records: list[Record]) -> None:
+def test_an_animation_shows_both_axes(brief: Scenario) -> None:
+    records = [fly_one(replace(in_space(brief), noise=kind)) for kind in NoiseKind]
     sizes = []
     for shown in (records[:1], records):
         with Image.open(BytesIO(animate(shown, GIF, 2))) as animation:
