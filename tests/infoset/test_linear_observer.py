@@ -590,12 +590,14 @@ def test_an_enlarged_polygon_contains_the_sum_with_the_box(points: list[tuple[fl
     out = np.zeros((len(polygon) + 4, 2))
     count = enlarge(polygon, len(polygon), 0.0, 0.0, *half, out)
     ring = [(Fraction(x), Fraction(y)) for x, y in out[:count].tolist()]
-    assert hull(ring)
-    for x, y in polygon:
-        for sign_x, sign_y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-            # Coordinates are rounded by much less than half a box.
-            corner = (Fraction(x) + sign_x * Fraction(half[0]) / 2, Fraction(y) + sign_y * Fraction(half[1]) / 2)
-            assert len(hull([*ring, corner])) == len(hull(ring))
+    # Coordinates are rounded by much less than half a box.
+    half_x, half_y = (Fraction(each) / 2 for each in half)
+    corners = [
+        (Fraction(x) + sign_x * half_x, Fraction(y) + sign_y * half_y)
+        for x, y in polygon.tolist()
+        for sign_x, sign_y in ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    ]
+    assert hull([*ring, *corners]) == hull(ring)
     assert np.abs(out[:count].max(axis=0) - polygon.max(axis=0)).max() <= 6.0 * max(half)
 
 

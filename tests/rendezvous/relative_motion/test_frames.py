@@ -27,13 +27,13 @@ def test_the_papers_axes_are_what_they_say() -> None:
     assert ORBITAL.vectors_to(HILL, np.array([-3.0, 7.0, 2.0])).tolist() == [7, 3, 2]
 
 
-@pytest.mark.parametrize(("first", "second"), list(itertools.product(FRAMES, FRAMES)))
 @given(STATES)
-def test_there_and_back_is_exact(first: Frame, second: Frame, state: list[float]) -> None:
+def test_there_and_back_is_exact(state: list[float]) -> None:
     given_state = np.array(state)
-    assert second.states_to(first, first.states_to(second, given_state)).tolist() == given_state.tolist()
-    conversion = first.conversion_to(second)
-    assert (conversion @ conversion.T).tolist() == np.eye(6).tolist()
+    for first, second in itertools.product(FRAMES, FRAMES):
+        assert second.states_to(first, first.states_to(second, given_state)).tolist() == given_state.tolist()
+        conversion = first.conversion_to(second)
+        assert (conversion @ conversion.T).tolist() == np.eye(6).tolist()
 
 
 def test_matrices_go_with_states() -> None:
