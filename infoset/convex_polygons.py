@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from infoset import polygon_batches as kernels
 from infoset._set_arguments import axis_numbers, finite_values, need_plot_axes, not_negative, random_source
 from infoset.arrays import Flags, Floats
-from infoset.limits import Limits, need_pair, real_values
+from infoset.limits import Limits, need_pair, real_values, shown
 from infoset.pictures import outlines_svg
 from infoset.polygon_arrays import PolygonArrays
 from infoset.renamed import renamed
@@ -30,9 +30,10 @@ class ConvexPolygons(PolygonArrays):
     ----------
     vertices : array_like, shape (..., V, 2)
         The first `counts` rows are the vertices in order around the polygon: one for a point, two for a segment, none
-        for the empty set. Clockwise rings are reversed.
+        for the empty set; the others are padding. `polygon` returns those of a single polygon without padding.
+        Clockwise rings are reversed.
     counts : array_like of int, shape (...)
-        Number of vertices.
+        Number of vertices. `from_vertices` needs none.
 
     Raises
     ------
@@ -42,8 +43,9 @@ class ConvexPolygons(PolygonArrays):
 
     Notes
     -----
-    Operations return new objects. Their arguments are broadcast over the batch, and a single polygon is broadcast to
-    the shape of the other polygons. The cost of an operation is for one polygon of n vertices. All arguments are
+    Operations return new objects. Their arguments are broadcast over the batch. A single polygon is broadcast to the
+    shape of the other polygons, and of several points or directions: `contains` of a polygon takes any number of
+    points. The cost of an operation is for one polygon of n vertices. All arguments are
     checked: numbers are finite (TypeError if they are not real numbers), and shapes fit (ValueError).
 
     An empty member of a batch does not affect the others: sets made from it are empty, its support function is -inf,
@@ -51,7 +53,7 @@ class ConvexPolygons(PolygonArrays):
     empty set has no such points; then a ValueError is raised.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
-    `point in P`, `P <= Q` (subset).
+    `point in P`, `P <= Q` (subset). `P == Q` compares objects; `equals` compares sets.
     """
 
     __array_ufunc__ = None
@@ -84,7 +86,7 @@ class ConvexPolygons(PolygonArrays):
         return f"<{name}, area {self.area():.3g}>"
 
     def polytope(self) -> Polytope:
-        """Return a single polygon as a `Polytope`; for operations in more dimensions."""
+        """Return a single polygon as a `Polytope`; `ConvexPolygons.from_points(polytope.vertices)` is the reverse."""
         from infoset.polytope import Polytope
 
         vertices = self.polygon()
@@ -227,7 +229,10 @@ class ConvexPolygons(PolygonArrays):
         the coordinates; masked where the line misses the polygon. A ValueError is raised if it misses a single polygon.
         """
         (axis,) = axis_numbers(axes, 2, 1)
-        intervals: tuple[Floats, Floats] = self.cut(np.eye(2)[axis], values, values).project(1 - axis)
+        section = self.cut(np.eye(2)[axis], values, values)
+        if not self.shape and section.is_empty:
+            raise ValueError(f"the line where coordinate {axis} is {shown(values)} does not meet the polygon")
+        intervals: tuple[Floats, Floats] = section.project(1 - axis)
         return intervals
 
     def reduce_outward(self, cap: int) -> ConvexPolygons:
@@ -257,20 +262,21 @@ class ConvexPolygons(PolygonArrays):
 
     def support_function(self, direction: ArrayLike) -> Floats:
         """Return max(direction . p), shape (...); -inf for the empty set. O(n); rounded as one scalar product."""
-        return self._measure(kernels.support, self._vectors(direction, "direction"))[..., 0]
+        one, directions = self._and_vectors(direction, "direction")
+        return one._measure(kernels.support, directions)[..., 0]
 
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a direction, shape (..., 2). O(n)."""
-        return self._known(
-            self._measure(kernels.support, self._vectors(direction, "direction"))[..., 1:], "support vector"
-        )
+        one, directions = self._and_vectors(direction, "direction")
+        return one._known(one._measure(kernels.support, directions)[..., 1:], "support vector")
 
     def margin(self, point: ArrayLike) -> Floats:
         """Return the signed distance of a point, shape (2,) or (..., 2), from the boundary, positive inside.
 
         -inf for the empty set. O(n), within rounding of the coordinates.
         """
-        return self._measure(kernels.margin, self._vectors(point, "point"))[..., 0]
+        one, points = self._and_vectors(point, "point")
+        return one._measure(kernels.margin, points)[..., 0]
 
     def contains(self, point: ArrayLike, tolerance: float = 0.0) -> Flags:
         """Return whether a point, shape (2,) or (..., 2), is inside, on the boundary, or within a distance of the set.
@@ -278,7 +284,8 @@ class ConvexPolygons(PolygonArrays):
         O(n). Exact for a tolerance of 0: rounding does not affect the answer.
         """
         not_negative("tolerance", tolerance)
-        values = self._measure(kernels.holds, self._vectors(point, "point"))
+        one, points = self._and_vectors(point, "point")
+        values = one._measure(kernels.holds, points)
         return np.asarray((values[..., 0] > 0.0) | (values[..., 1] >= -tolerance if tolerance else False))
 
     def is_subset(self, other: ConvexPolygons, tolerance: float = 0.0) -> Flags:
@@ -338,7 +345,8 @@ class ConvexPolygons(PolygonArrays):
 
     def closest_point(self, point: ArrayLike) -> Floats:
         """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside. O(n), rounded."""
-        return self._known(self._measure(kernels.nearest, self._vectors(point, "point"))[..., :2], "closest point")
+        one, points = self._and_vectors(point, "point")
+        return one._known(one._measure(kernels.nearest, points)[..., :2], "closest point")
 
     def hausdorff_distance(self, other: ConvexPolygons) -> Floats:
         """Return the Hausdorff distance, shape (...); inf between an empty and a nonempty set. O(n m), rounded."""

@@ -106,9 +106,11 @@ class PolygonArrays:
     def from_points(cls, points: ArrayLike) -> Self:
         """Return the convex hull of points, shape (n, 2) or (..., n, 2); no points give the empty set.
 
-        O(n) for sorted points, O(n^2) at worst. Vertices are points; points that protrude by less than rounding are
-        dropped.
+        Different numbers of points are a list of arrays of shape (n, 2), as in `from_vertices`. O(n) for sorted points,
+        O(n^2) at worst. Vertices are points; points that protrude by less than rounding are dropped.
         """
+        if isinstance(points, list | tuple) and len({np.shape(one) for one in points}) > 1:
+            return cls.stack([cls.from_points(one) for one in points])
         array = finite_values("points", points, "...", "k", 2)
         return cls.unchecked(array, np.full(array.shape[:-2], array.shape[-2]))._make(0, kernels.hull)
 
@@ -302,6 +304,12 @@ class PolygonArrays:
             value = value.filled(0.0) if (self.is_empty | ~masked).all() else value
         return self._spread(finite_values(name, value, "...", 2), name, (2,))
 
+    def _and_vectors(self, value: ArrayLike, name: str) -> tuple[Self, Floats]:
+        """Return the polygons and a vector for each; a single polygon is broadcast to the batch of the vectors."""
+        values = value if self.shape or isinstance(value, np.ma.MaskedArray) else real_values(name, value)
+        one = self if self.shape else self.broadcast_to(np.shape(values)[:-1])
+        return one, one._vectors(values, name)
+
     def _scalars(self, value: ArrayLike, name: str) -> Floats:
         """Return a number for each polygon, shape (B,); it may be infinite."""
         return self._spread(bound_values(name, value), name, ())
@@ -316,8 +324,11 @@ class PolygonArrays:
                     raise ValueError
                 spread[...] = values
             except ValueError:
+                several = not self.shape and values.shape[values.ndim - len(last) :] == last
+                remedy = "; broadcast_to makes a batch of a single polygon" if several else ""
                 raise ValueError(
-                    f"{name} must have the shape {last}, or one that can be broadcast to {shape}: got {values.shape}"
+                    f"{name} must have the shape {last}, or one that can be broadcast to {shape}: "
+                    f"got {values.shape}{remedy}"
                 ) from None
             values = spread
         return _plain(values.reshape(self.counts.size, *last))

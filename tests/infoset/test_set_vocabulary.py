@@ -94,6 +94,27 @@ def test_polytopes_from_and_to_shapely() -> None:
             operation(Polytope.empty(3))
 
 
+def test_a_single_polygon_takes_many_points_and_directions() -> None:
+    square, points = ConvexPolygons.from_box([0, 0], [2, 2]), np.array([[[1.0, 1.0], [3.0, 1.0], [5.0, 6.0]]])
+    assert square.contains(points).tolist() == [[True, False, False]]
+    assert square.margin(points).tolist() == [[1.0, -1.0, -5.0]]
+    assert square.closest_point(points).tolist() == [[[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]]
+    assert square.support_function(points).tolist() == [[4.0, 8.0, 22.0]]
+    assert square.support_vector(points).tolist() == [[[2.0, 2.0]] * 3]
+    assert square.contains(square.sample(20)).all()
+    assert not ConvexPolygons.empty().contains(points).any()
+    assert square.contains(np.zeros((0, 2))).shape == (0,)
+    with pytest.raises(ValueError, match=r"\(2, 2\); broadcast_to makes a batch of a single polygon"):
+        square.cut([[1, 0], [0, 1]], 0.0, 1.0)  # for a Polytope this is one intersection
+
+
+def test_hulls_of_lists_and_a_line_beside_a_polygon() -> None:
+    one, two = [[0, 0], [1, 0], [0, 1]], [[0, 0], [4, 0], [4, 4], [0, 4], [1, 1]]
+    assert ConvexPolygons.from_points([one, two]).area().tolist() == [0.5, 16.0]
+    with pytest.raises(ValueError, match=r"the line where coordinate 0 is 5\.0 does not meet the polygon"):
+        ConvexPolygons.from_points(one).slice(0, 5.0)
+
+
 SQUARE, CUBE = ConvexPolygons.from_box([0, 0], [1, 1]), Polytope.from_box([0, 0, 0], [1, 1, 1])
 EYE = np.eye(3)
 BAD_NUMBERS: list[Any] = [np.nan, np.inf, "1", None, 1e70, 1j, np.ma.masked_array([1.0], [True])]
