@@ -226,7 +226,12 @@ class ConvexPolygons(PolygonArrays):
         """Return the interval of the other coordinate where a coordinate (0 or 1) has a value: shape (...).
 
         `axes` is an integer, or a sequence of one; `values` has the shape () or (...). O(n), within a few ulp of
-        the coordinates; masked where the line misses the polygon. A ValueError is raised if it misses a single polygon.
+        the coordinates; masked where the line misses a member of a batch.
+
+        Raises
+        ------
+        ValueError
+            If the line misses a single polygon.
         """
         (axis,) = axis_numbers(axes, 2, 1)
         section = self.cut(np.eye(2)[axis], values, values)

@@ -30,7 +30,9 @@ class Inconsistency:
     step : ndarray of int
         Step whose measurement made the set empty; -1 if the set is not empty.
     output : ndarray of int
-        Output whose bounds made it empty, from 0, after the outputs before it. For noise in a polytope, its half-space.
+        Output whose bounds made it empty, from 0, after the outputs before it. For noise in a set, the row of
+        the normals of the polytope (of a polygon V, `V.polytope().normals`), or of its projection on the measured
+        outputs. 0 if the set is not empty.
     excess : ndarray
         Least enlargement of these bounds, all others unchanged, for which a state exists, in the unit of the output; 0
         if the set is not empty.
@@ -71,7 +73,7 @@ class Estimate:
 
     @property
     def polytopes(self) -> tuple[Polytope, ...]:
-        """The set of each run."""
+        """The set of each run; a tuple of one set for a single run."""
         if isinstance(self.sets, Polytopes):
             empty = Polytope.empty(self.states)
             return tuple(empty if member is None else member.polytope for member in self.sets.members)
@@ -128,7 +130,7 @@ class LinearObserver:
         C.
     initial : ConvexPolygons, Polytope or Zonotope
         Set of the state at step 0, before its measurement; for two states also one polygon for each run, shape (B,).
-    noise : array_like, shape () or (q,), or ConvexPolygons or Polytope
+    noise : array_like, shape () or (q,), or ConvexPolygons, Polytope or Zonotope
         Half-widths of the box V, or V.
     disturbance : ConvexPolygons, Polytope or Zonotope, optional
         W; without it the point 0.

@@ -15,6 +15,9 @@ from infoset.arrays import Floats
 class Zonotope:
     """The set of centre + t_1 g_1 + ... + t_m g_m with all -1 <= t_i <= 1.
 
+    An argument of `LinearObserver`. For operations on sets, `Polytope.from_zonotope(z.centre, z.generators)` or the
+    same method of `ConvexPolygons` converts it.
+
     Parameters
     ----------
     centre : array_like, shape (n,)

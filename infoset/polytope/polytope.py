@@ -51,7 +51,8 @@ class Polytope(PolytopeArrays):
     n.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
-    `point in P`, `P <= Q` (subset, to rounding).
+    `point in P`, `P <= Q` (subset, to rounding). `P == Q` compares objects; `equals` compares sets. The vertices are in
+    no order; `plot` and `to_shapely` order those of a set of the plane.
     """
 
     __array_ufunc__ = None
@@ -302,7 +303,10 @@ class Polytope(PolytopeArrays):
         return np.asarray(np.maximum(beyond.max(axis=-1, initial=-np.inf), away.max(axis=-1, initial=-np.inf)))
 
     def margin(self, points: ArrayLike) -> Floats:
-        """Return the distances of `points`, shape (..., n), from the nearest facet, positive inside: -`excess`."""
+        """Return the distances of `points`, shape (..., n), from the nearest facet, positive inside: -`excess`.
+
+        Outside, -`margin` is at most the `distance`.
+        """
         return -self.excess(points)
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
