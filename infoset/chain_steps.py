@@ -201,12 +201,13 @@ def cut(right: Chain, left: Chain, rings: Floats, tau: float, lower: float, uppe
     """Intersect a section at time to go `tau` with the band lower <= z <= upper.
 
     Return whether it lives, and the smaller overlap of section and band at the two borders, m: minus their distance if
-    they do not intersect. If the intersection is empty, the section is unchanged.
+    they do not intersect. If the intersection is empty, the section is unchanged. A band with `lower` above `upper` is
+    empty: that of a label behind x = 0, or beyond the range at which the error bound is zero.
     """
     least, greatest = heights(right, left, rings, tau)
     overlap = min(greatest - lower, upper - least)
-    if overlap < 0.0:
-        return False, overlap
+    if overlap < 0.0 or lower > upper:
+        return False, min(overlap, upper - lower)
     right_height, left_height = origin_height(right, tau), origin_height(left, tau)
     right_first, right_last, left_first, left_last = right.begin, right.end - 1, left.begin, left.end - 1
     if greatest > upper:

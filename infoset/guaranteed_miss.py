@@ -28,6 +28,8 @@ LABELS = 4
 """Labels replayed for one step; one more on each side serves for extrapolation."""
 MOST_LABELS = LABELS + 2
 PIECES = LABELS + 1
+NEAREST_OUTSIDE = 0.005
+"""Least distance of the label below the others, in their spacing: a line through both amplifies rounding 200 times."""
 MOST_LEAVING_WINDOWS = 16
 """Greatest number of windows of the labels that leave at one step, with rates: a power of two."""
 LOOSE = 1.25
@@ -166,6 +168,11 @@ def bound_leaving(
             # The bands are convex only on the window.
             continue
         label = last if k == LABELS - 1 and spacing > 0.0 else first + k * spacing
+        if k < 0 and label <= travelled:
+            # No section exists behind x = 0. A much shorter distance would amplify rounding errors.
+            label = travelled + 0.5 * (first - travelled)
+            if first - label < NEAREST_OUTSIDE * spacing:
+                continue
         row = PROBE
         if k == 0:
             row = LOWER

@@ -439,7 +439,7 @@ def shift_section(
     """
     tau = time_to_go(label, elapsed, law)
     chain_steps.shift(right, left, tau, -impulse)
-    if law.impulse_error > 0.0:
+    if law.impulse_error > 0.0 or law.pointing_across > 0.0:
         chain_steps.spread(right, left, tau, impulse_doubt(impulse, across, law))
 
 

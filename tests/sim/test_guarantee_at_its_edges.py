@@ -344,3 +344,49 @@ def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_le
     results = simulate(scenario, 8, seed=1)
     assert sound(results)
     assert (results.miss_m > 5e5).all()
+
+
+@pytest.mark.parametrize(
+    ("error_at_33_km_rad", "measured_rad", "impulse_m_s", "greatest_z_m"),
+    [
+        # Of the four labels and two more, the least would be behind x = 0 at this step.
+        (2.3e-4, 2.07e-4, 4.0, 4.4),
+        # The greatest would be beyond the range at which the error bound is zero.
+        (2.3e-7, 1.61e-4, 0.0, 40.0),
+    ],
+)
+def test_phi_is_extrapolated_from_labels_with_sections_only(
+    error_at_33_km_rad: float, measured_rad: float, impulse_m_s: float, greatest_z_m: float
+) -> None:
+    """All labels leave at the first step: the misses after one angle and one impulse, at V_z = 0, by hand.
+
+    At the range x the angle leaves z within x tan(alpha_m -+ b) and the start, the impulse moves z by -k x/e.
+    """
+    e, x_m, error_rad = 58e3, (5010.0, 33e3), 2.3e-4
+    box = StateBox((-greatest_z_m, greatest_z_m), x_m, (0.0, 0.0), (-e, -e))
+    sensor = AngleSensor(0.5, error_at_33_km_rad, error_rad, x_m[1])
+    model = SetModel(e, 0.5, box, sensor, range_threshold_m=5e3, initial_set=InitialSet.BOX, kind=Model.GUARANTEED)
+    information = InformationSet(model)
+    information.measure_angle(measured_rad)
+    information.shift(impulse_m_s)
+    information.drop_below_threshold()
+    x = np.linspace(*x_m, 10_001)
+    bound = error_rad + (error_at_33_km_rad - error_rad) * x / x_m[1]
+    least = np.maximum(x * np.tan(measured_rad - bound), -greatest_z_m) - impulse_m_s * x / e
+    greatest = np.minimum(x * np.tan(measured_rad + bound), greatest_z_m) - impulse_m_s * x / e
+    phi_m, exists = information.guaranteed_miss()
+    assert exists.all()
+    assert phi_m[0] >= max(greatest.max(), -least.min())
+
+
+def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_speed() -> None:
+    """An impulse of 10 m/s along y, turned by 0.1 rad at most, changes V_z by up to 10 sin(0.1) m/s."""
+    box = StateBox((-1.0, 1.0), (1e4, 2e4), (0.0, 0.0), (-1e3, -1e3), (-1.0, 1.0), (0.0, 0.0))
+    sensor = AngleSensor(1.0, 1e-3, 1e-3, 1e4)
+    model = SetModel(1e3, 1.0, box, sensor, initial_set=InitialSet.BOX, kind=Model.GUARANTEED, pointing_error_rad=0.1)
+    information = InformationSet(model)
+    information.shift([10.0, 0.0])
+    for section in information.sections():
+        changes_m_s = section.polygon.polygon()[:, 0]
+        assert changes_m_s.max() >= 10.0 * math.sin(0.1)
+        assert changes_m_s.min() <= -10.0 * math.sin(0.1)
