@@ -11,6 +11,7 @@ import numpy as np
 from guidance import NoiseKind, TieRule
 from infoset import AngleSensor, Bias, StateBox
 from infoset.arrays import Floats
+from sim.gravity import greatest_impulses_m_s, with_gravity
 from sim.scenario import Scenario
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
@@ -140,7 +141,8 @@ def generator(seed: int, run: int, stream: int) -> np.random.Generator:
 def greatest_number_of_steps(scenario: Scenario) -> int:
     """Return the number of steps after which every start of the dispersion has passed its closest approach.
 
-    A ValueError is raised if they are more than `MOST_STEPS`.
+    The time at the lowest closing speed is increased by the share of it that gravity can take away, at least by 1 %.
+    A ValueError is raised if the time without this increase has more than `MOST_STEPS` steps.
     """
     box = scenario.dispersion
     slowest = min(-box.vx_m_s[0], -box.vx_m_s[1])
@@ -150,4 +152,7 @@ def greatest_number_of_steps(scenario: Scenario) -> int:
             f"a flight may take at most {MOST_STEPS} steps: {box.x_m[1]:g} m at {slowest:g} m/s in steps of "
             f"{scenario.set_model.step_s:g} s are {steps:.3g}; lengthen the step"
         )
-    return math.ceil(1.01 * box.x_m[1] / (slowest * scenario.set_model.step_s)) + 2
+    model = scenario.set_model
+    model = with_gravity(model, scenario.sun, greatest_impulses_m_s(model, scenario.thruster))
+    longer = max(1.01, 1.0 / (1.0 - min(model.gravity_speed_change, 0.75)))
+    return math.ceil(longer * box.x_m[1] / (slowest * model.step_s)) + 2

@@ -113,7 +113,12 @@ def test_no_stale_kernel_is_loaded(tmp_path: Path) -> None:
         "caller": "from infoset import callee\nfrom infoset._compile import entry\n\n\n"
         "@entry\ndef call(x):\n    return callee.times(x)\n",
     }
-    changes = ({}, {"constant": "FACTOR = 4.0\n"}, {"callee": texts["callee"].replace("FACTOR * x", "x - FACTOR")}, {})
+    changes: tuple[dict[str, str], ...] = (
+        {},
+        {"constant": "FACTOR = 4.0\n"},
+        {"callee": texts["callee"].replace("FACTOR * x", "x - FACTOR")},
+        {},
+    )
     done = subprocess.run(
         [sys.executable, "-B", "-c", PROGRAM, str(package)],
         input=json.dumps([texts | changed for changed in changes]),

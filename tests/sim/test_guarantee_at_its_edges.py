@@ -18,7 +18,7 @@ from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet,
 from infoset.arrays import Floats
 from infoset.section_law import BOUND_SLACK, SectionLaw, section_laws
 from infoset.section_life import LastSight, rate_band
-from sim import Outcome, Results, Scenario, simulate
+from sim import Outcome, Results, Scenario, Sun, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 
@@ -390,3 +390,32 @@ def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_sp
         changes_m_s = section.polygon.polygon()[:, 0]
         assert changes_m_s.max() >= 10.0 * math.sin(0.1)
         assert changes_m_s.min() <= -10.0 * math.sin(0.1)
+
+
+@pytest.mark.parametrize("direction_rad", [0.0, np.pi])
+def test_flights_that_gravity_slows_down_reach_their_closest_approach(direction_rad: float) -> None:
+    parameter, distance_m, speed = 1.324948e20, 1.5e11, 1e3
+    flight_s = float(np.sqrt(0.15 * distance_m**3 / parameter))
+    start = speed * flight_s
+    offset = 0.05 * start
+    bounds = StateBox(
+        (-offset, offset),
+        (0.98 * start, 1.02 * start),
+        (-0.1 * offset / flight_s, 0.1 * offset / flight_s),
+        (-1.001 * speed, -0.999 * speed),
+    )
+    step_s = flight_s / 60.0
+    model = SetModel(
+        speed,
+        step_s,
+        bounds,
+        AngleSensor(step_s, 1e-4, 1e-4, start),
+        range_threshold_m=0.02 * start,
+        initial_set=InitialSet.BOX,
+        kind=Model.GUARANTEED,
+        sections=9,
+    )
+    sun = Sun(parameter, distance_m, direction_rad)
+    results = simulate(Scenario("slow", "", sun, start, bounds, model, None, Thruster(1.0, 0.0, 1.0)), 4)
+    assert sound(results)
+    assert (results.miss_m < 0.2 * start).all()
