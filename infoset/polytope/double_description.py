@@ -11,9 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from infoset._compile import entry
 from infoset.arrays import Flags, Floats, Integers
 from infoset.polytope._scaling import powers_of_two
 from infoset.polytope.polytope import Polytope
@@ -23,6 +21,8 @@ _ON = 64.0 * EPSILON
 """Distance of a vertex from a plane that contains it, relative to the terms of the distance."""
 _THIN = 3e-8
 """Least thickness of a set, relative to its coordinates."""
+_ENTRIES = 20_000_000
+"""Greatest size of a working array."""
 _PARALLEL = 1e-14
 _INCIDENT = 1e-8
 _SINGULAR = 1e-6
@@ -186,32 +186,13 @@ def _adjacent(incidence: Flags, first: Integers, second: Integers, size: int) ->
     numbers = incidence.astype(np.float32)
     i, j = np.nonzero(numbers[first] @ numbers[second].T >= size - 1)
     common = incidence[first[i]] & incidence[second[j]]
-    bits = np.packbits(incidence, axis=1)
-    words = np.zeros((len(bits), -(-bits.shape[1] // 8) * 8), dtype=np.uint8)
-    words[:, : bits.shape[1]] = bits
     edge = np.zeros(len(i), dtype=bool)
-    _find_edges(words.view(np.uint64), first[i], second[j], edge)
+    rows = max(1, _ENTRIES // len(incidence))
+    for start in range(0, len(i), rows):
+        part = common[start : start + rows]
+        holders = part.astype(np.float32) @ numbers.T >= part.sum(axis=1)[:, None]
+        edge[start : start + rows] = holders.sum(axis=1) == 2
     return first[i[edge]], second[j[edge]], common[edge]
-
-
-@entry
-def _find_edges(words: NDArray[np.uint64], first: Integers, second: Integers, edge: Flags) -> None:
-    """Mark the pairs of rows whose common bits no third row has; O(pairs rows) for most sets."""
-    count, width = words.shape
-    for pair in range(len(first)):
-        one, other = first[pair], second[pair]
-        holders = 0
-        for row in range(count):
-            holds = True
-            for word in range(width):
-                if words[one, word] & words[other, word] & ~words[row, word]:
-                    holds = False
-                    break
-            if holds:
-                holders += 1
-                if holders > 2:
-                    break
-        edge[pair] = holders == 2
 
 
 def _facets(incidence: Flags, size: int) -> Integers:
