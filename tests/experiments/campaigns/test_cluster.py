@@ -213,9 +213,10 @@ def test_two_workers_give_the_same_bits_and_one_that_dies_loses_nothing(
     (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
     workers = [processes.worker(), processes.worker()]
     processes.wait_for(2)
-    asked = ("campaign", "brief.toml", "--noise", "mixed", "--chunk", 16, "--dask", processes.address, "--out")
+    asked = ("campaign", "brief.toml", "--model", "paper", "--noise", "mixed", "--chunk", 16)
+    asked = (*asked, "--dask", processes.address, "--out")
     code, out, err = infoset(*asked, "two", "--runs", 400)
-    assert (code, err) == (0, "2 Dask workers, 2 threads\n")
+    assert (code, err) == (0, "2 Dask workers, 2 threads\nwrote shards, scenario.toml, summary.json in two\n")
     assert "400 runs" in out
     expected = Campaign(brief, 4000, tmp_path / "here", noise=CampaignNoise.MIXED).run().table
     assert CampaignFolder.read(tmp_path / "two").table().equals(expected.slice(0, 400))
@@ -242,7 +243,7 @@ def test_a_scheduler_that_dies_is_one_message_and_the_campaign_goes_on_without(
     (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
     processes.worker()
     processes.wait_for(1)
-    asked = ["campaign", "brief.toml", "--runs", "6000", "--chunk", "16", "--out", "runs", "-q"]
+    asked = ["campaign", "brief.toml", "--model", "paper", "--runs", "6000", "--chunk", "16", "--out", "runs", "-q"]
     command = [sys.executable, "-m", "experiments", *asked]
     with subprocess.Popen(
         [*command, "--dask", processes.address], cwd=tmp_path, stderr=subprocess.PIPE, text=True
@@ -256,7 +257,7 @@ def test_a_scheduler_that_dies_is_one_message_and_the_campaign_goes_on_without(
     assert process.returncode == 2
     assert errors.startswith("error: ")
     assert errors.count("\n") == 1
-    assert "go on with --resume" in errors
+    assert "continue with --resume" in errors
     there = CampaignFolder.read(tmp_path / "runs")
     assert there.damaged == []
     assert 160 <= there.finished_runs < 6000
@@ -315,7 +316,7 @@ def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(
         monkeypatch.setenv(name, str(path))
     monkeypatch.setenv("DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION", "True")
     (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
-    asked = ("campaign", "brief.toml", "--runs", 64, "--chunk", 16, "--dask")
+    asked = ("campaign", "brief.toml", "--model", "paper", "--runs", 64, "--chunk", 16, "--dask")
     found = Processes(tmp_path, "tls")
     with found.stack:
         found.wait_until_up()
@@ -324,7 +325,7 @@ def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(
         with dask.config.set(dask.config.merge(dask.config.config, dask.config.collect_env())):
             found.wait_for(1)
             code, _, err = infoset(*asked, found.address, "--out", "runs")
-        assert (code, err) == (0, "1 Dask workers, 1 threads\n")
+        assert (code, err) == (0, "1 Dask workers, 1 threads\nwrote shards, scenario.toml, summary.json in runs\n")
         for address in (found.address, found.address.replace("tls", "tcp")):  # without a certificate, unencrypted
             code, out, err = infoset(*asked, address, "--out", "others")
             assert (code, out) == (2, "")
