@@ -29,6 +29,10 @@ _SINGULAR = 1e-6
 """Least singular value of a matrix, relative to the greatest one, with which facets are mapped."""
 _HULL = 1e-8
 """Enlargement of a hull, relative to the size of the set along each axis: it may have merged points."""
+_ROUNDED = 1e-13
+"""Depth of a facet, relative to the terms of normal . x, below which rounding errors determine the set."""
+_WIDENED = 1e-12
+"""Widening of such a set, relative to its coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +74,26 @@ class FacetsAndVertices:
         """Return the set scaled about its centre, so that each facet moves outward by at least `slack` ulp.
 
         The ulp is that of the terms of normal . x, in which x has the greatest coordinates of the set or `sizes`, shape
-        (n,), if these are greater.
+        (n,), if these are greater. A set about as thin as rounding errors is widened by 1e-12 of these coordinates.
         """
-        depths = self.offsets - self.normals @ self.vertices.mean(axis=0)
-        terms = np.abs(self.normals) @ np.maximum(np.abs(self.vertices).max(axis=0), sizes)
-        ratio = float((terms / np.maximum(depths, 1e-300)).max())
-        return self._scaled(1.0 + slack * EPSILON * (1.0 + ratio))
+        sizes = np.maximum(np.abs(self.vertices).max(axis=0), sizes)
+        depths, terms = self._depths, np.abs(self.normals) @ sizes
+        if (depths < _ROUNDED * terms).any():
+            wide = self
+            for half in np.diag(_WIDENED * sizes):
+                wide = wide.plus_segment(half)
+            return wide
+        return self._scaled(1.0 + slack * EPSILON * (1.0 + float((terms / depths).max())))
+
+    @property
+    def _depths(self) -> Floats:
+        """Distances of the facets from the mean of the vertices, shape (f,)."""
+        return np.asarray(self.offsets - self.normals @ self.vertices.mean(axis=0))
 
     def _scaled(self, factor: float) -> FacetsAndVertices:
         """Return the set scaled about the mean of its vertices."""
         centre = self.vertices.mean(axis=0)
-        depths = self.offsets - self.normals @ centre
-        offsets = self.normals @ centre + factor * depths
+        offsets = self.normals @ centre + factor * self._depths
         return FacetsAndVertices(centre + factor * (self.vertices - centre), self.normals, offsets, self.incidence)
 
     def affine_image(self, matrix: Floats, shift: Floats) -> FacetsAndVertices:
@@ -89,24 +101,25 @@ class FacetsAndVertices:
         before = np.abs(self.vertices).max(axis=0)
         before = powers_of_two(np.where(before > 0.0, before, 1.0))
         after = np.abs(matrix) @ before
-        after = powers_of_two(np.where(after > 0.0, after, 1.0))
+        after = powers_of_two(np.where(after > 0.0, after, before))
         left, sizes, right = np.linalg.svd(matrix * before / after[:, None])
         floor = _SINGULAR * (float(sizes[0]) or 1.0)
         small = sizes < floor
+        start = self
         if small.any():
-            # A regular matrix, and segments that contain the difference of both images.
+            # A regular matrix, and segments that contain the difference of both images. They are added before the map:
+            # it makes the set so thin that rounding decides which facets the segments are parallel to.
             reach = np.abs((self.vertices / before) @ right[small].T).max(axis=0)
-            lengths = floor * np.maximum(reach, _THIN * float(np.abs(self.vertices / before).max()))
+            lengths = np.maximum(reach, _THIN * float(np.abs(self.vertices / before).max()))
+            for axis, length in zip(right[small], lengths, strict=True):
+                start = start.plus_segment(length * axis * before)
             matrix = (left * np.maximum(sizes, floor)) @ right * after[:, None] / before
-        vertices = self.vertices @ matrix.T + shift
+        vertices = start.vertices @ matrix.T + shift
         scaled = matrix * before / after[:, None]
-        normals = np.array(np.linalg.solve(scaled.T, (self.normals * before).T).T, dtype=np.float64) / after
+        normals = np.array(np.linalg.solve(scaled.T, (start.normals * before).T).T, dtype=np.float64) / after
         normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
         # The offsets follow from the vertices, so that rounding errors of both do not add up over many steps.
-        image = FacetsAndVertices(vertices, normals, (vertices @ normals.T).max(axis=0), self.incidence)
-        for axis, length in zip(left.T[small], lengths if small.any() else (), strict=True):
-            image = image.plus_segment(length * axis * after)
-        return image
+        return FacetsAndVertices(vertices, normals, (vertices @ normals.T).max(axis=0), start.incidence)
 
     def plus(self, other: Polytope) -> FacetsAndVertices:
         """Return the Minkowski sum with a polytope: a hull, enlarged by 1e-8 of its size."""
@@ -131,7 +144,8 @@ class FacetsAndVertices:
         if not half.any():
             return self
         along, widths = self.normals @ half, np.ptp(self.vertices, axis=0) + np.abs(half)
-        rounding = _PARALLEL * np.linalg.norm(half / widths) * np.linalg.norm(self.normals * widths, axis=1)
+        share = half / np.where(widths > 0.0, widths, 1.0)
+        rounding = _PARALLEL * np.linalg.norm(share) * np.linalg.norm(self.normals * widths, axis=1)
         ahead, behind = along > rounding, along < -rounding
         opposite = np.flatnonzero(behind) if len(half) > 1 else np.zeros(0, dtype=np.int64)  # an interval has no ridges
         first, second, common = _adjacent(self.incidence.T, np.flatnonzero(ahead), opposite, len(half))
