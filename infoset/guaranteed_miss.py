@@ -12,16 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset import chains, whole_chains
+from infoset import chains
 from infoset._compile import ZERO, allocation_free, by_reference, entry
 from infoset.arrays import Flags, Floats, Integers
+from infoset.chain_storage import chains_of
 from infoset.concave_bounds import bound_between
-from infoset.history import History, Tapes
+from infoset.history import History, Tape, Tapes, tape_of
 from infoset.location import FIRST, LABEL_RESOLUTION, LAST, locate_end, search_window
 from infoset.replays import LOWER, PROBE, ROWS, UPPER, ReplayRoom, Workspace, keep_section, probe, run, workspace
 from infoset.section_law import Laws, SectionLaw, law_of
-from infoset.section_life import ALIVE, Tape
-from infoset.section_passes import Sections, tape_of
+from infoset.section_life import ALIVE
+from infoset.section_passes import Sections
 from infoset.section_stack import SectionStack, impulse_doubts
 
 LABELS = 4
@@ -187,8 +188,8 @@ def bound_leaving(
         outlines.labels[number] = label
         tau = (label - travelled) / law.closing_speed
         for channel in range(laws.shape[0]):
-            right, left = chains.chains_of(replays.records, ROWS * channel + row)
-            outlines.counts[channel, number] = whole_chains.outline(
+            right, left = chains_of(replays.records, ROWS * channel + row)
+            outlines.counts[channel, number] = chains.outline(
                 right, left, replays.rings, tau, outlines.points[channel, number]
             )
         number += 1
@@ -299,9 +300,9 @@ def spread_at(
     spread = 0.0
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
-        right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
+        right, left = chains_of(room.records, ROWS * channel + PROBE)
         tau = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
-        count = whole_chains.outline(right, left, room.rings, tau, outline)
+        count = chains.outline(right, left, room.rings, tau, outline)
         least, greatest = extremes_along(outline, count, tau)
         spread = math.hypot(spread, 0.5 * (greatest - least) + 0.5 * law.disturbance * tau * tau)
     return spread

@@ -6,11 +6,71 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import by_reference
+from infoset._compile import allocation_free, by_reference
 from infoset.arrays import Flags, Floats, Integers
-from infoset.section_life import IMPULSE, NO_SIGHT, NO_WINDOW, PREDICTION, RATE, Tape
 
+ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
+"""Kinds of events."""
 ROOM_AT_START = 64
+
+
+class Tape(NamedTuple):
+    """History of one engagement.
+
+    Parameters
+    ----------
+    kinds : ndarray of int, shape (>= events,)
+        Kind of each event.
+    values : ndarray, shape (C, >= events)
+        Angle, rad, impulse, m/s, or rate, rad/s, along each lateral axis.
+    applies : ndarray of bool, shape (>= events,)
+        Whether the event applies to this engagement.
+    events : int
+        Number of events.
+    nearest, farthest : float
+        Window of labels, m, over which the bands of measured rates are convex. The empty window, from infinity to
+        minus infinity, makes the window of each label the label itself.
+    """
+
+    kinds: Integers
+    values: Floats
+    applies: Flags
+    events: int
+    nearest: float
+    farthest: float
+
+
+NO_WINDOW = (np.inf, -np.inf)
+"""The empty window: the rate band of each label is exact for that label."""
+
+
+class LastSight(NamedTuple):
+    """The last angle measurement of a history, and the impulses since.
+
+    Parameters
+    ----------
+    known : bool
+        Whether an angle was measured. If not, the initial box bounds the angle.
+    alpha, across : float
+        The measured angles of this axis and of the other one, rad.
+    steps : int
+        Steps since the measurement.
+    moved, doubt : float
+        Sum of the later impulses, each times its time since the measurement, and the error bound of that sum, m.
+    fired : float
+        Sum of the magnitudes of all impulses, m/s.
+    """
+
+    known: bool
+    alpha: float
+    across: float
+    steps: int
+    moved: float
+    doubt: float
+    fired: float
+
+
+NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
 
 
 @by_reference
@@ -21,6 +81,16 @@ class Tapes(NamedTuple):
     values: Floats
     applies: Flags
     events: int
+
+
+@allocation_free
+def tape_of(tapes: Tapes, b: int, values: Floats, applies: Flags) -> Tape:
+    """Copy the history of one engagement to contiguous arrays, for many replays."""
+    for event in range(tapes.events):
+        applies[event] = tapes.applies[event, b]
+        for channel in range(values.shape[0]):
+            values[channel, event] = tapes.values[event, channel, b]
+    return Tape(tapes.kinds, values, applies, tapes.events, np.inf, -np.inf)
 
 
 class History:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from infoset import section_life, section_passes
 from infoset.arrays import Flags, Floats
 from infoset.guaranteed_miss import GuaranteedMiss
-from infoset.history import History
+from infoset.history import ANGLE, IMPULSE, PREDICTION, RATE, WIDENING, History
 from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, real_values, shown
 from infoset.model import InitialSet, Recovery, SetModel
 from infoset.section_law import BOUND_SLACK, section_laws
@@ -217,7 +217,7 @@ class InformationSet(InformationSetView):
         """
         measured = self._spread(alpha_rad, "alpha_rad")
         state, active = self._state, self._active(where)
-        event = state.history.record(section_life.ANGLE, measured, active)
+        event = state.history.record(ANGLE, measured, active)
         before = state.lower_label.copy(), state.upper_label.copy()
         if state.stack.measure_angle(active, measured, state.history.elapsed, event):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
@@ -243,7 +243,7 @@ class InformationSet(InformationSetView):
         measured = self._spread(omega_rad_s, "omega_rad_s")
         state, active = self._state, self._active(where)
         error = error_rad_s * (1.0 + BOUND_SLACK)
-        event = state.history.record(section_life.RATE, measured, active, error)
+        event = state.history.record(RATE, measured, active, error)
         before = state.lower_label.copy(), state.upper_label.copy()
         if state.stack.measure_rate(active, measured, error, state.history.elapsed, event, state.history):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
@@ -265,7 +265,7 @@ class InformationSet(InformationSetView):
         if state.phi is not None:
             state.phi.fire(np.where(active, impulse, 0.0), elapsed)
         if active.any():
-            state.history.record(section_life.IMPULSE, impulse, active)
+            state.history.record(IMPULSE, impulse, active)
             state.stack.shift(active, impulse, elapsed)
 
     def drop_below_threshold(self) -> Flags:
@@ -311,7 +311,7 @@ class InformationSet(InformationSetView):
         The exact set of disturbances is a thin lens in (V, z). As in the paper, the segment between its ends is used.
         """
         active = self.tracking
-        self._state.history.record(section_life.PREDICTION)
+        self._state.history.record(PREDICTION)
         self._state.stack.predict(active, self._state.history.elapsed)
 
     @property
@@ -370,7 +370,7 @@ class InformationSet(InformationSetView):
             return
         if event is not None:
             history.retract(event, empty)
-        history.record(section_life.WIDENING, applies=empty)
+        history.record(WIDENING, applies=empty)
         # The sections that this measurement emptied live again; the refinement below recomputes their polygons.
         slots = state.stack.sections.slots
         stored = np.arange(slots.shape[1]) < state.stack.sections.used[:, None]

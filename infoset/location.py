@@ -14,9 +14,10 @@ import numpy as np
 
 from infoset._compile import allocation_free, constants, entry
 from infoset.arrays import Flags, Floats
-from infoset.chains import CAPACITY, chains_of, copy_section, count_of, room_of
+from infoset.chain_storage import chains_of, copy_section, room_of
+from infoset.chains import CAPACITY, count_of
 from infoset.concave_bounds import is_dead_between
-from infoset.history import Tapes
+from infoset.history import Tape, Tapes, tape_of
 from infoset.replays import (
     LOWER,
     MOST_HALVED_WINDOWS,
@@ -32,8 +33,8 @@ from infoset.replays import (
     run,
 )
 from infoset.section_law import Laws, law_of
-from infoset.section_life import ALIVE, Tape, summarise_section
-from infoset.section_passes import Sections, row_of, tape_of
+from infoset.section_life import ALIVE, summarise_section
+from infoset.section_passes import Sections, row_of
 
 FIRST, _, LAST = constants(3)
 """Indices of the ends of a bracket of three labels."""

@@ -210,6 +210,23 @@ def update_nodes(tree: Floats, first: int, last: int) -> None:
             tree[node] = min(tree[2 * node], tree[2 * node + 1])
 
 
+@allocation_free
+def box_around(points: Points, count: int, sign: float, slope: float) -> int:
+    """Replace a path by three sides of a box, in place: from its ends along a slope to its outermost vertex.
+
+    `sign` is 1 if greater x is outward, else -1.
+    """
+    first_x, first_y, last_x, last_y = points[0, 0], points[0, 1], points[count - 1, 0], points[count - 1, 1]
+    outermost = sign * first_x
+    for i in range(count):
+        outermost = max(outermost, sign * points[i, 0])
+    out = sign * (outermost - min(sign * first_x, sign * last_x))
+    points[1, 0], points[1, 1] = first_x + out, first_y + out * slope
+    points[2, 0], points[2, 1] = last_x + out, last_y + out * slope
+    points[3, 0], points[3, 1] = last_x, last_y
+    return 4
+
+
 @compiled
 def make_rectangle(points: Points, count: int) -> int:
     """Replace a polygon by its bounding rectangle along the longest direction from vertex 0, in place. O(count)."""

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from infoset import chains, polygon, whole_chains
-from infoset._compile import ZERO, allocation_free, by_reference, constants, entry, inlined
+from infoset import chain_storage, chains
+from infoset._compile import ZERO, allocation_free, by_reference, constants, entry
 from infoset.arrays import Flags, Floats, Integers
-from infoset.chains import copy_section, empty_sections, working_room
-from infoset.history import History, Tapes
-from infoset.section_law import Laws, law_of
-from infoset.section_life import (
-    ALIVE,
+from infoset.chain_storage import chains_of, copy_section, empty_sections, working_room
+from infoset.history import (
     ANGLE,
     IMPULSE,
     NO_SIGHT,
     PREDICTION,
     WIDENING,
+    History,
     LastSight,
     Tape,
+    Tapes,
+    tape_of,
+)
+from infoset.section_law import Laws, SectionLaw, law_of
+from infoset.section_life import (
+    ALIVE,
     across_of,
     measure_rate_section,
     measure_section,
@@ -32,7 +35,6 @@ from infoset.section_life import (
     time_to_go,
     widen_section,
 )
-from infoset.section_passes import tape_of
 
 MOST_HALVED_WINDOWS = 1000
 """Greatest number of windows of labels that a search halves. If more are needed, the set counts as empty."""
@@ -66,7 +68,7 @@ class ReplayRoom(NamedTuple):
     values, applies : ndarray, shape (C, E) and (E,)
         History of one engagement in contiguous arrays: angles, rates and impulses, SI, and the events that apply.
     records, rings : ndarray
-        Sections, stored as in `chains`; the last replay is `PROBE`.
+        Sections, stored as in `chain_storage`; the last replay is `PROBE`.
     overlaps : ndarray, shape (C, E)
         Overlap of section and band at each measurement, m, in the last replay.
     points : ndarray, shape (n, 2)
@@ -75,7 +77,7 @@ class ReplayRoom(NamedTuple):
 
     values: Floats
     applies: Flags
-    records: chains.Records
+    records: chain_storage.Records
     rings: Floats
     overlaps: Floats
     points: Floats
@@ -144,47 +146,39 @@ AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
 
 
 @allocation_free
-def replay(label: float, tape: Tape, errors: Floats | None, laws: Laws, channel: int, room: ReplayRoom) -> int:
-    """Compute the section at any label along one axis from a whole history, in row `PROBE` of the axis.
-
-    Return the number of the event that made the section empty, or ALIVE.
-    """
-    right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
-    start_section(right, left, room.rings, label, law_of(laws, channel))
-    return continue_replay(AT_START, label, tape, errors, laws, channel, room)[0]
-
-
-@allocation_free
-def continue_replay(
-    done: Replayed, label: float, tape: Tape, errors: Floats | None, laws: Laws, channel: int, room: ReplayRoom
+def replay(
+    done: Replayed, label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: ReplayRoom
 ) -> tuple[int, Replayed]:
-    """Apply the events of a tape that are not done yet; return what `replay` does, and the events done.
+    """Compute the section at any label along one axis from a history: apply the events of a tape after those `done`.
 
-    About 30 ns for each event. `errors` are the error bounds of each rate, rad/s; None without rates. It is not a field
-    of the tape because the compiler omits the code for rates only if an argument is None. The `room` receives the
-    section, and the overlaps with the bands of the measurements up to the one that makes it empty.
+    Return the number of the event that makes the section empty, or ALIVE, and the events done. About 30 ns for each
+    event. `errors` are the error bounds of each rate, rad/s; None without rates. It is not a field of the tape because
+    the compiler omits the code for rates only if an argument is None. The `room` receives the section, in row `PROBE`
+    of the axis, and the overlaps with the bands of the measurements up to the one that makes it empty.
     """
     kinds, values, applies, events, nearest, farthest = tape
-    right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
-    rings, points, window, law = room.rings, room.points, (nearest, farthest), law_of(laws, channel)
+    right, left = chains_of(room.records, ROWS * law.channel + PROBE)
+    rings, points, window = room.rings, room.points, (nearest, farthest)
     first, elapsed, sight = done
     own, overlaps = values[law.channel], room.overlaps[law.channel]
+    if first == 0:
+        start_section(right, left, rings, label, law)
     for event in range(first, events):
         if kinds[event] == PREDICTION:
-            if whole_chains.is_crowded(right, left):
-                whole_chains.reduce_outward(right, left, rings, time_to_go(label, elapsed, law), points)
+            if chains.is_crowded(right, left):
+                chains.reduce_outward(right, left, rings, time_to_go(label, elapsed, law), points)
             elapsed += 1
             predict_section(right, left, rings, label, elapsed, law)
         elif not applies[event]:
             continue
         elif kinds[event] == ANGLE:
             living, overlaps[event] = measure_section(
-                right, left, rings, label, elapsed, own[event], across_of(tape, event, law), law
+                right, left, rings, label, elapsed, own[event], across_of(values, event, law), law
             )
             if not living:
                 return event, done
         elif kinds[event] == IMPULSE:
-            shift_section(right, left, label, elapsed, own[event], across_of(tape, event, law), law)
+            shift_section(right, left, label, elapsed, own[event], across_of(values, event, law), law)
         elif kinds[event] == WIDENING:
             widen_section(right, left, label, elapsed, law)
         elif errors is not None:
@@ -195,7 +189,7 @@ def continue_replay(
             if not living:
                 return event, done
         if errors is not None:
-            sight = sight_after(sight, kinds[event], own[event], across_of(tape, event, law), applies[event], law)
+            sight = sight_after(sight, kinds[event], own[event], across_of(values, event, law), applies[event], law)
     return ALIVE, Replayed(events, elapsed, sight)
 
 
@@ -210,7 +204,7 @@ def run(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: Repla
     for channel in range(laws.shape[0]):
         # Later events of a label that is empty along one axis do not matter.
         part = Tape(kinds, values, applies, events if died == ALIVE else died + 1, nearest, farthest)
-        died_here = replay(label, part, errors, laws, channel, room)
+        died_here, _ = replay(AT_START, label, part, errors, law_of(laws, channel), room)
         if died_here != ALIVE:
             overlap_here = room.overlaps[channel, died_here]
             if died_here != died or overlap_here < overlap:
@@ -282,46 +276,18 @@ def margins_all(
         label, tape = labels[b], tape_of(tapes, b, room.values, room.applies)
         for channel in range(laws.shape[0]):
             law = law_of(laws, channel)
-            right, left = chains.chains_of(room.records, ROWS * channel + PROBE)
-            start_section(right, left, room.rings, label, law)
+            right, left = chains_of(room.records, ROWS * channel + PROBE)
             died, done = ALIVE, AT_START
             for look in range(looks.shape[0]):
                 if died == ALIVE:
                     part = Tape(tape.kinds, tape.values, tape.applies, looks[look], tape.nearest, tape.farthest)
-                    died, done = continue_replay(done, label, part, errors, laws, channel, room)
+                    died, done = replay(done, label, part, errors, law, room)
                 if died == ALIVE:
                     tau = time_to_go(label, done.elapsed, law)
                     state = v[channel, look, b], z[channel, look, b]
-                    margins[channel, look, b] = margin_in(right, left, room.rings, tau, *state)
+                    margins[channel, look, b] = chains.margin_in(right, left, room.rings, tau, *state)
                 else:
                     margins[channel, look, b] = room.overlaps[channel, died]
-
-
-@inlined
-def vertex_from(chain: chains.Chain, rings: Floats, i: int, tau: float, v: float, z: float) -> tuple[float, float]:
-    """Vertex of a chain relative to a state, in the plane of V x/e and z, m."""
-    offset_v, offset_z = tau * (chain.v - v + chain.v_rest), chains.origin_height(chain, tau) - z
-    chain_v, chain_m = chains.read(chain, rings, i)
-    return tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z
-
-
-@allocation_free
-def margin_in(right: chains.Chain, left: chains.Chain, rings: Floats, tau: float, v: float, z: float) -> float:
-    """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
-    last_v, last_m = chains.vertex(left, rings, left.end - 1)
-    rounded = (tau * (last_v - v), (last_m - tau * last_v) - z)
-    end = vertex_from(left, rings, left.end - 1, tau, v, z)
-    last = vertex_from(right, rings, right.begin, tau, v, z)
-    # The edge between the chains: a start rounded to absolute coordinates may be beyond the state in a section that is
-    # thinner than this rounding. It is used for the distance only, which keeps the last digit of published margins.
-    nearest, _ = polygon.pass_edge(np.inf, False, rounded, last, 0.0, 0.0)
-    _, inside = polygon.pass_edge(np.inf, False, end, last, 0.0, 0.0)
-    for chain in (right, left):
-        for i in range(chain.begin, chain.end):
-            vertex = vertex_from(chain, rings, i, tau, v, z)
-            nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
-            last = vertex
-    return math.sqrt(nearest) if inside else -math.sqrt(nearest)
 
 
 @entry

@@ -1,23 +1,23 @@
-"""Compiled operations on one section: start, measurements, shift, prediction, summary, and replay of a history.
+"""Compiled operations on one section: start, measurements, shift, prediction and summary.
 
 A section is the polygon of all (V, z) that agree with the history under the hypothesis that the range is
 x = label - e t. With z = alpha x and V = omega x - e alpha, the motion (9) of the paper is z' = V, V' = v_z: an angle
 measurement is a band of z, and an impulse is a shift of V. A section depends only on its label and on the history.
-Therefore `replay` computes the section at any label exactly, with the functions that update the stored sections in
+Therefore `replays` computes the section at any label exactly, with the functions that update the stored sections in
 `section_passes`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from infoset import chain_steps, chains, whole_chains
+from infoset import chains
 from infoset._compile import ZERO, allocation_free, inlined
-from infoset.arrays import Flags, Floats, Integers
+from infoset.arrays import Floats
 from infoset.chains import Chain
+from infoset.history import ANGLE, IMPULSE, PREDICTION, LastSight
 from infoset.section_law import CONE, ELEVATION, PLANE, SectionLaw
 
 CUT_SLACK = 16.0 * chains.EPSILON
@@ -27,68 +27,11 @@ ANGLE_SLACK = 1e-12
 WIDEST_CONE, CONE_STRETCH = 0.2, 1.01
 """Greatest error of a direction, rad, that bounds an angle, and a bound of asin(k sin(b))/(k b) up to it."""
 
-ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 ALIVE = np.iinfo(np.int64).max
 
 # Columns of a section's summary.
 LOWER_MISS, UPPER_MISS, Z_LEAST, Z_GREATEST = range(4)
 SUMMARY_COLUMNS = 4
-
-
-class Tape(NamedTuple):
-    """History of one engagement.
-
-    Parameters
-    ----------
-    kinds : ndarray of int, shape (>= events,)
-        Kind of each event.
-    values : ndarray, shape (C, >= events)
-        Angle, rad, impulse, m/s, or rate, rad/s, along each lateral axis.
-    applies : ndarray of bool, shape (>= events,)
-        Whether the event applies to this engagement.
-    events : int
-        Number of events.
-    nearest, farthest : float
-        Window of labels, m, over which the bands of measured rates are convex. The empty window, from infinity to
-        minus infinity, makes the window of each label the label itself.
-    """
-
-    kinds: Integers
-    values: Floats
-    applies: Flags
-    events: int
-    nearest: float
-    farthest: float
-
-
-NO_WINDOW = (np.inf, -np.inf)
-"""The empty window: the rate band of each label is exact for that label."""
-
-
-class LastSight(NamedTuple):
-    """The last angle measurement of a history, and the impulses since.
-
-    Parameters
-    ----------
-    known : bool
-        Whether an angle was measured. If not, the initial box bounds the angle.
-    alpha, across : float
-        The measured angles of this axis and of the other one, rad.
-    steps : int
-        Steps since the measurement.
-    moved, doubt : float
-        Sum of the later impulses, each times its time since the measurement, and the error bound of that sum, m.
-    fired : float
-        Sum of the magnitudes of all impulses, m/s.
-    """
-
-    known: bool
-    alpha: float
-    across: float
-    steps: int
-    moved: float
-    doubt: float
-    fired: float
 
 
 @inlined
@@ -121,7 +64,7 @@ def start_section(right: Chain, left: Chain, rings: Floats, label: float, law: S
         shift_at_least, shift_at_greatest = -e * math.atan(z_least / x), -e * math.atan(z_greatest / x)
         z_least, z_greatest = math.atan(z_least / x) * x, math.atan(z_greatest / x) * x
     tau = time_to_go(label, ZERO, law)
-    chain_steps.start(
+    chains.start(
         right,
         left,
         rings,
@@ -130,7 +73,7 @@ def start_section(right: Chain, left: Chain, rings: Floats, label: float, law: S
         (lowest + shift_at_greatest, highest + shift_at_greatest, z_greatest),
     )
     if law.half_v_at_start > 0.0:
-        chain_steps.spread(right, left, tau, law.half_v_at_start)
+        chains.spread(right, left, tau, law.half_v_at_start)
 
 
 @inlined
@@ -263,7 +206,7 @@ def measure_section(
     across: float,
     law: SectionLaw,
 ) -> tuple[bool, float]:
-    """Cut a section by an angle measurement; return what `chain_steps.cut` does. `across` is the angle of the other
+    """Cut a section by an angle measurement; return what `chains.cut` does. `across` is the angle of the other
     axis.
 
     The band is widened by 16 ulp, so that rounding does not exclude true states on the border, which extremal noise
@@ -273,10 +216,7 @@ def measure_section(
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = slope_band(alpha, across, law.closing_speed * (law.step * elapsed), x, law)
     slack = CUT_SLACK * (label * (abs(alpha) + bound) + right.reach * (label / law.closing_speed))
-    return chain_steps.cut(right, left, rings, x / law.closing_speed, x * lower - slack, x * upper + slack)
-
-
-NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
+    return chains.cut(right, left, rings, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
 
 @inlined
@@ -312,9 +252,9 @@ def impulse_doubt(impulse: float, across: float, law: SectionLaw) -> float:
 
 
 @inlined
-def across_of(tape: Tape, event: int, law: SectionLaw) -> float:
-    """Return the value of an event along the other axis; zero in a plane."""
-    return tape.values[law.other, event] if law.other >= 0 else 0.0
+def across_of(values: Floats, i: int, law: SectionLaw) -> float:
+    """Return the value with number `i` along the other axis, of values of shape (C, N); zero in a plane."""
+    return values[law.other, i] if law.other >= 0 else 0.0
 
 
 @allocation_free
@@ -407,18 +347,18 @@ def measure_rate_section(
 ) -> tuple[bool, float]:
     """Cut a section by a line-of-sight rate, which is a band of the predicted miss omega x^2 / e.
 
-    Return what `chain_steps.cut` does, with the overlap in metres of predicted miss.
+    Return what `chains.cut` does, with the overlap in metres of predicted miss.
     """
-    if whole_chains.is_crowded(right, left):
-        whole_chains.reduce_outward(right, left, rings, time_to_go(label, elapsed, law), points)
     near, far = min(label, window[0]), max(label, window[1])
     lower, upper = rate_band(label, near, far, elapsed, omega, error, sight, law)
     # The band bounds z + V x_c/e = m + V tilt.
     tau, tilt = time_to_go(label, elapsed, law), (0.5 * (near + far) - label) / law.closing_speed
+    if chains.is_crowded(right, left):
+        chains.reduce_outward(right, left, rings, tau, points)
     slack = CUT_SLACK * (label * (abs(omega) + error) + right.reach) * (label / law.closing_speed)
     # The section already contains the first half of the next step's disturbance, which does not commute with the cut.
     slack += (tau + tilt) * law.half_v_at_start
-    return whole_chains.cut_misses(right, left, rings, tau, tilt, lower - slack, upper + slack, points)
+    return chains.cut_misses(right, left, rings, tau, tilt, lower - slack, upper + slack, points)
 
 
 @inlined
@@ -426,7 +366,7 @@ def widen_section(right: Chain, left: Chain, label: float, elapsed: int, law: Se
     """Enlarge a section by the error bound b of one angle measurement: by e b in V, or x b in the predicted miss."""
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x + law.centroid_error / x
-    chain_steps.spread(right, left, x / law.closing_speed, law.closing_speed * bound)
+    chains.spread(right, left, x / law.closing_speed, law.closing_speed * bound)
 
 
 @inlined
@@ -437,20 +377,20 @@ def shift_section(
 
     `across` is the impulse along the other axis.
     """
-    tau = time_to_go(label, elapsed, law)
-    chain_steps.shift(right, left, tau, -impulse)
+    tau, doubt = time_to_go(label, elapsed, law), impulse_doubt(impulse, across, law)
+    chains.shift(right, left, tau, -impulse)
     if law.impulse_error > 0.0 or law.pointing_across > 0.0:
-        chain_steps.spread(right, left, tau, impulse_doubt(impulse, across, law))
+        chains.spread(right, left, tau, doubt)
 
 
 @inlined
 def predict_section(right: Chain, left: Chain, rings: Floats, label: float, elapsed: int, law: SectionLaw) -> None:
     """Move a section to step `elapsed`: the level turns, and the segment of the disturbance, 8 ulp longer, is added."""
     tau = time_to_go(label, elapsed, law)
-    chain_steps.turn(right, left, rings, tau + law.disturbance_lead)
-    chain_steps.spread(right, left, tau + law.disturbance_lead, law.half_v + SUM_SLACK * right.reach)
+    chains.turn(right, left, rings, tau + law.disturbance_lead)
+    chains.spread(right, left, tau + law.disturbance_lead, law.half_v + SUM_SLACK * right.reach)
     if law.disturbance_lead > 0.0:
-        chain_steps.turn(right, left, rings, tau)
+        chains.turn(right, left, rings, tau)
 
 
 @inlined
@@ -467,7 +407,7 @@ def summarise_section(
 ) -> None:
     """Write the extremes (13), (14) of the predicted miss of a section, those of z + V x/e -+ nu/2 (x/e)^2."""
     tau = time_to_go(label, elapsed, law)
-    upper, lower = chain_steps.greatest_and_least_miss(right, left, rings, tau)
+    upper, lower = chains.greatest_and_least_miss(right, left, rings, tau)
     drift = 0.5 * law.disturbance * tau * tau
     summaries[law.channel, b, s, UPPER_MISS] = upper + drift
     summaries[law.channel, b, s, LOWER_MISS] = lower - drift

@@ -7,10 +7,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import chain_steps, chains, whole_chains
+from infoset import chain_storage, chains
 from infoset._compile import ZERO, allocation_free, by_reference, entry, inlined, record_of
 from infoset.arrays import Flags, Floats, Integers
-from infoset.history import Tapes
+from infoset.chain_storage import chains_of
+from infoset.history import LastSight, Tapes
 from infoset.section_law import Laws, SectionLaw, law_of
 from infoset.section_life import (
     ALIVE,
@@ -20,8 +21,7 @@ from infoset.section_life import (
     UPPER_MISS,
     Z_GREATEST,
     Z_LEAST,
-    LastSight,
-    Tape,
+    across_of,
     impulse_doubt,
     measure_rate_section,
     measure_section,
@@ -76,7 +76,7 @@ class Sections(NamedTuple):
     used : ndarray of int, shape (B,)
         Number of slots in use.
     records, rings : ndarray
-        The polygons, stored as in `chains`: slot s of engagement b is section (c B + b) S + s for axis c.
+        The polygons, stored as in `chain_storage`: slot s of engagement b is section (c B + b) S + s for axis c.
     summaries : ndarray, shape (C, B, S, columns)
         Extremes of the predicted miss and of z, m.
     rows : ndarray of int, shape (B S, 3)
@@ -85,7 +85,7 @@ class Sections(NamedTuple):
 
     slots: NDArray[np.record]
     used: Integers
-    records: chains.Records
+    records: chain_storage.Records
     rings: Floats
     summaries: Floats
     rows: Integers
@@ -95,7 +95,7 @@ def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections
     """Allocate the arrays of a batch of sections for a number of axes."""
     slots = np.zeros(labels.shape, dtype=record_of(Slot))
     slots["label"], slots["died"] = labels, ALIVE
-    records, rings = chains.empty_sections(channels * labels.size, chains.ROOM_AT_START)
+    records, rings = chain_storage.empty_sections(channels * labels.size, chain_storage.ROOM_AT_START)
     return Sections(
         slots=slots,
         used=used,
@@ -121,7 +121,7 @@ def start_all(sections: Sections, laws: Laws) -> None:
         law = law_of(laws, channel)
         for b in range(len(used)):
             for s in range(used[b]):
-                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
+                right, left = chains_of(records, row_of(sections, channel, b, s))
                 start_section(right, left, rings, slots[b, s].label, law)
                 slots[b, s].living = True
 
@@ -192,16 +192,15 @@ def step_all(
         for k in range(count):
             b, s = rows[k, 1], rows[k, 2]
             slot = slots[b, s]
-            right, left = chains.chains_of(records, rows[k, 0])
+            right, left = chains_of(records, rows[k, 0])
             if k + 1 < count:
-                next_right, next_left = chains.chains_of(records, rows[k + 1, 0])
-                chains.expect(next_right, next_left, rings)
+                next_right, next_left = chains_of(records, rows[k + 1, 0])
+                chain_storage.expect(next_right, next_left, rings)
             if behind[b]:
                 predict_section(right, left, rings, slot.label, elapsed, law)
             if measured[b]:
-                across = alpha[law.other, b] if law.other >= 0 else 0.0
                 survives, overlap = measure_section(
-                    right, left, rings, slot.label, elapsed, alpha[channel, b], across, law
+                    right, left, rings, slot.label, elapsed, alpha[channel, b], across_of(alpha, b, law), law
                 )
                 if not survives:
                     deaths += bury(slot, channel, event, overlap)
@@ -211,20 +210,10 @@ def step_all(
                 summarise_section(right, left, rings, slot.label, elapsed, law, summaries, b, s)
             if heights_wanted:
                 tau = time_to_go(slot.label, elapsed, law)
-                least, greatest = chain_steps.heights(right, left, rings, tau)
+                least, greatest = chains.heights(right, left, rings, tau)
                 summaries[channel, b, s, Z_LEAST] = least
                 summaries[channel, b, s, Z_GREATEST] = greatest
     return deaths
-
-
-@allocation_free
-def tape_of(tapes: Tapes, b: int, values: Floats, applies: Flags) -> Tape:
-    """Copy the history of one engagement to contiguous arrays, for many replays."""
-    for event in range(tapes.events):
-        applies[event] = tapes.applies[event, b]
-        for channel in range(values.shape[0]):
-            values[channel, event] = tapes.values[event, channel, b]
-    return Tape(tapes.kinds, values, applies, tapes.events, np.inf, -np.inf)
 
 
 @allocation_free
@@ -244,8 +233,9 @@ def follow_sight(tapes: Tapes, done: int, b: int, sights: Floats, law: SectionLa
         sights[c, b, 6],
     )
     for event in range(done, tapes.events):
-        across = tapes.values[event, law.other, b] if law.other >= 0 else 0.0
-        sight = sight_after(sight, tapes.kinds[event], tapes.values[event, c, b], across, tapes.applies[event, b], law)
+        values = tapes.values[event]
+        across, applies = across_of(values, b, law), tapes.applies[event, b]
+        sight = sight_after(sight, tapes.kinds[event], values[c, b], across, applies, law)
     sights[c, b, 0] = 1.0 if sight.known else 0.0
     sights[c, b, 1], sights[c, b, 2], sights[c, b, 3] = sight.alpha, sight.across, sight.steps
     sights[c, b, 4], sights[c, b, 5], sights[c, b, 6] = sight.moved, sight.doubt, sight.fired
@@ -282,7 +272,7 @@ def measure_rate_all(
                     continue
                 slot = slots[b, s]
                 label = slot.label
-                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
+                right, left = chains_of(records, row_of(sections, channel, b, s))
                 survives, overlap = measure_rate_section(
                     right,
                     left,
@@ -313,14 +303,14 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
         for b in range(len(used)):
             if not active[b]:
                 continue
-            along, across = impulse[channel, b], impulse[law.other, b] if law.other >= 0 else 0.0
+            along, across = impulse[channel, b], across_of(impulse, b, law)
             if along == 0.0 and across == 0.0:
                 continue
             for s in range(used[b]):
                 slot = slots[b, s]
                 if not slot.living:
                     continue
-                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
+                right, left = chains_of(records, row_of(sections, channel, b, s))
                 shift_section(right, left, slot.label, elapsed, along, across, law)
                 tau, error = time_to_go(slot.label, elapsed, law), impulse_doubt(along, across, law)
                 summaries[channel, b, s, UPPER_MISS] += (error - along) * tau
@@ -350,17 +340,17 @@ def make_room_all(
                 slot = slots[b, s]
                 if not slot.living:
                     continue
-                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
-                if widen and whole_chains.is_crowded(right, left):
+                right, left = chains_of(records, row_of(sections, channel, b, s))
+                if widen and chains.is_crowded(right, left):
                     tau = time_to_go(slot.label, elapsed, law)
-                    whole_chains.reduce_outward(right, left, rings, tau, points)
-                count, room = chains.count_of(right, left), chains.room_of(right)
-                wanted = chains.room_for(min(count + added, chains.CAPACITY), room)
+                    chains.reduce_outward(right, left, rings, tau, points)
+                count, room = chains.count_of(right, left), chain_storage.room_of(right)
+                wanted = chain_storage.room_for(min(count + added, chains.CAPACITY), room)
                 if wanted > room and widen:
-                    chains.widen_rings(right, left, rings, wanted)
+                    chain_storage.widen_rings(right, left, rings, wanted)
                 elif wanted > room:
-                    floats += 2 * chains.floats_of(wanted)
-                spare = min(spare, chains.room_of(right) - count)
+                    floats += 2 * chain_storage.floats_of(wanted)
+                spare = min(spare, chain_storage.room_of(right) - count)
     return floats, spare
 
 
@@ -392,8 +382,8 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
             exists[b] = True
             for end, s in ((0, lowest), (1, highest)):
                 tau, x = time_to_go(slots[b, s].label, elapsed, law), range_of(slots[b, s].label, elapsed, law)
-                right, left = chains.chains_of(records, row_of(sections, channel, b, s))
-                points = chain_steps.extreme_points(right, left, rings, tau, TIE_TOLERANCE, CUT_SLACK)
+                right, left = chains_of(records, row_of(sections, channel, b, s))
+                points = chains.extreme_points(right, left, rings, tau, TIE_TOLERANCE, CUT_SLACK)
                 v, m = points[1 - end]
                 alpha = (m - tau * v) / x
                 ends[channel, b, end, 0] = summaries[channel, b, s, LOWER_MISS + end]
@@ -444,10 +434,10 @@ def keep_labels_all(active: Flags, least: Floats, greatest: Floats, sections: Se
 
 
 @entry
-def write_outline(records: chains.Records, rings: Floats, n: int, tau: float, out: Floats) -> int:
-    """Call `whole_chains.outline` from Python."""
-    right, left = chains.chains_of(records, n)
-    return whole_chains.outline(right, left, rings, tau, out)
+def write_outline(records: chain_storage.Records, rings: Floats, n: int, tau: float, out: Floats) -> int:
+    """Call `chains.outline` from Python."""
+    right, left = chains_of(records, n)
+    return chains.outline(right, left, rings, tau, out)
 
 
 @entry
@@ -455,5 +445,4 @@ def steepest_all(alpha: Floats, farthest: float, laws: Laws, steepest: Floats) -
     """Write the greatest sizes of angles of shape (C, B) up to a range: those of `steepest_angles`, shape (2, B)."""
     law = law_of(laws, ZERO)
     for b in range(alpha.shape[1]):
-        across = alpha[law.other, b] if law.other >= 0 else 0.0
-        steepest[0, b], steepest[1, b] = steepest_angles(alpha[0, b], across, farthest, law)
+        steepest[0, b], steepest[1, b] = steepest_angles(alpha[0, b], across_of(alpha, b, law), farthest, law)

@@ -9,9 +9,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import chains, section_life, section_passes
+from infoset import chain_storage, chains, section_life, section_passes
 from infoset.arrays import Flags, Floats
-from infoset.chains import Chains
+from infoset.chain_storage import Chains
 from infoset.history import History
 from infoset.section_law import SectionLaw, law_table
 from infoset.section_passes import Sections
@@ -124,12 +124,12 @@ class SectionStack:
         self._spare -= chains.MOST_ADDED
         if self._spare >= 0:
             return
-        elapsed, points = self._elapsed, chains.working_room()
+        elapsed, points = self._elapsed, chain_storage.working_room()
         make_room = section_passes.make_room_all
-        floats, spare = make_room(active, chains.ROOM_AHEAD, elapsed, self.sections, self.table, points, False)
+        floats, spare = make_room(active, chain_storage.ROOM_AHEAD, elapsed, self.sections, self.table, points, False)
         if floats or spare < chains.MOST_ADDED:
-            self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
-            _, spare = make_room(active, chains.ROOM_AHEAD, elapsed, self.sections, self.table, points, True)
+            self.sections = self.sections._replace(rings=chain_storage.with_room(self.sections.rings, floats))
+            _, spare = make_room(active, chain_storage.ROOM_AHEAD, elapsed, self.sections, self.table, points, True)
         self._spare = spare - chains.MOST_ADDED
 
     def make_room_for_new(self, wanted: Flags, number: int) -> None:
@@ -137,8 +137,8 @@ class SectionStack:
         self._catch_up()
         self._freshness = min(self._freshness, Freshness.SUMMARISED)
         new = number * int(np.count_nonzero(wanted)) * len(self.laws)
-        floats = 2 * (2 * chains.CAPACITY + chains.LINE) * new
-        self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
+        floats = 2 * (2 * chains.CAPACITY + chain_storage.LINE) * new
+        self.sections = self.sections._replace(rings=chain_storage.with_room(self.sections.rings, floats))
 
     def note_new(self, spare: int) -> None:
         """Register new sections, each of which may gain at least `spare` vertices."""
@@ -174,7 +174,7 @@ class SectionStack:
             history.sights,
             self.sections,
             self.table,
-            chains.working_room(),
+            chain_storage.working_room(),
         )
         history.seen = history.events
         self._set_summarised(active)
@@ -242,7 +242,9 @@ class SectionStack:
         """Return an independent copy."""
         twin = copy.copy(self)
         arrays = {name: array.copy() for name, array in self.sections._asdict().items() if name != "rings"}
-        twin.sections = Sections(**arrays, rings=chains.copy_of_rings(self.sections.rings, self.sections.rings.size))
+        twin.sections = Sections(
+            **arrays, rings=chain_storage.copy_of_rings(self.sections.rings, self.sections.rings.size)
+        )
         return twin
 
 
@@ -257,6 +259,6 @@ def impulse_doubts(impulse: Floats, law: SectionLaw) -> Floats:
 
 def outline(section: Chains, row: int, label: float, elapsed: int, law: SectionLaw) -> Floats:
     """Return the vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
-    points = chains.working_room()
+    points = chain_storage.working_room()
     time_to_go = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
     return points[: section_passes.write_outline(*section, row, time_to_go, points)].copy()

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from infoset import section_life
 from infoset.arrays import Flags, Floats
-from infoset.chains import Chains
+from infoset.chain_storage import Chains
 from infoset.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, POSITIVE, WHOLE, real_array
 from infoset.pictures import sections_svg

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from guidance.noise import checked_measurements
 from guidance.strategy import decide, start
 from guidance.thruster import modulus
 from infoset import AngleSensor, InformationSet, InformationSetView, PredictedMiss
-from infoset.sensors import Measurements, Sensor
+from infoset.sensors import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.closed_form import worst_shift_m
 from sim.draws import Draws
@@ -94,10 +94,10 @@ class Engagements:
         self.step = 0
         self._draws = draws
         self._batch = batch = len(draws.position_m)
+        self._noise = noise or _make_noise(scenario, draws)
         self._truth = truth or KeplerMotion(
             draws.position_m, draws.velocity_m_s, scenario.sun, longest_substep_s(scenario)
         )
-        self._noise = noise or _make_noise(scenario, draws)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._model = model = on_board_model(scenario)
         self._states = start(self._strategy, batch, model.axes)
@@ -210,7 +210,10 @@ class Engagements:
         return np.where(self._flying, ahead_s, self._arrival_s)
 
     def _measure(self, sight: Sight, pending: Pending) -> Measurements:
-        """Measure with the sensors that are due, cut the sets, and return the measured values."""
+        """Measure with the sensors that are due, cut the sets, and return the values of the sensors that measured.
+
+        Where the image of a camera is lost, the set is cut by the other measurements.
+        """
         before_s = self.scenario.nominal_arrival_s - self.step * self.scenario.set_model.step_s
         due = {
             name: sensor
@@ -221,35 +224,27 @@ class Engagements:
         if not due or not self._tracking.any():
             return {}
         asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, pending)
-        measured = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
-        if self._draws.images is not None and AngleSensor.name in measured:
-            return self._measure_some(sight, due, measured, self._draws.images[:, self.step])
-        self._cut(sight, due, measured, self._tracking)
-        self._measured = self._measured | measured
+        measured = kept = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
+        cuts = [(measured, self._tracking)]
+        camera, images = AngleSensor.name, self._draws.images
+        if images is not None and camera in measured:
+            seen = images[:, self.step] >= self.scenario.set_model.angle_sensor.miss_probability
+            self._seen = {name: seen if name == camera else np.ones_like(seen) for name in measured}
+            others = {name: values for name, values in measured.items() if name != camera}
+            kept = others | {camera: np.where(seen, measured[camera], self._measured.get(camera, np.nan))}
+            cuts = [(measured, self._tracking & seen)]
+            if others:
+                cuts.append((others, self._tracking & ~seen))
+            if not cuts[0][1].any():
+                measured = others
+        for values, where in cuts:
+            for name, sensor in due.items():
+                if name in values:
+                    sensor.cut(self._information, values, where)
+                    sensor.cut(self._truth_section, values, where)
+            self._truth_section.look(where, sight)
+        self._measured = self._measured | kept
         return measured
-
-    def _cut(self, sight: Sight, due: Mapping[str, Sensor], measured: Measurements, where: Flags) -> None:
-        """Cut the sets of some engagements by all measurements."""
-        for name, sensor in due.items():
-            if name in measured:
-                sensor.cut(self._information, measured, where)
-                sensor.cut(self._truth_section, measured, where)
-        self._truth_section.look(where, sight)
-
-    def _measure_some(
-        self, sight: Sight, due: Mapping[str, Sensor], measured: Measurements, images: Floats
-    ) -> Measurements:
-        """Cut the sets by measurements of which some images are lost; return the values of sensors that measured."""
-        camera = AngleSensor.name
-        seen = images >= self.scenario.set_model.angle_sensor.miss_probability
-        self._seen = {name: seen if name == camera else np.ones_like(seen) for name in measured}
-        self._cut(sight, due, measured, self._tracking & seen)
-        others = {name: values for name, values in measured.items() if name != camera}
-        if others:
-            self._cut(sight, due, others, self._tracking & ~seen)
-        kept = np.where(seen, measured[camera], self._measured.get(camera, np.nan))
-        self._measured = self._measured | others | {camera: kept}
-        return measured if (seen & self._tracking).any() else others
 
     def _executed(self, impulse: Floats) -> Floats:
         """Return the executed impulses."""
@@ -327,8 +322,9 @@ class Engagements:
 
     def results(self, runs: NDArray[np.int64]) -> Results:
         """Return the results so far, with these run numbers."""
+        arrivals_s = self._arrivals_s()
         lost = self._information.inconsistent
-        margin = self._truth_section.least_margin_m(self._arrivals_s())
+        margin = self._truth_section.least_margin_m(arrivals_s)
         payoff, known = self._guaranteed, self._finished_label
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset import SetModel
-from infoset.history import History
+from infoset.history import ANGLE, IMPULSE, PREDICTION, RATE, History
 from infoset.replays import margins_along
 from infoset.section_law import BOUND_SLACK, law_table, section_laws
-from infoset.section_life import ANGLE, IMPULSE, PREDICTION, RATE
 from infoset.set_queries import MaskedFloats
 from sim.kepler import Sight
 

@@ -26,9 +26,10 @@ from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from numba import types
 
-from infoset import chain_steps, chains, location, replays, whole_chains
+from infoset import chain_storage, chains, location, replays
 from infoset.arrays import Floats
-from infoset.chains import CAPACITY, FIRST_RING, TAKEN
+from infoset.chain_storage import FIRST_RING, TAKEN
+from infoset.chains import CAPACITY
 from tests.rationals import Fraction
 
 Exact = tuple[Fraction, Fraction]
@@ -153,10 +154,10 @@ class Section:
     """One row of three, with the time to go that it was last turned to."""
 
     def __init__(self, tau: float, bottom: Level, top: Level, room: int = CAPACITY) -> None:
-        self.chains = chains.empty_sections(3, room)
+        self.chains = chain_storage.empty_sections(3, room)
         self.chains.rings[FIRST_RING:] = 0.0
         self.tau = tau
-        chain_steps.start(*self.parts, tau, bottom, top)
+        chains.start(*self.parts, tau, bottom, top)
 
     @property
     def sides(self) -> tuple[Any, Any]:
@@ -169,22 +170,22 @@ class Section:
 
     def turn(self, tau: float) -> None:
         self.tau = tau
-        chain_steps.turn(*self.parts, tau)
+        chains.turn(*self.parts, tau)
 
     def spread(self, half_v: float) -> None:
-        chain_steps.spread(*self.sides, self.tau, half_v)
+        chains.spread(*self.sides, self.tau, half_v)
 
     def shift(self, v: float) -> None:
-        chain_steps.shift(*self.sides, self.tau, v)
+        chains.shift(*self.sides, self.tau, v)
 
     def cut(self, lower: float, upper: float) -> tuple[bool, float]:
-        return chain_steps.cut(*self.parts, self.tau, lower, upper)
+        return chains.cut(*self.parts, self.tau, lower, upper)
 
     def cut_misses(self, lower: float, upper: float) -> tuple[bool, float]:
-        return whole_chains.cut_misses(*self.parts, self.tau, 0.0, lower, upper, chains.working_room())
+        return chains.cut_misses(*self.parts, self.tau, 0.0, lower, upper, chain_storage.working_room())
 
     def reduce(self) -> None:
-        whole_chains.reduce_outward(*self.parts, self.tau, chains.working_room())
+        chains.reduce_outward(*self.parts, self.tau, chain_storage.working_room())
 
     @property
     def reach(self) -> float:
@@ -195,11 +196,11 @@ class Section:
         return chains.count_of(*self.sides)
 
     def heights(self) -> tuple[float, float]:
-        return chain_steps.heights(*self.parts, self.tau)
+        return chains.heights(*self.parts, self.tau)
 
     def outline(self) -> Floats:
-        out = chains.working_room()
-        return out[: whole_chains.outline(*self.parts, self.tau, out)].copy()
+        out = chain_storage.working_room()
+        return out[: chains.outline(*self.parts, self.tau, out)].copy()
 
     def corners(self) -> list[Exact]:
         """The outline, as (V, m)."""
@@ -232,7 +233,7 @@ class Section:
 
     def peak(self, side: int) -> int:
         chain = self.sides[side]
-        return chain_steps.find_peak(chain, self.chains.rings, (1.0, -1.0)[side], abs(float(chain.m)))
+        return chains.find_peak(chain, self.chains.rings, (1.0, -1.0)[side], abs(float(chain.m)))
 
     def is_alone(self) -> bool:
         """Whether the rows before and after are as they were made."""
@@ -582,7 +583,7 @@ def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: flo
         misses = [sign * m for _, m in section.local(side)]
         first, peak = section.numbers(side)[0], section.peak(side)
         tolerance = part * (max(misses) - min(misses))
-        near = chain_steps.first_near_peak(section.sides[side], section.chains.rings, sign, tolerance)
+        near = chains.first_near_peak(section.sides[side], section.chains.rings, sign, tolerance)
         level = misses[peak - first] - tolerance
         assert all(miss >= level for miss in misses[near - first : peak - first + 1])
         assert near == first or misses[near - first - 1] < level
@@ -638,7 +639,7 @@ def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
     """A section that has grown until it may have no room for another step; its exact polygon is taken from there."""
     life = Life(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
     section = life.section
-    while not whole_chains.is_crowded(*section.sides):
+    while not chains.is_crowded(*section.sides):
         before = section.count
         section.turn(section.tau * fall)
         section.spread(0.01 * size_v)
@@ -715,9 +716,9 @@ def test_moving_to_wider_rings_keeps_everything(start: Start, before: list[Step]
     life, twin = Life(*start, room=32), Life(*start)
     for step in before:
         assert tell(life, step) == tell(twin, step)
-    rings = chains.with_room(life.section.chains.rings, 4 * CAPACITY)
+    rings = chain_storage.with_room(life.section.chains.rings, 4 * CAPACITY)
     life.section.chains = life.section.chains._replace(rings=rings)
-    chains.widen_rings(*life.section.parts, CAPACITY)
+    chain_storage.widen_rings(*life.section.parts, CAPACITY)
     assert rings[TAKEN] <= rings.size
     for i in range(len(after) + 1):
         for side in (RIGHT, LEFT):
@@ -795,7 +796,7 @@ def test_no_kernel_is_compiled_anew_for_each_constant_it_is_handed() -> None:
     """Numba makes a type of its own of a constant that is Python's: it doubles the time to compile."""
     literal: Any = types.maybe_literal
     assert literal(1) is not None
-    for number in (chain_steps.ONE, location.FIRST, location.LAST, replays.PROBE, replays.LOWER, replays.UPPER):
+    for number in (chains.ONE, location.FIRST, location.LAST, replays.PROBE, replays.LOWER, replays.UPPER):
         assert literal(number) is None
 
 

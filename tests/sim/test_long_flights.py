@@ -10,7 +10,7 @@ import pytest
 
 from infoset import AngleSensor, InformationSet, InitialSet, Model, StateBox, guaranteed_miss
 from infoset.arrays import Floats
-from infoset.section_life import IMPULSE
+from infoset.history import IMPULSE
 from sim import Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
