@@ -213,8 +213,8 @@ def test_two_workers_give_the_same_bits_and_one_that_dies_loses_nothing(
     (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
     workers = [processes.worker(), processes.worker()]
     processes.wait_for(2)
-    asked = ("campaign", "brief.toml", "--model", "paper", "--noise", "mixed", "--chunk", 16)
-    asked = (*asked, "--dask", processes.address, "--out")
+    options = ("--model", "paper", "--noise", "mixed", "--chunk", 16, "--dask", processes.address)
+    asked = ("campaign", "brief.toml", *options, "--out")
     code, out, err = infoset(*asked, "two", "--runs", 400)
     assert (code, err) == (0, "2 Dask workers, 2 threads\nwrote shards, scenario.toml, summary.json in two\n")
     assert "400 runs" in out
