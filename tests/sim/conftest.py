@@ -1,16 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from guidance import Thruster
 from infoset import AngleSensor, RangeSensor, SetModel, StateBox
-from sim import Results, Scenario, Sun
-from sim.chunk import fly_chunk
+from sim import Scenario, Sun
 
 
 @pytest.fixture(scope="session")
@@ -74,16 +71,3 @@ def brief(asteroid: Scenario) -> Scenario:
     sensor = replace(asteroid.set_model.angle_sensor, nominal_range_m=595e3)
     model = replace(asteroid.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
     return replace(asteroid, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
-
-
-@pytest.fixture(scope="session")
-def remembered_flight() -> Callable[..., Results]:
-    """`fly_chunk` with a memory: runs that it has simulated once are not simulated again."""
-    simulated = cache(fly_chunk)
-    return lambda chunk, _check=None: simulated(replace(chunk, index=0))
-
-
-@pytest.fixture
-def simulated_once(remembered_flight: Callable[..., Results], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Simulate each chunk once, in tests that are about which chunks are simulated, and how they are stored."""
-    monkeypatch.setattr("sim.flights.fly_chunk", remembered_flight)

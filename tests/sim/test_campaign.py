@@ -142,7 +142,7 @@ def test_any_executor_will_do(brief: Scenario, reference: Any, tmp_path: Path) -
     late = Late()
     assert mixed(brief, tmp_path / "late").run(late, workers=4).table.equals(reference)
     assert late.most <= 4
-    with worker_processes(1) as pool:
+    with worker_processes(2) as pool:
         assert mixed(brief, tmp_path / "processes", 64).run(pool).table.equals(reference.slice(0, 64))
 
 
@@ -154,7 +154,6 @@ def test_a_row_is_the_engagement_flown_alone(brief: Scenario, reference: Any) ->
         assert row["outcome"] == alone.outcomes[0].value
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_shards_are_plain_parquet(brief: Scenario, reference: Any, tmp_path: Path) -> None:
     mixed(brief, tmp_path / "campaign").run()
     files = shards(tmp_path / "campaign")
@@ -230,7 +229,6 @@ def breaking_off_after(runs: int) -> Callable[[Progress], None]:
     return progress
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_what_was_broken_off_is_gone_on_with(brief: Scenario, reference: Any, tmp_path: Path) -> None:
     asked, told = mixed(brief, tmp_path / "campaign"), list[Progress]()
     for _ in range(3):
@@ -246,7 +244,6 @@ def test_what_was_broken_off_is_gone_on_with(brief: Scenario, reference: Any, tm
     assert asked.run(resume=True).table.equals(reference)
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_an_unfinished_campaign_can_be_read(brief: Scenario, reference: Any, tmp_path: Path) -> None:
     with pytest.raises(Stop):
         mixed(brief, tmp_path).run(workers=1, progress=breaking_off_after(32))
@@ -255,7 +252,6 @@ def test_an_unfinished_campaign_can_be_read(brief: Scenario, reference: Any, tmp
     assert folder.table().equals(reference.slice(0, 32))
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_more_runs_extend_a_campaign(brief: Scenario, reference: Any, tmp_path: Path) -> None:
     mixed(brief, tmp_path, 40).run()
     assert len(shards(tmp_path)) == 3
@@ -268,7 +264,6 @@ def test_more_runs_extend_a_campaign(brief: Scenario, reference: Any, tmp_path: 
 
 
 @pytest.mark.parametrize("harm", ["cut", "empty", "flipped", "foreign", "garbage"])
-@pytest.mark.usefixtures("simulated_once")
 def test_a_damaged_shard_is_said_and_flown_again(harm: str, brief: Scenario, reference: Any, tmp_path: Path) -> None:
     mixed(brief, tmp_path / "campaign").run()
     victim = shards(tmp_path / "campaign")[4]
@@ -297,7 +292,6 @@ def test_a_damaged_shard_is_said_and_flown_again(harm: str, brief: Scenario, ref
     assert CampaignFolder.read(tmp_path / "campaign").damaged == []
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_a_shard_that_lies_about_itself_is_flown_again(brief: Scenario, reference: Any, tmp_path: Path) -> None:
     import zlib
 
@@ -316,7 +310,6 @@ def test_a_shard_that_lies_about_itself_is_flown_again(brief: Scenario, referenc
         victim = shards(tmp_path)[2]
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_a_shard_that_goes_while_it_is_read(brief: Scenario, tmp_path: Path) -> None:
     mixed(brief, tmp_path).run()
     folder = CampaignFolder.read(tmp_path)
@@ -325,7 +318,6 @@ def test_a_shard_that_goes_while_it_is_read(brief: Scenario, tmp_path: Path) -> 
         folder.table()
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_leftovers_of_a_process_that_died_writing_are_cleared(brief: Scenario, reference: Any, tmp_path: Path) -> None:
     (tmp_path / ".infoset-1-abc.tmp").write_bytes(b"half")
     with pytest.raises(Stop):
@@ -336,7 +328,6 @@ def test_leftovers_of_a_process_that_died_writing_are_cleared(brief: Scenario, r
 
 
 @pytest.mark.parametrize("moment", [1, 2, 5, 11])
-@pytest.mark.usefixtures("simulated_once")
 def test_a_full_disk_leaves_a_valid_folder(
     moment: int, brief: Scenario, reference: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -370,7 +361,6 @@ def test_a_disk_that_fails_otherwise(brief: Scenario, tmp_path: Path, monkeypatc
         mixed(brief, tmp_path).run()
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_who_began_it_is_told_and_not_compared(
     brief: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -382,7 +372,6 @@ def test_who_began_it_is_told_and_not_compared(
     assert read_manifest(tmp_path).made_by == begun
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_another_campaign_is_refused_and_every_difference_shown(brief: Scenario, tmp_path: Path) -> None:
     asked = mixed(brief, tmp_path, 32)
     asked.run()
@@ -449,7 +438,6 @@ def test_another_version_or_schema_is_refused(brief: Scenario, tmp_path: Path) -
         lambda text: text.replace(b'"stopped_after": null', b'"stopped_after": 99'),
     ],
 )
-@pytest.mark.usefixtures("simulated_once")
 def test_a_manifest_that_is_none_is_refused(change: Callable[[bytes], bytes], brief: Scenario, tmp_path: Path) -> None:
     mixed(brief, tmp_path, 32).run()
     file = tmp_path / "manifest.json"
@@ -486,7 +474,6 @@ def test_a_manifest_written_by_an_earlier_version_is_recognised(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("number", [2, np.float64(2.0), np.int64(2)])
-@pytest.mark.usefixtures("simulated_once")
 def test_numbers_of_other_types_are_the_same_campaign(number: Any, brief: Scenario, tmp_path: Path) -> None:
     plain = replace(brief, thruster=replace(brief.thruster, greatest_impulse_m_s=2.0))
     other = replace(brief, thruster=replace(brief.thruster, greatest_impulse_m_s=number))
@@ -497,7 +484,6 @@ def test_numbers_of_other_types_are_the_same_campaign(number: Any, brief: Scenar
     assert mixed(plain, tmp_path, 8).run(resume=True).complete
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_a_folder_that_holds_something_is_left_alone(brief: Scenario, tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("precious")
     for resume in (False, True):
@@ -513,7 +499,6 @@ def test_a_folder_that_holds_something_is_left_alone(brief: Scenario, tmp_path: 
         CampaignFolder.read(tmp_path)
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_two_campaigns_in_one_folder_at_once(brief: Scenario, reference: Any, tmp_path: Path) -> None:
     refused: list[BaseException] = []
 
@@ -575,7 +560,6 @@ def test_a_rule_stops_at_the_same_run_whoever_flies(
     assert estimate.width < 1.5
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_a_rule_that_comes_later_takes_nothing_away(
     brief: Scenario, rule: StoppingRule, stopped: Any, tmp_path: Path
 ) -> None:
@@ -588,7 +572,6 @@ def test_a_rule_that_comes_later_takes_nothing_away(
     assert told[-1].flown == 0
 
 
-@pytest.mark.usefixtures("simulated_once")
 def test_a_shard_put_aside_that_is_not_full_is_no_damage_when_more_runs_are_asked(
     brief: Scenario, rule: StoppingRule, stopped: Any, tmp_path: Path
 ) -> None:

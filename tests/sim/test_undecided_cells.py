@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import random
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim import CampaignNoise, QuantileName, Requirement, Results, Scenario, StoppingRule, Sweep
+from sim import CampaignNoise, QuantileName, Requirement, Scenario, StoppingRule, Sweep
 from sim.campaign import Progress
 from sim.requirement import Decision, judge
 from sim.storage import Axis, CampaignFolder, ManifestError, read_manifest
@@ -44,14 +44,6 @@ class Shuffled(Executor):
             future, work = self._waiting.pop(self._random.randrange(len(self._waiting)))
         if future.set_running_or_notify_cancel():
             future.set_result(work())
-
-
-@pytest.fixture(scope="module", autouse=True)
-def simulated_once(remembered_flight: Callable[..., Results]) -> Iterator[None]:
-    """Simulate each chunk once: these tests are about which chunks are simulated, and stored."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sim.flights.fly_chunk", remembered_flight)
-        yield
 
 
 @pytest.fixture(scope="module")
