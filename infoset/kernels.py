@@ -18,7 +18,6 @@ import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from types import FunctionType
 from typing import Any, ClassVar, TypeVar, cast
 
 from numba import config, njit, types
@@ -95,23 +94,14 @@ class Kernels:
         )(function)
         if kernel is not function:  # it is the function itself under NUMBA_DISABLE_JIT
             kernel._insert = lambda *_, **__: None
-            kernel._compile_for_args = lambda *_, **__: _callable_from_python(self, kernel)
+            kernel._compile_for_args = lambda *_, **__: _callable_from_python(kernel)
         return cast(F, kernel)
 
 
 @cache
-def _callable_from_python(kernels: Kernels, kernel: Any) -> Any:
+def _callable_from_python(kernel: Any) -> Any:
     """Return a compiled function that calls a linked kernel, which has no code that Python could call."""
-    function = kernel.py_func
-    of_file = function.__closure__ is None  # otherwise several kernels have this name: none of them is stored
-    code = _call.__code__.replace(co_filename=function.__code__.co_filename if of_file else "")
-    call = FunctionType(code, {"kernel": kernel, "__name__": function.__module__}, function.__name__)
-    call.__qualname__ = f"{function.__qualname__}-from-python"  # the name of its file of machine code
-    return kernels.compiled(call)
-
-
-def _call(*arguments: object) -> object:
-    return kernel(*arguments)  # type: ignore[name-defined]  # noqa: F821 - a global variable of each copy of this function
+    return JIT(lambda *arguments: kernel(*arguments))  # noqa: PLW0108 - the kernel has no Python interface
 
 
 class _Typing(Context):

@@ -85,9 +85,9 @@ def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.Fix
         rate_sensor=RateSensor(3.0 * given.set_model.step_s, 1e-5),
         set_model=replace(given.set_model, sections=9, fewest_sections=3),
     )
-    found = find_worst(scenario, budget=16, seed=2)
+    found = find_worst(scenario, budget=24, seed=2)
     assert found.sets_emptied == 0
-    assert found.miss_m == find_worst(scenario, budget=16, seed=2, keep_set=True).miss_m
+    assert found.miss_m == find_worst(scenario, budget=24, seed=2, keep_set=True).miss_m
     assert_possible(found, scenario)
     assert_flies_again(found)
     assert found.errors["range"].any()
@@ -116,8 +116,8 @@ def test_the_worst_in_space_is_worse_than_in_the_plane(coarse: Scenario) -> None
     spatial = guaranteed(in_space(coarse))
     found = find_worst(spatial, budget=60, seed=3)
     assert found.miss_m > find_worst(guaranteed(coarse), budget=60, seed=3).miss_m
-    one, two = (find_worst(spatial, budget=16, seed=3, threads=threads) for threads in (1, 2))
-    assert (one.miss_m, one.history) == (two.miss_m, two.history)
+    again = find_worst(spatial, budget=60, seed=3, threads=2)
+    assert (again.miss_m, again.history) == (found.miss_m, found.history)
 
 
 def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:

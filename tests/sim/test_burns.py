@@ -14,7 +14,6 @@ from infoset.arrays import Floats
 from sim import Results, Scenario, fly_one, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
-from tests.long_steps import with_long_steps
 from tests.space import in_space
 
 E, RANGE = 58e3, 5800e3
@@ -273,7 +272,7 @@ def test_the_guarantee_holds_with_errors_of_the_engine_and_a_delay(
     asteroid: Scenario, fields: dict[str, Any], strategy: str, spatial: bool
 ) -> None:
     """Measurements between decision and impulse keep the truth in the set, and the miss is at most Phi."""
-    scenario = replace(guaranteed(with_long_steps(asteroid)), strategy=strategy)
+    scenario = replace(guaranteed(asteroid), strategy=strategy)
     scenario = with_thruster(in_space(scenario) if spatial else scenario, execution_error_relative=0.05, **fields)
     if spatial:
         scenario = with_thruster(scenario, pointing_error_rad=0.02)

@@ -12,7 +12,6 @@ from guidance import NoiseKind, TieRule
 from sim import Scenario, simulate
 from sim.bound import TruthPair, lower_bound, pair_at
 from sim.closed_form import possible_miss_m, worst_shift_m
-from tests.long_steps import with_long_steps
 
 RUNS = 10
 
@@ -35,7 +34,7 @@ def latest_pair(scenario: Scenario) -> TruthPair:
 )
 def test_game_noise_is_worse_than_random_noise_and_near_the_bound(name: str, settings: list[str]) -> None:
     """Errors of one sign gave 12.5 m in place of 38 m for haiv-2013, whose lower bound is 39 m."""
-    scenario = with_long_steps(load_scenario(name, settings))
+    scenario = load_scenario(name, settings)
     random, game = (simulate(replace(scenario, noise=noise), runs=RUNS) for noise in NoiseKind)
     assert (game.miss_m > random.miss_m).all()
     assert (game.miss_m <= game.guaranteed_miss_m).all()
@@ -75,7 +74,7 @@ def test_only_a_schedule_has_a_shift() -> None:
 
 
 def test_the_two_rules_have_opposite_errors() -> None:
-    scenario = replace(with_long_steps(load_scenario("haiv-2013")), noise=NoiseKind.GAME)
+    scenario = replace(load_scenario("haiv-2013"), noise=NoiseKind.GAME)
     upper, lower = (simulate(replace(scenario, tie=tie), runs=RUNS) for tie in (TieRule.UPPER, TieRule.LOWER))
     across = [np.ma.getdata(results.lateral_miss) for results in (upper, lower)]
     assert (np.sign(across[0]) == -np.sign(across[1])).all()

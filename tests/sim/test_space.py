@@ -290,7 +290,7 @@ def extremal(scenario: Scenario, runs: int, seed: int) -> tuple[Draws, ScriptedN
 
 @pytest.mark.parametrize("convention", list(Convention))
 def test_the_true_state_is_kept_in_every_convention(convention: Convention, asteroid: Scenario) -> None:
-    scenario = of_model(in_space(with_long_steps(asteroid), convention=convention), Model.GUARANTEED)
+    scenario = of_model(in_space(asteroid, convention=convention), Model.GUARANTEED)
     draws, noise = extremal(scenario, 100, 7)
     flight = Engagements(scenario, draws, noise=noise)
     while flight.flying:
