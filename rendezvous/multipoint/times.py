@@ -21,10 +21,11 @@ LEAST_SHARE = 1e-6
 """Default of the least gap, as a share of the available time."""
 _POLISH_ROUNDS = 8
 _DIFFERENCE = 1e-5
+_HELD = 1e-3
 _WALL = 20.0
 _MOST_WALLS = 6
 _MOST_RESTARTS = 4
-_SETTLED = 1e-3
+_SETTLED, _WELL_SETTLED = 1e-3, 1e-6
 _ROUNDING = 1e-26
 _SMALLEST = float(np.finfo(float).tiny)
 _CLOCK = 1e-9
@@ -236,9 +237,12 @@ def optimise_times(
     if effort is Effort.FINAL:
         best = _polish(trials, best)
         for _ in range(_MOST_RESTARTS):
-            if _unsettled(trials, best) <= _SETTLED:
+            if _unsettled(trials, best) <= _WELL_SETTLED:
                 break
-            best = _polish(trials, _descend(trials, best, best.gaps, effort.tolerance, enough))
+            again = _polish(trials, _descend(trials, best, best.gaps, effort.tolerance, enough))
+            if not again.objective < best.objective:
+                break
+            best = again
         if not _unsettled(trials, best) <= _SETTLED:
             raise NotSettledError(
                 f"the best times found cost {best.objective:.6g} m^2/s^3 and are no minimum: another gap lowers the "
@@ -361,7 +365,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
     least, total, near = trials.least, trials.total, 1e-5 * trials.scale
     gaps = best.gaps
     full = total - gaps.sum() <= near
-    held = gaps - least <= near
+    held = gaps - least <= _HELD * least
     if held.all():
         return best
     if full:  # exactly at the latest time
