@@ -66,8 +66,13 @@ def _keep_exit_code() -> None:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether an error is an interrupt or has one as its cause, as in Python 3.11 while a module is loaded."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
+    """Whether an error is an interrupt or has replaced one.
+
+    Notes
+    -----
+    Python 3.11 names the interrupt as the cause while a module is loaded, pydantic only in the text of its own errors.
+    """
+    while error is not None and KeyboardInterrupt.__name__ not in repr(error):
         error = error.__cause__
     return error is not None
 

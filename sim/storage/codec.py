@@ -30,8 +30,9 @@ def to_json(value: Any) -> dict[str, Any]:
     field are then those of the versions before it.
     """
     adapter = _adapter(value.__class__)
-    text = adapter.dump_json((value,), fallback=lambda number: number.item())  # integers of NumPy
-    (made,) = adapter.validate_json(text)
+    # `dump_json` would replace a KeyboardInterrupt by another error. The fallback is for NumPy's integers.
+    values = adapter.dump_python((value,), mode="json", warnings=False, fallback=lambda number: number.item())
+    (made,) = adapter.validate_json(json.dumps(values))
     (plain,) = adapter.dump_python((made,), mode="json")
     return dict(_used(made, plain))
 

@@ -9,14 +9,19 @@ import subprocess
 import sys
 import time
 import weakref
+from collections.abc import Callable
+from enum import Enum
 from pathlib import Path
 
 import pytest
+from pydantic import TypeAdapter
 
 from experiments.__main__ import main as beginning
 from experiments.campaigns.flight import campaign_errors
+from infoset.model import Model
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import CampaignFolder, CampaignWriter
+from sim.storage.codec import to_json
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX signals")
@@ -64,6 +69,19 @@ def test_an_interrupt_says_how_to_go_on(
     assert infoset(*asked, "--resume", "-q").code == 0
     there = CampaignFolder.read(tmp_path / "runs")
     assert there.complete
+
+
+def interrupt(_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_an_interrupt_while_a_scenario_is_encoded_stays_an_interrupt(
+    brief: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    to_json(brief)  # makes pydantic's serializer
+    monkeypatch.setattr(Model, "value", property(interrupt), raising=False)
+    with pytest.raises(KeyboardInterrupt):
+        to_json(brief)
 
 
 def test_what_cannot_be_resumed_is_only_interrupted() -> None:
@@ -119,7 +137,8 @@ def test_interrupted_at_random_moments(name: str, infoset: Infoset, file: Path, 
 
 @pytest.mark.slow
 def test_a_campaign_interrupted_ten_times_gives_the_same_bits(brief: Scenario, file: Path, tmp_path: Path) -> None:
-    asked = ("campaign", file, "--runs", 2000, "--chunk", 8, "--noise", "mixed", "--out", "runs", "--resume", "-q")
+    many = ("--runs", 2000, "--chunk", 8, "--noise", "mixed", "--model", "paper")
+    asked = ("campaign", file, *many, "--out", "runs", "--resume", "-q")
     chance, stored = random.Random(9), []
     shards = tmp_path / "runs" / "shards"
     for _ in range(10):
@@ -221,12 +240,25 @@ main()
     assert begun(program, folder=tmp_path) == Left(0, "", "")
 
 
-def test_an_interrupt_that_python_wraps_is_one_message(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def run() -> None:
-        raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
+def wrapped_by_python() -> None:
+    raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
 
+
+def replaced_by_pydantic() -> None:
+    class Kind(Enum):
+        ONE = 1
+
+        @property
+        def value(self) -> int:
+            raise KeyboardInterrupt
+
+    TypeAdapter(Kind)
+
+
+@pytest.mark.parametrize("run", [wrapped_by_python, replaced_by_pydantic])
+def test_an_interrupt_as_another_error_is_one_message(
+    run: Callable[[], None], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr("sys.unraisablehook", sys.unraisablehook)  # put back afterwards
     monkeypatch.setattr("experiments.cli.main", run)
     with pytest.raises(SystemExit) as left:
@@ -250,9 +282,6 @@ def test_an_interrupt_that_falls_into_a_callback_is_not_lost(
 ) -> None:
     class Thing:
         pass
-
-    def interrupt(_: object) -> None:
-        raise KeyboardInterrupt
 
     def run() -> None:
         thing = Thing()
