@@ -13,7 +13,7 @@ from infoset import section_life
 from infoset.arrays import Flags, Floats
 from infoset.chain_storage import Chains
 from infoset.convex_polygons import ConvexPolygons
-from infoset.limits import NUMBER, POSITIVE, WHOLE, real_array
+from infoset.limits import NUMBER, POSITIVE, WHOLE, Limits, real_array
 from infoset.pictures import sections_svg
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.replays import PROBE, ROWS, replay_label, replay_room
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 MaskedFloats = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
 MaskedIntegers = np.ma.MaskedArray[tuple[int], np.dtype[np.int64]]
+
+LEAST_RANGE_M = 1e-25
+"""Least range of a section that can be mapped to (omega, alpha): e/x^2 is within `LARGEST` up to the speed of light."""
 
 
 @dataclass(frozen=True)
@@ -71,14 +74,14 @@ def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: f
     polygon : ConvexPolygons
         Polygons of (V, z), m/s and m.
     range_m, closing_speed_m_s : float
-        Range x, m, and closing speed e, m/s.
+        Range x, m, at least `LEAST_RANGE_M`, and closing speed e, m/s.
 
     Returns
     -------
     ConvexPolygons
         omega = (V + e z/x)/x in rad/s, alpha = z/x in rad.
     """
-    POSITIVE.need("range_m", range_m)
+    Limits(least=LEAST_RANGE_M).need("range_m", range_m)
     POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     x, e = range_m, closing_speed_m_s
     return polygon.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))

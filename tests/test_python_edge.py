@@ -395,6 +395,12 @@ def test_an_engagement_that_is_not_there() -> None:
             call()
 
 
+def test_a_range_at_which_rates_are_too_large() -> None:
+    assert np.isfinite(to_omega_alpha(square(), 1e-25, 3e8).vertices).all()
+    with pytest.raises(ValueError, match="range_m must be at least 1e-25: got 1e-100"):
+        to_omega_alpha(square(), 1e-100, 3e8)
+
+
 @pytest.mark.parametrize("value", [value for value in NO_NUMBERS if value is not None])
 def test_what_is_no_number(value: Any) -> None:
     given = information(1)

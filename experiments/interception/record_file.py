@@ -32,8 +32,9 @@ from experiments.common.output import library_version, write_file
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from infoset import ConvexPolygons, Section
 from infoset.arrays import Floats, Integers
-from infoset.limits import LARGEST, SMALLEST
+from infoset.limits import LARGEST
 from infoset.sensors import SENSORS
+from infoset.set_queries import LEAST_RANGE_M
 from sim import AxisStep, Inconsistency, Record, Results, Scenario, StepRecord
 from sim.columns import Column, columns_of, columns_with_values, values_of
 from sim.storage.codec import from_json, to_json
@@ -406,7 +407,7 @@ def _check(arrays: Arrays) -> None:
             raise ValueError(f"{name} does not run from 0 to {size}")
         if (np.diff(offsets) < least).any():
             raise ValueError(f"{name} does not rise")
-    for name, least_m in (("section_range_m", SMALLEST), ("measured_range_m", 0.0), ("true_range_m", 0.0)):
+    for name, least_m in (("section_range_m", LEAST_RANGE_M), ("measured_range_m", 0.0), ("true_range_m", 0.0)):
         if (arrays[name] < least_m).any():
             raise ValueError(f"{name} holds a range below {least_m:g}")
 
