@@ -1,4 +1,4 @@
-"""A lower bound on the miss that any strategy can guarantee, from two motions with the same measurements."""
+"""A lower bound of the miss that any strategy can guarantee, from two motions with the same measurements."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from infoset import AngleSensor, Convention, SetModel
 from infoset.arrays import Flags, Floats, Integers
+from sim.gravity import greatest_impulses_m_s
 from sim.scenario import Scenario
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
@@ -47,7 +48,9 @@ class TruthPair:
     apart_m : float
         Their distance across x at x = 0, with the same impulses, m.
     correction_m : float
-        Greatest change of one miss by the impulses after `last_common_step`, m.
+        Greatest change of one position across x at x = 0 by the impulses after `last_common_step`, m.
+    across_m_s : float
+        Greatest velocity across x of the two in the flight, with any impulses, m/s.
     position_m, velocity_m_s : ndarray, shape (2, 2) or (2, 3)
         (z, x) and (V_z, V_x) of the two motions at t = 0; (y, z, x) and (V_y, V_z, V_x) in space.
     acceleration_m_s2 : ndarray, shape (2, steps) or (2, 2, steps)
@@ -60,19 +63,21 @@ class TruthPair:
     last_common_step: int
     apart_m: float
     correction_m: float
+    across_m_s: float
     position_m: Floats
     velocity_m_s: Floats
     acceleration_m_s2: Floats
 
     @property
     def bound_m(self) -> float:
-        """Miss that at least one of the two has with any strategy, m."""
+        """Least distance, m, below which at least one of the two does not come with any strategy."""
         return max(0.0, self.unlimited_bound_m)
 
     @property
     def unlimited_bound_m(self) -> float:
         """The bound without its limit at zero, m."""
-        return 0.5 * self.apart_m - self.correction_m
+        cosine = -self.vx_m_s / math.hypot(self.vx_m_s, self.across_m_s)
+        return (0.5 * self.apart_m - self.correction_m) * cosine
 
     @property
     def arrival_s(self) -> float:
@@ -159,9 +164,11 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     about 110 variables, 6 ms each.
 
     The order in a step is measure, decide, fire. Equal measurements up to step s give equal impulses up to step s.
-    Later impulses may differ, and each changes one miss by at most mu2 x_j / |V_x|. The distance of the two along z at
-    x = 0 is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two misses by at least half of
-    it. The sum uses the earliest impulses that the budget allows, because they change the miss most.
+    Later impulses may differ, and each changes z at x = 0 by at most mu2 x_j / |V_x|. The distance of the two along z
+    at x = 0 is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two has at least half of it.
+    The sum uses the earliest impulses that the budget allows, because they change z most. The miss is the least
+    distance of the flight, which is shorter than the distance at x = 0 by at most the factor |V_x| / |(V_x, W)|, with
+    the greatest velocity W across x. docs/guarantee.md has the proof.
 
     The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance (1e-11 m/s^2).
 
@@ -330,16 +337,19 @@ class _Approach:
             *(farthest[planar] if name in axes else nothing for name, planar in self._models.items()), strict=True
         )
         sides = np.array([0.5, -0.5])
+        model, thruster = self.scenario.set_model, self.scenario.thruster
         boxes = [planar.bounds for planar in self._models.values()]
         z = [0.5 * sum(box.z_m) + sides * offset for box, offset in zip(boxes, offsets, strict=True)]
         vz = [0.5 * sum(box.vz_m_s) + sides * velocity for box, velocity in zip(boxes, velocities, strict=True)]
         acceleration = sides[:, None] * np.array(accelerations)[:, None, :]
+        speeds = np.abs(vz) + np.abs(acceleration).sum(axis=-1) * model.step_s
         return TruthPair(
             self.label_m,
             self.vx_m_s,
             last_common_step,
             math.hypot(*ends_m),
             self.correction_m(last_common_step),
+            float(np.hypot.reduce(speeds).max()) + greatest_impulses_m_s(model, thruster),
             np.column_stack([*z, np.full(2, self.label_m)]),
             np.column_stack([*vz, np.full(2, self.vx_m_s)]),
             acceleration if self.scenario.is_spatial else acceleration[0],

@@ -122,9 +122,8 @@ def fly_pair(
     """Simulate two motions with the same measurements up to the last common step.
 
     `strategy` None is the scenario's. The pair replaces the noise of the scenario and the manoeuvre of its target. For
-    every deterministic strategy, the greater one of the two misses is at least `pair.bound_m`, up to two differences:
-    the bound assumes straight motion, and the distance at x = 0 as the miss. Here gravity curves the motion, and the
-    miss is the least distance, which is smaller by the relative amount (V/V_x)^2 / 2, where V is the velocity across x.
+    every deterministic strategy, the greater one of the two misses is at least `pair.bound_m`. The bound leaves gravity
+    out; here gravity curves the motion.
     """
     *shape, steps = pair.acceleration_m_s2.shape
     nothing = np.zeros((*shape, steps + STEPS_BEYOND))

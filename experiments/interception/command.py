@@ -153,9 +153,10 @@ class Bound(FileOptions):
     """Compute a lower bound of the guaranteed miss of all strategies, and simulate the pairs of states that prove it.
 
     Two true states whose measurements are equal until some step receive equal impulses until that step, so at least
-    one of them misses. The bound is the greatest miss that such pairs prove. In space, the two states differ along both
-    axes if the errors of the angles are in a box, and along one axis if they are in a disc. Each strategy is simulated
-    with these pairs, and in the searches of infoset adversary. Without --out or --json no file is written.
+    one of them misses. The bound is the greatest miss, the least distance of the flight, that such pairs prove. In
+    space, the two states differ along both axes if the errors of the angles are in a box, and along one axis if they
+    are in a disc. Each strategy is simulated with these pairs, and in the searches of infoset adversary. Without --out
+    or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"

@@ -12,6 +12,7 @@ from guidance import Thruster
 from infoset import AngleSensor, ErrorShape, RateSensor, SetModel, StateBox
 from sim import Scenario
 from sim.bound import TruthPair, label_grid, lower_bound, pair_at
+from sim.pair import fly_pair
 from tests.space import in_space
 
 NOMINAL_LABEL_M = 5801.3e3
@@ -35,6 +36,11 @@ def toy(vz_m_s: float = 1e3, greatest_impulse_m_s: float = 0.5) -> Scenario:
         range_sensor=None,
         thruster=Thruster(1000.0, 0.0, greatest_impulse_m_s),
     )
+
+
+def cosine(across_m_s: float) -> float:
+    """Cosine of the angle between the relative velocity and the x axis, at a closing speed of 1000 m/s."""
+    return 1.0 / float(np.sqrt(1.0 + (across_m_s / 1000.0) ** 2))
 
 
 def with_disturbance(scenario: Scenario, disturbance_m_s2: float) -> Scenario:
@@ -111,27 +117,53 @@ def test_two_measurements_by_hand(last_common_step: int, bound_m: float) -> None
 
     Both can be the same (s = 1), and V_z is within 2 m/s, so |dv| <= 4 m/s: dz(2) = dz(1) + dv is at most 2 + 4 = 6 m,
     reached from dz(0) = -2 m. No impulse is left, for x = 0 at step 2: 6 / 2 = 3 m.
+
+    These are distances at x = 0. Impulses at t = 0, 1 and 2 s change V_z, which is at most the half-width, by 1.5 m/s.
     """
     half_width = 50.0 if last_common_step == 0 else 2.0
     pair = pair_at(toy(vz_m_s=half_width), 2000.0, -1000.0, last_common_step=last_common_step)
-    assert pair.bound_m == pytest.approx(bound_m, rel=3e-6)
+    assert pair.bound_m == pytest.approx(bound_m * cosine(half_width + 1.5), rel=3e-6)
 
 
 def test_two_measurements_by_hand_without_a_binding_box() -> None:
-    """As above, V_z within 1000 m/s: dz(2) = 2 dz(1) - dz(0) is at most 2 * 2 + 4 = 8 m, so 4 m with both the same.
+    """As above, V_z within 5 m/s: dz(2) = 2 dz(1) - dz(0) is at most 2 * 2 + 4 = 8 m, so 4 m with both the same.
 
-    With one only, 1002 m - or all that a strong engine leaves of it, nothing: both the same is the best choice.
+    dv = dz(1) - dz(0) is then 6 m/s, V_z is 3 m/s, and three impulses of 20 m/s make it 63 m/s. With one measurement
+    only, dz(2) is at most 4 + 2 * 10 = 24 m, and an impulse of 20 m/s at t = 1 s leaves nothing of 12 m: both the same
+    is the best choice.
 
     If either truth may accelerate by 0.25 m/s^2, the difference by 0.5 m/s^2 over each second: dz(1) = dz(0) + v + a/2
-    and dz(2) = dz(1) + v + a + b/2 = 2 dz(1) - dz(0) + (a + b)/2 is at most 8.5 m: 4.25 m.
+    and dz(2) = dz(1) + v + a + b/2 = 2 dz(1) - dz(0) + (a + b)/2 is at most 8.5 m: 4.25 m. v is 6 - 0.25 = 5.75 m/s,
+    and V_z at most 2.875 + 2 * 0.25 + 60 m/s.
     """
-    strong = toy(greatest_impulse_m_s=1e4)
-    strong = replace(strong, thruster=replace(strong.thruster, budget_m_s=1e9))
+    strong = toy(vz_m_s=5.0, greatest_impulse_m_s=20.0)
     found = pair_at(strong, 2000.0, -1000.0)
     assert found.last_common_step == 1
-    assert found.bound_m == pytest.approx(4.0, rel=3e-6)
-    assert pair_at(with_disturbance(strong, 0.25), 2000.0, -1000.0).bound_m == pytest.approx(4.25, rel=3e-6)
-    assert lower_bound(strong).bound_m == pytest.approx(4.0, rel=3e-6)
+    assert found.bound_m == pytest.approx(4.0 * cosine(63.0), rel=3e-6)
+    assert lower_bound(strong).bound_m == pytest.approx(4.0 * cosine(63.0), rel=3e-6)
+    pushed = pair_at(with_disturbance(strong, 0.25), 2000.0, -1000.0)
+    assert pushed.bound_m == pytest.approx(4.25 * cosine(63.375), rel=3e-6)
+    poor = replace(strong, thruster=replace(strong.thruster, budget_m_s=10.0))
+    assert pair_at(poor, 2000.0, -1000.0, last_common_step=1).bound_m == pytest.approx(4.0 * cosine(13.0), rel=3e-6)
+
+
+@pytest.mark.parametrize("slope", [0.01, 0.3])
+def test_the_bound_is_of_the_least_distance_of_an_oblique_flight(slope: float) -> None:
+    """As above with both measurements the same, no budget, and V_z within 2 m/s of `slope` times the closing speed.
+
+    The two are at z = 3 m and z = -3 m when x = 0, on straight lines: their least distances from the target are 3 m
+    times 1/sqrt(1 + (V_z/V_x)^2), which is less than 3 m. The bound takes the greater velocity for both.
+    """
+    scenario, speed = toy(), 1000.0 * slope
+    z_m = (-2.0 * speed - 100.0, -2.0 * speed + 100.0)
+    box = StateBox(z_m, (2000.0, 2000.0), (speed - 2.0, speed + 2.0), (-1000.0, -1000.0))
+    engine = replace(scenario.thruster, budget_m_s=0.0)
+    scenario = replace(scenario, dispersion=box, set_model=replace(scenario.set_model, bounds=box), thruster=engine)
+    pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
+    miss_m = sorted(fly_pair(scenario, pair).results.miss_m)
+    assert miss_m == pytest.approx([3.0 * cosine(speed + 2.0), 3.0 * cosine(speed - 2.0)], rel=3e-6)
+    assert pair.bound_m == pytest.approx(3.0 * cosine(speed + 2.0), rel=3e-6)
+    assert pair.bound_m < miss_m[1] < 3.0
 
 
 def test_budget_limits_what_can_be_corrected() -> None:
@@ -261,24 +293,27 @@ def test_bounds_in_space_by_the_last_common_step(
 def test_best_bounds_in_space(
     shape: ErrorShape, disturbance_m_s2: float, bound_m: float, last_common_step: int, asteroid: Scenario
 ) -> None:
+    """Distances at x = 0 by an independent linear program, times the cosine for the budget of 1000 m/s."""
     scenario = with_disturbance(in_space(asteroid, error_shape=shape), disturbance_m_s2)
     pair = pair_at(scenario, NOMINAL_LABEL_M, -58e3)
     assert pair.last_common_step == last_common_step
-    assert pair.bound_m == pytest.approx(bound_m, abs=0.005)
+    assert pair.bound_m == pytest.approx(bound_m / np.hypot(1.0, 1.0 / 58.0), abs=0.005)
 
 
 def test_two_measurements_in_space_by_hand() -> None:
     """As in the plane, with V_z within 2 m/s and V_y within 1 m/s, both measurements the same and no impulse left.
 
     |dv_y| <= 2 m/s: dy(2) = dy(1) + dv_y is at most 2 + 2 = 4 m, with dy(0) = 0; dz(2) is at most 6 m. With errors in a
-    box one of the two misses by half of |(4, 6)| m; in a disc by 3 m, along z only.
+    box one of the two is half of |(4, 6)| m from the target at x = 0; in a disc 3 m, along z only. The velocity across
+    x is at most |(1, 2)| m/s, or 2 m/s in a disc, and 1.5 m/s by impulses.
     """
     for name, bound_m in (("box", 0.5 * np.hypot(4.0, 6.0)), ("disc", 3.0)):
         scenario = in_space(toy(vz_m_s=2.0), error_shape=ErrorShape(name))
         bounds = replace(scenario.set_model.bounds, vy_m_s=(-1.0, 1.0))
         scenario = replace(scenario, set_model=replace(scenario.set_model, bounds=bounds), dispersion=bounds)
         pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
-        assert pair.bound_m == pytest.approx(bound_m, rel=3e-6)
+        across_m_s = 1.5 + (np.hypot(1.0, 2.0) if name == "box" else 2.0)
+        assert pair.bound_m == pytest.approx(bound_m * cosine(across_m_s), rel=3e-6)
         times, difference = pair.difference_m(1.0)
         assert times.tolist() == [0.0, 1.0, 2.0]
         assert difference[:, -1] == pytest.approx([4.0 if name == "box" else 0.0, 6.0], rel=3e-6)
