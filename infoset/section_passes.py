@@ -321,11 +321,11 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
 def make_room_all(
     active: Flags, added: int, elapsed: int, sections: Sections, laws: Laws, points: Floats, widen: bool
 ) -> tuple[int, int]:
-    """Compute the room that the living sections of the active engagements need; with `widen`, enlarge their rings.
+    """Compute the room that the living sections need; with `widen`, enlarge their rings.
 
     Every section must be able to gain `added` vertices. Return the number of floats by which the rings are too small,
-    for which memory must be allocated, and the number of vertices that every section may gain; it is negative if a
-    section must be reduced first, which `widen` does for those of `CAPACITY` vertices.
+    for which memory must be allocated, and the number of vertices that every section may gain. It is less than
+    `MOST_ADDED` if a section must be reduced first; `widen` reduces those of the active engagements.
     """
     slots, used = sections.slots, sections.used
     records, rings = sections.records, sections.rings
@@ -334,14 +334,12 @@ def make_room_all(
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         for b in range(len(used)):
-            if not active[b]:
-                continue
             for s in range(used[b]):
                 slot = slots[b, s]
                 if not slot.living:
                     continue
                 right, left = chains_of(records, row_of(sections, channel, b, s))
-                if widen and chains.is_crowded(right, left):
+                if widen and active[b] and chains.is_crowded(right, left):
                     tau = time_to_go(slot.label, elapsed, law)
                     chains.reduce_outward(right, left, rings, tau, points)
                 count, room = chains.count_of(right, left), chain_storage.room_of(right)

@@ -120,7 +120,10 @@ class SectionStack:
         return self.labels - self.law.closing_speed * (self.law.step * elapsed)
 
     def _make_room(self, active: Flags) -> None:
-        """Give each living section room for the vertices that one step adds."""
+        """Give each living section room for the vertices that one step adds.
+
+        Only the active engagements change, but the others may use their room later without another count.
+        """
         self._spare -= chains.MOST_ADDED
         if self._spare >= 0:
             return

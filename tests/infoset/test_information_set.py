@@ -52,6 +52,20 @@ def test_a_section_replayed_equals_the_one_carried_from_the_start() -> None:
         assert replayed.range_m == section.range_m
 
 
+@pytest.mark.parametrize("rates", range(1, 9))
+def test_rates_of_one_engagement_leave_room_for_the_sections_of_another_one(rates: int) -> None:
+    model = replace(MODEL, sections=3, fewest_sections=1)
+    alone, both = InformationSet(model), InformationSet(model, 2)
+    for _ in range(90):
+        both.measure_angle(0.0, [True, False])
+        for _ in range(rates):
+            both.measure_rate(0.0, 1.0, [True, False])
+        for information in (alone, both):
+            information.predict()
+    for one, other in zip(alone.sections(), both.sections(1), strict=True):
+        np.testing.assert_array_equal(other.polygon.polygon(), one.polygon.polygon())
+
+
 def test_in_space_a_value_is_needed_for_each_axis_and_is_used_in_all_engagements() -> None:
     model = replace(MODEL, bounds=replace(KNOWN, y_m=(-8e3, 8e3), vy_m_s=(-80.0, 80.0)))
     for batch in (1, 3):
