@@ -151,9 +151,10 @@ def _check_file(file: Path, overwrite: bool) -> None:
     with _reporting(file):
         _check_name(file, overwrite)
         probe = temporary_beside(file)
-        with probe.open("x"):
-            pass
-        probe.unlink()
+        try:
+            probe.touch(exist_ok=False)
+        finally:
+            probe.unlink(missing_ok=True)
 
 
 def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> None:
@@ -261,8 +262,8 @@ def _make_folder(folder: Path, overwrite: bool, created: list[Path]) -> None:
         if os.path.lexists(folder) and not folder.is_dir():
             raise InputError(f"{folder}: is a file, not a folder; choose another name for the output folder")
         for parent in reversed([parent for parent in (folder, *folder.parents) if not parent.exists()]):
+            created.append(parent)  # before it exists, because an interrupt may come between
             parent.mkdir()
-            created.append(parent)
         if not overwrite and next(folder.iterdir(), None) is not None:
             raise InputError(
                 f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
