@@ -83,6 +83,12 @@ def frame_of(points: Floats, flat: float = FLAT) -> Frame:
     A singular-value decomposition, O(k n^2). A direction counts where the points are wider along it than `flat` times
     their greatest width, and wider than the rounding of their coordinates.
     """
+    varies = (points != points[0]).any(axis=0)
+    if not varies.all():  # the other coordinates are exact, without the rounding errors of those that vary
+        inner, axes, centre = frame_of(points[:, varies], flat), np.eye(len(varies)), points[0].copy()
+        centre[varies] = inner.centre
+        across = np.hstack([axes[:, varies] @ inner.across, axes[:, ~varies]])
+        return Frame(centre, axes[:, varies] @ inner.basis, inner.extents, across)
     centre = points.mean(axis=0)
     centred = points - centre
     # With fewer points than coordinates all right singular vectors are needed, and the left ones are few.

@@ -56,7 +56,9 @@ class FacetsAndVertices:
         incidence, offsets = depth <= _INCIDENT * depth.max(axis=0), heights.max(axis=0)
         sizes = np.maximum(np.abs(vertices).max(axis=0), sizes)
         for row, level in zip(polytope.across, polytope.levels, strict=True):
-            half = _THIN * (float(np.abs(row) @ sizes) or 1.0)
+            # Where the coordinates are rounding errors, the layer is thicker than these.
+            rounding = float(np.abs(vertices @ row - level).max())
+            half = max(_THIN * float(np.abs(row) @ sizes), rounding / _THIN) or _THIN
             along = half * row / (row @ row)
             above = np.repeat([False, True], len(vertices))
             vertices = np.vstack([vertices - along, vertices + along])

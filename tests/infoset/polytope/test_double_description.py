@@ -125,3 +125,18 @@ def test_flat_sets_and_singular_images_get_a_thickness() -> None:
     image = flat.affine_image(np.diag([1.0, 1.0, 0.0]), np.zeros(3))
     assert is_consistent(image)
     np.testing.assert_allclose(image.vertices[:, 2], 0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_flat_set_whose_coordinates_are_rounding_errors_is_consistent(seed: int) -> None:
+    """A square that is turned and turned back. Formerly exact rational heights of vertices were far beyond facets."""
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    square = turn.T @ (turn @ Polytope.from_box([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0]))
+    shape = FacetsAndVertices.of(square)
+    vertices = [[Fraction(x) for x in vertex] for vertex in shape.vertices.tolist()]
+    for normal, offset, on in zip(shape.normals.tolist(), shape.offsets.tolist(), shape.incidence.T, strict=True):
+        heights = [sum(Fraction(n) * x for n, x in zip(normal, vertex, strict=True)) for vertex in vertices]
+        depth = max(heights) - min(heights)
+        away = [(height - Fraction(offset)) / depth for height in heights]
+        assert max(away) <= 1e-6
+        assert min(each for each, lies_on in zip(away, on, strict=True) if lies_on) >= -1e-6

@@ -409,6 +409,20 @@ def test_flat_sets_in_mixed_units_and_far_from_the_origin(name: str) -> None:
     assert float((other.offsets - other.normals @ middle).min(initial=np.inf)) >= radius * (1.0 - 1e-6) - 1e-9 * far
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_coordinates_that_are_equal_at_all_points_stay_exact(seed: int) -> None:
+    """Formerly they had the rounding errors of the other coordinates, which can have larger units."""
+    points = 1e9 * np.random.default_rng(seed).normal(size=(9, 5))
+    points[:, [1, 3]] = 5e-9, 0.0
+    steps = points - points[0]
+    for flat in (Polytope.from_vertices(points), Polytope.from_zonotope(points[0], steps)):
+        assert flat.dimension == 3
+        np.testing.assert_array_equal(flat.vertices[:, [1, 3]], np.tile([5e-9, 0.0], (len(flat.vertices), 1)))
+        assert not flat.normals[:, [1, 3]].any()
+        np.testing.assert_array_equal(flat.across.T @ flat.across, np.diag([0.0, 1.0, 0.0, 1.0, 0.0]))
+        np.testing.assert_array_equal(flat.across.T @ flat.levels, [0.0, 5e-9, 0.0, 0.0, 0.0])
+
+
 def test_a_row_of_another_length_does_not_hide_a_thin_set() -> None:
     """Formerly a point: the rounding of the offsets was not divided by the lengths of the rows."""
     rows = [[-1.0, 0.0], [8388609.0, -8388608.0], [-8388599.0, 8388608.0], [25165827.0, -25165824.0]]
