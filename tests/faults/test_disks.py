@@ -19,8 +19,8 @@ from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
 COMMANDS = {
     "experiment": ("experiment", "brief.toml", "--runs", 2),
-    "compare": ("compare", "brief.toml", "--runs", 2, "--strategies", "patient"),
-    "bound": ("bound", "brief.toml", "--strategies", "patient", "--budget", 4),
+    "compare": ("compare", "brief.toml", "--model", "paper", "--runs", 2, "--strategies", "patient"),
+    "bound": ("bound", "brief.toml", "--model", "paper", "--strategies", "patient", "--budget", 4),
     "engage": ("engage", "brief.toml"),
     "pareto": ("pareto",),
     "multipoint": ("multipoint",),
@@ -62,7 +62,7 @@ def test_a_report_on_a_full_disk(infoset: Infoset, file: Path, small_disk: Path)
 @pytest.mark.parametrize("page", ["--html", pytest.param("--gif", marks=pytest.mark.slow)])
 def test_a_page_or_a_film_that_does_not_fit(page: str, infoset: Infoset, file: Path, small_disk: Path) -> None:
     assert infoset("engage", file, "--record", "flight.npz", "-q").code == 0
-    (small_disk / "filler").write_bytes(b"\0" * 55_000)
+    (small_disk / "filler").write_bytes(b"\0" * 27_000)
     left = infoset("replay", "flight.npz", page, small_disk / f"page.{page[2:]}")
     assert "No space left on device" in refused(left)
     assert [each.name for each in small_disk.iterdir()] == ["filler"]
@@ -91,8 +91,8 @@ def test_a_folder_that_may_not_be_written(name: str, file: Path, tmp_path: Path,
     sealed = tmp_path / "sealed"
     sealed.mkdir(mode=0o500)
     others = {
-        "campaign": ("campaign", "brief.toml", "--runs", 8),
-        "sweep": ("sweep", "brief.toml", "--runs", 8, "--vary", "thruster.budget_m_s=100:200:2"),
+        "campaign": ("campaign", "brief.toml", "--model", "paper", "--runs", 8),
+        "sweep": ("sweep", "brief.toml", "--model", "paper", "--runs", 8, "--vary", "thruster.budget_m_s=100:200:2"),
     }
     command = {**COMMANDS, **others}[name]
     for out in (sealed, sealed / "o"):

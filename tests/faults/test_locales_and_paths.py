@@ -74,7 +74,9 @@ def test_files_are_the_same_with_a_decimal_comma(
 def test_every_file_of_a_command_in_a_german_process(
     german: dict[str, str], brief: Scenario, file: Path, tmp_path: Path
 ) -> None:
-    flown = begin("campaign", file, "--runs", 16, "--out", "runs", folder=tmp_path, environment=german)
+    flown = begin(
+        "campaign", file, "--model", "paper", "--runs", 16, "--out", "runs", folder=tmp_path, environment=german
+    )
     assert ended(flown).code == 0
     drawn = begin("report", "runs", "--out", "o", "--json", "-", folder=tmp_path, environment=german)
     assert json.loads(ended(drawn).out)["runs"] == 16

@@ -73,9 +73,10 @@ def test_a_campaign_under_a_limit_ends_and_is_resumed(brief: Scenario, file: Pat
 
     Where a library or Python itself fails for want of memory, it may end the process in its own way.
     """
-    asked = ("campaign", file, "--runs", 4096, "--chunk", 1024, "--out", "runs", "--resume", "--workers", 2)
+    study = ("campaign", file, "--model", "paper")
+    asked = (*study, "--runs", 4096, "--chunk", 1024, "--out", "runs", "--resume", "--workers", 2)
     # What compiles is not ours: the kernels are made before.
-    assert with_room(4 << 30, *asked[:2], "--runs", 32, "--out", "first", "--workers", 1, folder=tmp_path).code == 0
+    assert with_room(4 << 30, *study, "--runs", 32, "--out", "first", "--workers", 1, folder=tmp_path).code == 0
     codes = []
     for room_bytes in (1 << 20, 8 << 20, 32 << 20, 128 << 20):
         left = with_room(room_bytes, *asked, folder=tmp_path)
