@@ -246,7 +246,7 @@ def bound_leaving_all(
     slots, used, windows = sections.slots, sections.used, room.windows
     for b in range(active.shape[0]):
         made[b] = 0
-        if not active[b] or lower[b] >= upper[b]:
+        if not active[b] or lower[b] > upper[b]:
             continue
         tape = tape_of(tapes, b, room.replays.values, room.replays.applies)
         reached = 0.5 * floor[b]
@@ -365,7 +365,7 @@ class GuaranteedMiss:
         too, so that the number of replays does not grow with the number of steps.
         """
         lower = np.maximum(lower, self._bounded_below)
-        active = active & (lower < np.minimum(upper, self._least_label(history.elapsed + 1)))
+        active = active & (lower <= upper) & (lower < self._least_label(history.elapsed + 1))
         if not active.any():
             return
         below = self._least_label(history.elapsed + self._group_steps)

@@ -420,3 +420,20 @@ def test_flights_that_gravity_slows_down_reach_their_closest_approach(direction_
     results = simulate(Scenario("slow", "", sun, start, bounds, model, None, Thruster(1.0, 0.0, 1.0)), 4)
     assert sound(results)
     assert (results.miss_m < 0.2 * start).all()
+
+
+@pytest.mark.parametrize("greatest_z_m", [0.0, 0.5, 10.0])
+def test_phi_of_an_exactly_known_range_and_speed(greatest_z_m: float) -> None:
+    """The only label leaves after the angle at 1100 m, which leaves z within 1100 tan(1e-3); V_z is zero."""
+    e = 1e3
+    box = StateBox((-greatest_z_m, greatest_z_m), (2e4, 2e4), (0.0, 0.0), (-e, -e))
+    sensor = AngleSensor(0.9, 1e-3, 1e-3, 2e4)
+    model = SetModel(e, 0.9, box, sensor, range_threshold_m=500.0, initial_set=InitialSet.BOX, kind=Model.GUARANTEED)
+    information = InformationSet(model)
+    while information.tracking.any():
+        information.measure_angle(0.0)
+        information.drop_below_threshold()
+        information.predict()
+    phi_m, exists = information.guaranteed_miss()
+    assert exists.all()
+    assert phi_m[0] == pytest.approx(min(greatest_z_m, 1100.0 * math.tan(1e-3)), rel=1e-6)
