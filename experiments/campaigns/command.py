@@ -36,6 +36,8 @@ Shown = Annotated[
 
 
 _WORKERS: dict[str, Any] = {"metavar": "W", "min": 1, "max": MOST_WORKERS}
+_SOME_WORKERS = 4
+"""Number in a message about a wrong number of workers."""
 
 
 def _execution(text: str, *names: str, **options: Any) -> Any:
@@ -78,11 +80,12 @@ class Flight:
         ),
     ] = None
     workers: Annotated[
-        int | None, _execution("Number of threads on this machine. Default: one per core.", **_WORKERS)
+        int | None, _execution("Number of threads on this machine. Default: one per core.", **_WORKERS), _SOME_WORKERS
     ] = None
     processes: Annotated[
         int | None,
         _execution("Number of processes on this machine, instead of threads; faster for long campaigns.", **_WORKERS),
+        _SOME_WORKERS,
     ] = None
     dask: Annotated[
         str | None,

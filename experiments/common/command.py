@@ -17,7 +17,7 @@ from experiments.common.options import choice, read_number
 
 LOADING = "loading ..."
 EXAMPLE = 50
-"""Number in a message about an option without a default."""
+"""Number in a message about an option without a default, unless a number follows ``typer.Option(...)``."""
 
 
 def command(options: type, module: str) -> Callable[..., None]:
@@ -57,7 +57,7 @@ def loaded(module: str, quiet: bool) -> Any:
 
 def _checked(parameter: inspect.Parameter, hint: Any) -> Any:
     """Return the annotation of an option with a parser for its numbers or names, whose messages have an example."""
-    kind, info = get_args(hint)
+    kind, info, *examples = get_args(hint)
     kinds = [part for part in (get_args(kind) if NoneType in get_args(kind) else [kind]) if part is not NoneType]
     option = info.default if isinstance(info.default, str) else f"--{parameter.name.replace('_', '-')}"
     info = copy.copy(info)
@@ -66,7 +66,8 @@ def _checked(parameter: inspect.Parameter, hint: Any) -> Any:
     elif kinds[0] is bool:
         info.metavar = ""  # The help of a flag shows no type, because a flag has no value.
     elif kinds[0] in (int, float):
-        number = parameter.default if isinstance(parameter.default, kinds[0]) else max(info.min or 0, EXAMPLE)
+        default = parameter.default
+        number = default if isinstance(default, kinds[0]) else max(info.min or 0, *examples or [EXAMPLE])
         limits = {"least": info.min, "greatest": info.max, "example": f"{option} {number}"}
         info.parser = partial(read_number, option, kinds[0], **limits)
     return Annotated[kind, info]
