@@ -16,6 +16,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from experiments.campaigns.campaign_columns import CampaignColumns
 from experiments.campaigns.samples import noise_flags
 from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, separate_labels, style
+from experiments.common.screen import some_runs
 from experiments.interception.figures.b_plane import Cloud, draw_b_plane, greatest_guarantee
 from experiments.interception.figures.distributions import MOST_POINTS, Sample, axis_limit, beyond, draw_samples
 from infoset.arrays import Floats
@@ -57,7 +58,7 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
         bound = "guaranteed miss" if column.guarantees else "the paper's $\\Phi$ (not a bound here)"
         samples.append(
             Sample(
-                f"{column.noise} noise, {meter} range meter, {column.miss_m.size} runs",
+                f"{column.noise} noise, {meter} range meter, {some_runs(column.miss_m.size)}",
                 _look(column),
                 column.miss_m,
                 column.impulse_m_s,
@@ -76,7 +77,7 @@ def _clouds(folder: CampaignFolder) -> list[Cloud]:
     clouds = []
     for noise, rows in noise_flags(folder).items():
         bound_m = greatest_guarantee(bounds_m[rows].tolist()) if guaranteed else None
-        clouds.append(Cloud(f"{noise} noise, {len(miss_m[rows])} runs", across_m[rows], miss_m[rows], bound_m))
+        clouds.append(Cloud(f"{noise} noise, {some_runs(len(miss_m[rows]))}", across_m[rows], miss_m[rows], bound_m))
     return [each for each in clouds if len(each.miss_m)]
 
 

@@ -7,7 +7,7 @@ from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_er
 from experiments.campaigns.samples import heading, sample_json, sample_parts, samples
 from experiments.common.errors import input_errors
 from experiments.common.output import output_of, to_json
-from experiments.common.screen import show
+from experiments.common.screen import show, some_runs
 from experiments.interception.own_strategy import own_strategy
 from experiments.interception.study import study_title
 from sim import Campaign, CampaignNoise, StoppingRule
@@ -47,7 +47,7 @@ def run(options: Options) -> None:
         stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
         parts = [
             study_title(manifest.scenario, manifest.strategy, manifest.seed),
-            f"{stored.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}; "
+            f"{some_runs(stored.finished_runs)}{stopped}, {duration(flown.elapsed_s)}; "
             f"quantiles with {'' if stopped else '95 % '}confidence limits",
             *sample_parts(stored, by_noise),
         ]

@@ -22,7 +22,17 @@ from experiments.campaigns.sweep_table import TABLE, sweep_table
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output_of, to_json
-from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, progress_bar, say, show
+from experiments.common.screen import (
+    BeginProgress,
+    Part,
+    figure_files,
+    number,
+    number_table,
+    progress_bar,
+    say,
+    show,
+    some_runs,
+)
 from experiments.interception.scenario_file import scenario_to_toml
 from experiments.interception.study import study_title
 from sim.results import ending
@@ -136,10 +146,10 @@ def _parts(
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
-    yield f"{folder.finished_runs} runs{stopped}"
+    yield f"{some_runs(folder.finished_runs)}{stopped}"
     yield from sample_parts(folder, by_noise)
     yield ""
-    runs = ", ".join(f"{sample.runs} runs of {sample.noise} noise" for sample in by_noise)
+    runs = ", ".join(f"{some_runs(sample.runs)} of {sample.noise} noise" for sample in by_noise)
     yield f"correlation of the miss with the initial state ({runs}; CI by Fisher's z):"
     table = number_table("noise", "component", "Pearson", "95 % CI", "Spearman", "95 % CI", left=2)
     for noise, components in related.items():

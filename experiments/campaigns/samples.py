@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from experiments.common.output import hit_key, library_version
-from experiments.common.screen import Part, number, number_table, quantile_notes
+from experiments.common.screen import Part, number, number_table, quantile_notes, some_runs
 from experiments.interception.runs.shared import bound_name
 from experiments.interception.study import SetCounts, game_note, hit_text, set_counts, set_warnings
 from guidance import NoiseKind
@@ -236,7 +236,11 @@ def sample_parts(folder: CampaignFolder, by_noise: Sequence[Sample]) -> Iterator
             table.add_row("", "", "max", number(sample.worst[quantity]), "")
         notes += [f"{sample.noise} noise: {text}" for text in quantile_notes(sample.runs, LEVELS, len(by_noise))]
         outcomes = ", ".join(f"{count} {name}" for name, count in sample.outcomes.items())
-        held = f"; miss within the bound Phi: {sample.phi_held} of {sample.phi_known} runs" if sample.phi_known else ""
+        held = (
+            f"; miss within the bound Phi: {sample.phi_held} of {some_runs(sample.phi_known)}"
+            if sample.phi_known
+            else ""
+        )
         hits = hit_text(sample.hits, scenario)
         notes += [
             f"{sample.noise} noise: {text}" for text in (hits, f"{sample.sets}{held}; outcomes: {outcomes}") if text

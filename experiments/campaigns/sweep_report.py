@@ -24,7 +24,7 @@ from experiments.campaigns.sweep_table import (
 )
 from experiments.common.errors import InputError, input_errors
 from experiments.common.output import Output, hit_key
-from experiments.common.screen import Part, number, number_table
+from experiments.common.screen import Part, number, number_table, some_runs
 from experiments.interception.study import SetCounts, set_warnings, study_title
 from guidance import NoiseKind
 from sim import QuantileName, Requirement
@@ -109,7 +109,7 @@ class SweepReport:
         if manifest.until:
             watched = " although runs are added until it is made"
         yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
-        yield f"{len(table.cells)} cells, {folder.finished_runs} runs"
+        yield f"{len(table.cells)} cells, {some_runs(folder.finished_runs)}"
         yield (
             f"the decision in each cell has a confidence of at least 95 %{watched}; "
             "this holds for each cell, not for all cells together"

@@ -159,6 +159,11 @@ def number(value: float | None) -> str:
     return f"{value:.1f}" if 100 <= abs(value) < 1e9 else f"{value:.3g}"
 
 
+def some_runs(count: int) -> str:
+    """Return a number of runs as text: 1 run, 2 runs."""
+    return f"{count} run{'' if count == 1 else 's'}"
+
+
 def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[str]:
     """Return a line about the quantiles that so many runs of a noise do not show; no line if they show all."""
     hidden = [level for level in levels if not shows(runs, level)]
@@ -166,4 +171,5 @@ def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[
         return []
     needed = max(round(1.0 / min(level, 1.0 - level)) for level in hidden)
     each = f" of each noise (--runs {noises * needed})" if noises > 1 else ""
-    return [f"{runs} runs are too few for {', '.join(map(level_name, hidden))}; {needed} runs{each} show all quantiles"]
+    too_few = f"{some_runs(runs)} {'is' if runs == 1 else 'are'} too few for {', '.join(map(level_name, hidden))}"
+    return [f"{too_few}; {needed} runs{each} show all quantiles"]

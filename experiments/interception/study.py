@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.common.screen import some_runs
 from infoset import Model
 from infoset.arrays import Flags
 from sim import HitEstimate, Results, Scenario
@@ -30,7 +31,7 @@ class SetCounts:
         return SetCounts(*(mine + more for mine, more in zip(vars(self).values(), vars(other).values(), strict=True)))
 
     def __str__(self) -> str:
-        kept, emptied = (f"{count} of {self.runs} runs" for count in (self.truth_kept, self.set_emptied))
+        kept, emptied = (f"{count} of {some_runs(self.runs)}" for count in (self.truth_kept, self.set_emptied))
         return (
             f"true state inside the set at every step: {kept} ({percent(self.truth_kept / self.runs)}); "
             f"set became empty: {emptied} ({percent(self.set_emptied / self.runs)})"
@@ -47,7 +48,7 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
     """Return a warning if sets failed in some runs: the quantiles then describe the failures of the model too."""
     if not counts.failed:
         return []
-    failures = f"in {counts.failed} of {counts.runs} runs the set lost the true state or became empty"
+    failures = f"in {counts.failed} of {some_runs(counts.runs)} the set lost the true state or became empty"
     if model is Model.PAPER:
         return [
             f"warning: model paper: {failures}; the quantiles include these failures of the model; for quantiles "
@@ -85,8 +86,8 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
     if hits is None or scenario.body is None:
         return ""
     return (
-        f"hit (miss at most {scenario.body.radius_m:g} m): {hits.hits} of {hits.runs} runs ({percent(hits.probability)}"
-        f"), 95 % CI {percent(hits.lower)} to {percent(hits.upper)}"
+        f"hit (miss at most {scenario.body.radius_m:g} m): {hits.hits} of {some_runs(hits.runs)} "
+        f"({percent(hits.probability)}), 95 % CI {percent(hits.lower)} to {percent(hits.upper)}"
     )
 
 

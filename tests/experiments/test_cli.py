@@ -583,6 +583,16 @@ def test_the_run_of_every_command_takes_its_options() -> None:
         assert get_type_hints(run) == {"options": options, "return": type(None)}
 
 
+@pytest.mark.parametrize(
+    "command", [["experiment"], ["compare", "--strategies", "patient"], ["campaign", "--out", "o"]]
+)
+def test_one_run_is_singular(command: list[str], infoset: Command, brief_file: Path) -> None:
+    code, out, _ = infoset(*command, brief_file, "--runs", "1")
+    assert code == 0
+    assert "1 run is too few for " in out
+    assert "1 runs" not in out
+
+
 @pytest.mark.parametrize("command", [["experiment"], ["compare", "--strategies", "patient"]])
 def test_no_99_percent_quantile_of_two_runs(command: list[str], infoset: Command, brief_file: Path) -> None:
     code, out, _ = infoset(*command, brief_file, "--runs", "2")

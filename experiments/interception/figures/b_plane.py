@@ -16,7 +16,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 
 from experiments.common.figure_style import INK, SET_EDGE, TRUTH, WIDTH_MM, figure_grid, plain, style
-from experiments.common.screen import number
+from experiments.common.screen import number, some_runs
 from experiments.interception.figures.distributions import RADIUS_LOOK, axis_limit
 from infoset.arrays import Floats
 from sim import Results
@@ -203,7 +203,7 @@ def draw_discs(axes: Axes, half: float, radius_m: float | None, guaranteed_m: fl
 
 def _handles(clouds: Sequence[Cloud], radius_m: float | None, halves: Sequence[float]) -> list[Line2D | Patch]:
     runs = {len(each.miss_m) for each in clouds}
-    runs_per_panel = f", {max(runs)} runs per panel" if len(runs) == 1 else ""
+    runs_per_panel = f", {some_runs(max(runs))} per panel" if len(runs) == 1 else ""
     handles: list[Line2D | Patch] = [
         Line2D([], [], markersize=4.0, label=f"miss of one run{runs_per_panel}", **_POINT),
         Line2D([], [], color=INK, marker="+", linestyle="none", markersize=7.0, label="centre of the body"),

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from experiments.common.figure_style import INK, SET_EDGE, SET_FILL, new_figure, place_axes, style
+from experiments.common.screen import some_runs
 from experiments.interception.comparison import Comparison
 from experiments.interception.figures.distributions import draw_radius
 from guidance import NoiseKind
@@ -129,7 +130,7 @@ def _handles(runs: int) -> list[Line2D | Patch]:
         )
 
     return [
-        Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, linewidth=0.5, label=f"histogram of {runs} runs"),
+        Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, linewidth=0.5, label=f"histogram of {some_runs(runs)}"),
         mark("o", "median", 5.0),
         *([Line2D([], [], color=INK, linewidth=2.4, label="10 to 90 %")] if shows(runs, 0.9) else []),
         *([mark("|", "99 %", 6.0)] if shows(runs, 0.99) else []),

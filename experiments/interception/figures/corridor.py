@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from experiments.common.figure_style import IMPULSE, SET_EDGE, SET_FILL, TRUTH, figure_grid, style
+from experiments.common.screen import some_runs
 from experiments.interception.course import Courses, marks
 from experiments.interception.curves import Curve
 from experiments.interception.figures.approach import MARK_LOOK, count_down_pair
@@ -55,7 +56,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
             _draw_possible(axes, curve, course)
             _draw_impulses(below, course)
             meter = f", {'' if curve.range_meter else 'no '}range meter" if len(curves) > 2 else ""
-            axes.set_title(f"({letter}) {curve.noise.value} noise{meter}, {len(course.possible_m)} runs")
+            axes.set_title(f"({letter}) {curve.noise.value} noise{meter}, {some_runs(len(course.possible_m))}")
             count_down_pair(axes, below, course.scenario)
             axes.set_ylabel("possible miss, m")
             below.set_ylabel("impulse, m/s")

@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from experiments.common.figure_style import CURVE_LOOKS, INK, figure_grid, separate_labels, style, width_mm
+from experiments.common.screen import some_runs
 from experiments.interception.curves import Curve
 from infoset.arrays import Floats
 from sim import empirical_distribution
@@ -62,7 +63,7 @@ def draw_distributions(curves: Sequence[Curve], radius_m: float | None = None) -
 
 def _sample(curve: Curve) -> Sample:
     meter = "with" if curve.range_meter else "no"
-    name = f"{curve.number}  {curve.noise.value} noise, {meter} range meter, {len(curve.results)} runs"
+    name = f"{curve.number}  {curve.noise.value} noise, {meter} range meter, {some_runs(len(curve.results))}"
     results = curve.results
     return Sample(name, CURVE_LOOKS[curve.number], results.miss_m, results.impulse_m_s, number=curve.number)
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from experiments.common.figure_style import INK, SET_EDGE, figure_grid, style
+from experiments.common.screen import some_runs
 from experiments.interception.figures.distributions import draw_band
 from experiments.interception.figures.process import draw_process
 from sim import Record, Results, empirical_distribution
@@ -31,5 +32,5 @@ def plot(results: Results | Record | Sequence[Record]) -> Figure:
             draw_band(axes, found.values, found.lower, found.upper, SET_EDGE)
             axes.plot(found.values, found.probability, drawstyle="steps-post", color=INK)
             axes.set_xlabel(label)
-        left.set_ylabel(f"share of {len(results)} runs")
+        left.set_ylabel(f"share of {some_runs(len(results))}")
     return figure

@@ -16,6 +16,7 @@ from experiments.common.screen import (
     quantile_notes,
     say_warnings,
     show,
+    some_runs,
 )
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Compare
@@ -146,9 +147,9 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
             sets.add_row(title, comparison.strategy, *shares)
             title = ""
     runs = len(compared[0].miss_m)
-    yield f"{scenario_title(scenario)}: quantiles of {runs} runs; game noise: {TIES}"
+    yield f"{scenario_title(scenario)}: quantiles of {some_runs(runs)}; game noise: {TIES}"
     yield table
-    yield from ("", f"of the {runs} runs:", sets)
+    yield from ("", f"of the {some_runs(runs)}:", sets)
     yield game_note(scenario, TIES)
     yield from quantile_notes(runs, [*QUANTILES.values()])
     yield from set_warnings(scenario.set_model.kind, total)

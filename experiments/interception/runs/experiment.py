@@ -18,6 +18,7 @@ from experiments.common.screen import (
     say,
     say_warnings,
     show,
+    some_runs,
 )
 from experiments.interception.choices import scenario_with
 from experiments.interception.command import Experiment
@@ -128,7 +129,7 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
         (median,) = shown_quantiles(bounds, [0.5]) if len(bounds) else (None,)
         table.add_row("", bound_name(scenario), "", number(median))
         lines = [
-            f"in {count} run{'s' if count > 1 else ''} {text} ({outcome.value})"
+            f"in {some_runs(count)} {text} ({outcome.value})"
             for outcome, text in endings.items()
             if (count := results.outcomes.count(outcome))
         ]
@@ -149,7 +150,9 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
     runs = len(curves[0].results)
     notes += quantile_notes(runs, levels)
     burns = [burn_table(scenario, curves)] if scenario.thruster.impulses_s else []
-    title = f"{scenario.name}: quantiles of {runs} runs per curve; game noise with the tie rule {scenario.tie.value}"
+    title = (
+        f"{scenario.name}: quantiles of {some_runs(runs)} per curve; game noise with the tie rule {scenario.tie.value}"
+    )
     return [title, table, *burns, *notes]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from experiments.common.errors import InputError
 from experiments.common.output import library_version
-from experiments.common.screen import NOT_FINITE, BeginProgress
+from experiments.common.screen import NOT_FINITE, BeginProgress, some_runs
 from experiments.interception.course import Courses
 from experiments.interception.scenario_file import scenario_hash
 from experiments.interception.study import set_counts
@@ -110,7 +110,7 @@ def certificate(results: Results) -> str:
     if not len(held):
         return sets
     missing = f" ({runs - len(held)} without a bound)" if len(held) < runs else ""
-    return f"{sets}; miss within the bound Phi: {int(held.sum())} of {len(held)} runs{missing}"
+    return f"{sets}; miss within the bound Phi: {int(held.sum())} of {some_runs(len(held))}{missing}"
 
 
 @dataclass(frozen=True)
