@@ -64,7 +64,7 @@ nitpick_ignore = [
         "guidance.predictive": ("ManoeuvreState",),
         "guidance.proportional_navigation": ("PulseState",),
         "infoset.observer_sets": ("Polygons", "Polytopes"),
-        "infoset.sensors": ("RangeOrRanges", "Measurements", "Geometry", "Cuttable"),
+        "infoset.sensors": ("RangeOrRanges", "Measurements", "Geometry", "Apart", "Cuttable"),
         "infoset.set_queries": ("SetQueries",),
         "infoset.set_state": ("SetState",),
         "sim.engagement": ("Step",),

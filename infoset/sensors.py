@@ -76,6 +76,29 @@ class Geometry(Protocol):
         """Distance, m, shape (B,), or for points that differ by axis (2, B)."""
 
 
+@dataclass(frozen=True)
+class Apart:
+    """Two true motions with the same range x at n times, for the lower bound of the miss (`sim.lower_bound`).
+
+    Parameters
+    ----------
+    offset_m, predicted_miss_m : ndarray, shape (axes, n)
+        Differences of their positions z and of their predicted misses z + V x/e along each lateral axis, m.
+    range_m : ndarray, shape (n,)
+        Their range x, m.
+    slope : ndarray, shape (n,)
+        Greatest distance from the x axis, and greatest change of it until x = 0, of both, as a share of x.
+    closing_speed_m_s : float
+        Their closing speed e.
+    """
+
+    offset_m: Floats
+    predicted_miss_m: Floats
+    range_m: Floats
+    slope: Floats
+    closing_speed_m_s: float
+
+
 class Cuttable(Protocol):
     """A batch of sets that measurements cut; `InformationSet` describes the methods."""
 
@@ -163,6 +186,18 @@ class Sensor(ABC):
             measurement leaves V and z as they are.
         """
         return None
+
+    def share(self, apart: Apart) -> Floats:
+        """Return half of the greatest difference of the measured values of two motions, in units of the bound.
+
+        Shape (n,). Both can have the same measured value where it is at most 1. This default is that of `band`, which
+        neglects the square of the slope.
+        """
+        band = self.band(apart.range_m, apart.closing_speed_m_s, 2.0)
+        if band is None:
+            return np.zeros(len(apart.range_m))
+        size = apart.predicted_miss_m if band[0] else apart.offset_m
+        return np.asarray(np.abs(size).max(axis=0) / band[1])
 
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
         """Return the measured value for an error in units of the bound, from -1 to 1."""
@@ -455,15 +490,24 @@ class AngleSensor(Sensor):
         sets.measure_angle(measured[self.name], where)
 
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
-        """Return a band of z.
+        """Return a band of z."""
+        return False, errors * self.error_bound(range_m) * range_m
 
-        With a camera the bound of a point off the axis, which is farther away, is less: h/x = b/(1 + b^2) allows for
-        this, along both axes at once.
+    def share(self, apart: Apart) -> Floats:
+        """Return half of the greatest difference of the angles, in units of the bound, shape (n,).
+
+        An angle changes by at most as much as z/x. The elevation of a gimbal also depends on the azimuth, by the
+        product of the two slopes, which is at most half of `slope` squared. The bound may fall with the distance, which
+        is greater than the range.
         """
-        bound = self.error_bound(range_m)
-        if self.centroid_error_m:
-            bound = bound / (1.0 + bound * bound)
-        return False, errors * bound * range_m
+        angles = np.abs(apart.offset_m) / apart.range_m
+        if self.convention is Convention.GIMBAL:
+            y, z = angles
+            angles = np.stack([y, z + 0.5 * apart.slope**2 * y])
+        farthest_m = apart.range_m * np.hypot(1.0, apart.slope)
+        bounds = np.minimum(self.error_bounds(apart.range_m), self.error_bounds(farthest_m))
+        shares = 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD)
+        return np.asarray(np.hypot.reduce(shares) if self.is_disc else shares.max(axis=0))
 
 
 def _direction(alpha_rad: Floats) -> Floats:
@@ -513,6 +557,10 @@ class RangeSensor(Checked, Sensor):
     def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         """Cut by the range; an angle measured in the same step sharpens the cut."""
         sets.measure_range(measured[self.name], self.relative_error, where, alpha_rad=measured.get(AngleSensor.name))
+
+    def share(self, apart: Apart) -> Floats:
+        """Return half of the greatest difference of the distances, in units of the bound, shape (n,)."""
+        return np.asarray(apart.slope * np.hypot.reduce(apart.offset_m) / (2.0 * self.relative_error * apart.range_m))
 
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
         """Return d (1 + error b), m."""
@@ -566,6 +614,14 @@ class RateSensor(Checked, Sensor):
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
         """Return a band of the predicted miss, omega x^2/e."""
         return True, errors * self.error_rad_s * range_m * range_m / closing_speed_m_s
+
+    def share(self, apart: Apart) -> Floats:
+        """Return half of the greatest difference of the rates, in units of the bound, shape (n,).
+
+        The rate is the derivative of z/x times cos^2(alpha), which depends on z.
+        """
+        change_m = np.abs(apart.predicted_miss_m) + 4.0 * apart.slope**2 * np.abs(apart.offset_m)
+        return np.asarray(change_m.max(axis=0) / self.band(apart.range_m, apart.closing_speed_m_s, 2.0)[1])
 
 
 SENSORS: tuple[type[Sensor], ...] = (AngleSensor, RangeSensor, RateSensor)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from infoset import AngleSensor, Convention, SetModel
+from infoset import AngleSensor, SetModel
 from infoset.arrays import Flags, Floats, Integers
+from infoset.sensors import Apart, Sensor
 from sim.gravity import greatest_impulses_m_s
 from sim.scenario import Scenario
 
@@ -20,7 +21,9 @@ LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
 """The bound oscillates with the label; the period is the distance travelled between two measurements."""
 REFINEMENTS = 5
 MARGIN = 1e-6
-"""Reserve as a share of each limit, for rounding and for the difference between an angle and its tangent."""
+"""Reserve as a share of each limit, for rounding."""
+LEAST_RANGE = 1e-9
+"""Least range of a measurement as a share of the label; at a range of zero there is no angle."""
 
 FEW_CANDIDATES = 16
 """Number of last common steps up to which all are tried: between few impulses, the bound has several maxima."""
@@ -146,7 +149,7 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     Parameters
     ----------
     scenario : Scenario
-        A range meter has no effect, because the two motions have the same range.
+        A range meter has no effect unless it is very precise, because the two motions have the same range x.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
 
@@ -168,7 +171,8 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     at x = 0 is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two has at least half of it.
     The sum uses the earliest impulses that the budget allows, because they change z most. The miss is the least
     distance of the flight, which is shorter than the distance at x = 0 by at most the factor |V_x| / |(V_x, W)|, with
-    the greatest velocity W across x. docs/guarantee.md has the proof.
+    the greatest velocity W across x. The linear programs neglect the square of the slope of the line of sight; the
+    difference that they find is reduced until all measurements can be the same. docs/guarantee.md has the proof.
 
     The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance (1e-11 m/s^2).
 
@@ -291,16 +295,23 @@ class _Approach:
         self.arrival_s = -label_m / vx_m_s
         # Steps that start before the arrival, up to rounding.
         steps = max(1, int(np.ceil(self.arrival_s / model.step_s * (1.0 - 1e-12))))
-        times_s = np.append(np.arange(steps) * model.step_s, self.arrival_s)
-        self.ranges_m = np.maximum(label_m + vx_m_s * times_s[:-1], 0.0)
+        self.times_s = times_s = np.append(np.arange(steps) * model.step_s, self.arrival_s)
+        self.ranges_m = np.maximum(label_m + vx_m_s * times_s[:-1], LEAST_RANGE * label_m)
         self._models = {name: model.axis(name) for name in model.axes}
-        margin = MARGIN
-        if model.angle_sensor.convention is Convention.GIMBAL:
-            # The elevation of each of the two depends on its azimuth, up to the product of their slopes.
-            slope = model.bounds.offset_m / model.bounds.x_m[0] + model.bounds.lateral_speed_m_s / -vx_m_s
-            margin += slope * slope
+        self._due: dict[str, Integers] = {}
+        for name, sensor in scenario.sensors.items():
+            due = np.arange(0, steps, model.steps_in(sensor.period_s))
+            before_s = (scenario.nominal_arrival_s - times_s[due]).tolist()
+            self._due[name] = due[[sensor.measures_at(each_s) for each_s in before_s]]
         self._programs = {
-            planar: _Program(planar, scenario, times_s, self.ranges_m, vx_m_s, margin)
+            planar: _Program(
+                planar,
+                {**scenario.sensors, AngleSensor.name: planar.angle_sensor},
+                self._due,
+                times_s,
+                self.ranges_m,
+                vx_m_s,
+            )
             for planar in dict.fromkeys(self._models.values())
         }
         single = {planar: (name,) for name, planar in self._models.items()}
@@ -333,31 +344,51 @@ class _Approach:
         wanted = dict.fromkeys(self._models[name] for name in axes)
         farthest = {planar: self._programs[planar].farthest(last_common_step) for planar in wanted}
         nothing = (0.0, 0.0, np.zeros(len(self.ranges_m)), 0.0)
-        offsets, velocities, accelerations, ends_m = zip(
-            *(farthest[planar] if name in axes else nothing for name, planar in self._models.items()), strict=True
-        )
-        sides = np.array([0.5, -0.5])
-        model, thruster = self.scenario.set_model, self.scenario.thruster
+        found = [farthest[planar] if name in axes else nothing for name, planar in self._models.items()]
+        offset, velocity, acceleration, end_m = (np.array(each) for each in zip(*found, strict=True))
+        model, sides = self.scenario.set_model, np.array([0.5, -0.5])
         boxes = [planar.bounds for planar in self._models.values()]
-        z = [0.5 * sum(box.z_m) + sides * offset for box, offset in zip(boxes, offsets, strict=True)]
-        vz = [0.5 * sum(box.vz_m_s) + sides * velocity for box, velocity in zip(boxes, velocities, strict=True)]
-        acceleration = sides[:, None] * np.array(accelerations)[:, None, :]
-        speeds = np.abs(vz) + np.abs(acceleration).sum(axis=-1) * model.step_s
+        z = np.array([0.5 * sum(box.z_m) for box in boxes])[:, None]
+        vz = np.array([0.5 * sum(box.vz_m_s) for box in boxes])[:, None]
+        speeds = np.abs(vz + sides * velocity[:, None]) + 0.5 * np.abs(acceleration).sum(axis=1)[:, None] * model.step_s
+        across_m_s = float(np.hypot.reduce(speeds).max()) + greatest_impulses_m_s(model, self.scenario.thruster)
+        correction_m = self.correction_m(last_common_step)
+        apart_m = math.hypot(*end_m)
+        slope = (across_m_s / -self.vx_m_s) + max(0.0, 0.5 * apart_m - correction_m) / self.ranges_m
+        share = self._admissible_share(last_common_step, offset, velocity, acceleration, slope)
+        halves = share * sides
+        pushes = halves[:, None] * acceleration[:, None, :]
         return TruthPair(
             self.label_m,
             self.vx_m_s,
             last_common_step,
-            math.hypot(*ends_m),
-            self.correction_m(last_common_step),
-            float(np.hypot.reduce(speeds).max()) + greatest_impulses_m_s(model, thruster),
-            np.column_stack([*z, np.full(2, self.label_m)]),
-            np.column_stack([*vz, np.full(2, self.vx_m_s)]),
-            acceleration if self.scenario.is_spatial else acceleration[0],
+            share * apart_m,
+            correction_m,
+            across_m_s,
+            np.column_stack([*(z + halves * offset[:, None]), np.full(2, self.label_m)]),
+            np.column_stack([*(vz + halves * velocity[:, None]), np.full(2, self.vx_m_s)]),
+            pushes if self.scenario.is_spatial else pushes[0],
         )
+
+    def _admissible_share(
+        self, last_common_step: int, offset: Floats, velocity: Floats, acceleration: Floats, slope: Floats
+    ) -> float:
+        """Return the share of a difference, at most 1, with which all measurements up to a step can be the same.
+
+        `slope` is that of `Apart` at each step. The linear programs neglect its square.
+        """
+        positions, speeds = (values[:, :-1] for values in _motion(offset, velocity, acceleration, self.times_s))
+        misses = positions + speeds * (self.arrival_s - self.times_s[:-1])
+        greatest = 1.0 - MARGIN
+        for name, sensor in self.scenario.sensors.items():
+            due = self._due[name][self._due[name] <= last_common_step]
+            apart = Apart(positions[:, due], misses[:, due], self.ranges_m[due], slope[due], -self.vx_m_s)
+            greatest = max(greatest, float(sensor.share(apart).max(initial=0.0)))
+        return (1.0 - MARGIN) / greatest
 
 
 class _Program:
-    """The linear programs of one axis; `margin` is the reserve of its limits as a share.
+    """The linear programs of one axis, with its sensors and the steps in which they measure.
 
     `limits_m` is the greatest distance of the two along the axis at each step with the same measurements,
     `miss_limits_m` that of their predicted misses; infinite where nothing is measured.
@@ -366,24 +397,22 @@ class _Program:
     def __init__(
         self,
         model: SetModel,
-        scenario: Scenario,
+        sensors: Mapping[str, Sensor],
+        due: Mapping[str, Integers],
         times_s: Floats,
         ranges_m: Floats,
         vx_m_s: float,
-        margin: float,
     ) -> None:
         self.model, self.times_s, self.ranges_m, self.vx_m_s = model, times_s, ranges_m, vx_m_s
         self.arrival_s = float(times_s[-1])
         self.steps = len(ranges_m)
         self.limits_m = np.full(self.steps, np.inf)
         self.miss_limits_m = np.full(self.steps, np.inf)
-        for sensor in {**scenario.sensors, AngleSensor.name: model.angle_sensor}.values():
-            due = np.arange(0, self.steps, model.steps_in(sensor.period_s))
-            due = due[[sensor.measures_at(scenario.nominal_arrival_s - at_s) for at_s in times_s[due]]]
-            band = sensor.band(self.ranges_m[due], -vx_m_s, 2.0 * (1.0 - margin))
+        for name, sensor in sensors.items():
+            band = sensor.band(self.ranges_m[due[name]], -vx_m_s, 2.0 * (1.0 - MARGIN))
             if band is not None:
                 limits = self.miss_limits_m if band[0] else self.limits_m
-                limits[due] = np.minimum(limits[due], band[1])
+                limits[due[name]] = np.minimum(limits[due[name]], band[1])
 
     @property
     def is_measured(self) -> Flags:
