@@ -78,14 +78,16 @@ class Geometry(Protocol):
 
 @dataclass(frozen=True)
 class Apart:
-    """Two true motions with the same range x at n times, for the lower bound of the miss (`sim.lower_bound`).
+    """Two true motions at n times, for the lower bound of the miss (`sim.lower_bound`).
 
     Parameters
     ----------
     offset_m, predicted_miss_m : ndarray, shape (axes, n)
-        Differences of their positions z and of their predicted misses z + V x/e along each lateral axis, m.
-    range_m : ndarray, shape (n,)
-        Their range x, m.
+        Greatest differences of their positions z and of their predicted misses z + V x/e along each lateral axis, m.
+    shift_m : float
+        Greatest difference of their ranges x, m.
+    range_m, farthest_m : ndarray, shape (n,)
+        Their least range x and greatest distance, m.
     slope : ndarray, shape (n,)
         Greatest distance from the x axis, and greatest change of it until x = 0, of both, as a share of x.
     closing_speed_m_s : float
@@ -94,7 +96,9 @@ class Apart:
 
     offset_m: Floats
     predicted_miss_m: Floats
+    shift_m: float
     range_m: Floats
+    farthest_m: Floats
     slope: Floats
     closing_speed_m_s: float
 
@@ -498,15 +502,14 @@ class AngleSensor(Sensor):
 
         An angle changes by at most as much as z/x. The elevation of a gimbal also depends on the azimuth, by the
         product of the two slopes, which is at most half of `slope` squared. The bound may fall with the distance, which
-        is greater than the range.
+        is greater than the range. An axis that is measured without error is left out.
         """
         angles = np.abs(apart.offset_m) / apart.range_m
         if self.convention is Convention.GIMBAL:
             y, z = angles
             angles = np.stack([y, z + 0.5 * apart.slope**2 * y])
-        farthest_m = apart.range_m * np.hypot(1.0, apart.slope)
-        bounds = np.minimum(self.error_bounds(apart.range_m), self.error_bounds(farthest_m))
-        shares = 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD)
+        bounds = np.minimum(self.error_bounds(apart.range_m), self.error_bounds(apart.farthest_m))
+        shares = np.where(bounds == 0.0, 0.0, 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD))
         return np.asarray(np.hypot.reduce(shares) if self.is_disc else shares.max(axis=0))
 
 
@@ -560,7 +563,8 @@ class RangeSensor(Checked, Sensor):
 
     def share(self, apart: Apart) -> Floats:
         """Return half of the greatest difference of the distances, in units of the bound, shape (n,)."""
-        return np.asarray(apart.slope * np.hypot.reduce(apart.offset_m) / (2.0 * self.relative_error * apart.range_m))
+        difference_m = apart.slope * np.hypot.reduce(apart.offset_m) + apart.shift_m
+        return np.asarray(difference_m / (2.0 * self.relative_error * apart.range_m))
 
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
         """Return d (1 + error b), m."""

@@ -14,7 +14,7 @@ import numpy as np
 from infoset import AngleSensor, SetModel
 from infoset.arrays import Flags, Floats, Integers
 from infoset.sensors import Apart, Sensor
-from sim.gravity import greatest_impulses_m_s
+from sim.gravity import greatest_impulses_m_s, with_gravity
 from sim.scenario import Scenario
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
@@ -22,6 +22,8 @@ LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
 REFINEMENTS = 5
 MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding."""
+GREATEST_SPEED_CHANGE = 0.05
+"""Greatest relative change of V_x by gravity for which the reserve for gravity is proved."""
 LEAST_RANGE = 1e-9
 """Least range of a measurement as a share of the label; at a range of zero there is no angle."""
 
@@ -52,8 +54,10 @@ class TruthPair:
         Their distance across x at x = 0, with the same impulses, m.
     correction_m : float
         Greatest change of one position across x at x = 0 by the impulses after `last_common_step`, m.
+    gravity_m : float
+        Greatest change of half of `apart_m` by gravity, m.
     across_m_s : float
-        Greatest velocity across x of the two in the flight, with any impulses, m/s.
+        Greatest velocity across x of the two in the flight, with any impulses and gravity, m/s.
     position_m, velocity_m_s : ndarray, shape (2, 2) or (2, 3)
         (z, x) and (V_z, V_x) of the two motions at t = 0; (y, z, x) and (V_y, V_z, V_x) in space.
     acceleration_m_s2 : ndarray, shape (2, steps) or (2, 2, steps)
@@ -66,6 +70,7 @@ class TruthPair:
     last_common_step: int
     apart_m: float
     correction_m: float
+    gravity_m: float
     across_m_s: float
     position_m: Floats
     velocity_m_s: Floats
@@ -80,7 +85,7 @@ class TruthPair:
     def unlimited_bound_m(self) -> float:
         """The bound without its limit at zero, m."""
         cosine = -self.vx_m_s / math.hypot(self.vx_m_s, self.across_m_s)
-        return (0.5 * self.apart_m - self.correction_m) * cosine
+        return (0.5 * self.apart_m - self.correction_m - self.gravity_m) * cosine
 
     @property
     def arrival_s(self) -> float:
@@ -174,7 +179,8 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     the greatest velocity W across x. The linear programs neglect the square of the slope of the line of sight; the
     difference that they find is reduced until all measurements can be the same. docs/guarantee.md has the proof.
 
-    The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance (1e-11 m/s^2).
+    The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance, and changes the
+    time of arrival: the bound has a reserve for both, and is zero if gravity changes V_x by 5 % or more.
 
     In space, each axis has a linear program, and the impulses limit the modulus. If the errors of the angles are in a
     box, the two motions of a pair differ along both axes, each by the most that its program allows: |(dy(T), dz(T))|
@@ -297,6 +303,12 @@ class _Approach:
         steps = max(1, int(np.ceil(self.arrival_s / model.step_s * (1.0 - 1e-12))))
         self.times_s = times_s = np.append(np.arange(steps) * model.step_s, self.arrival_s)
         self.ranges_m = np.maximum(label_m + vx_m_s * times_s[:-1], LEAST_RANGE * label_m)
+        self.impulses_m_s = greatest_impulses_m_s(model, scenario.thruster)
+        self.speed_change = 0.0
+        if scenario.sun is not None:
+            change = with_gravity(model, scenario.sun, self.impulses_m_s).gravity_speed_change
+            self.speed_change = min(change, GREATEST_SPEED_CHANGE)
+        self.late_s = 0.5 * self.speed_change / (1.0 - self.speed_change) * self.arrival_s
         self._models = {name: model.axis(name) for name in model.axes}
         self._due: dict[str, Integers] = {}
         for name, sensor in scenario.sensors.items():
@@ -332,9 +344,10 @@ class _Approach:
     def correction_m(self, last_common_step: int) -> float:
         """Return the greatest change of the miss by impulses that are decided after a step, within the budget, m."""
         thruster, steps = self.scenario.thruster, self.scenario.impulse_steps
-        given = np.arange(thruster.delay_steps, len(self.ranges_m)) if steps is None else np.array(steps)
-        later = (given > last_common_step + thruster.delay_steps) & (given < len(self.ranges_m))
-        arms_s = self.ranges_m[given[later]] / -self.vx_m_s
+        latest_s, step_s = self.arrival_s + self.late_s, self.scenario.set_model.step_s
+        given = np.arange(thruster.delay_steps, math.ceil(latest_s / step_s)) if steps is None else np.array(steps)
+        arms_s = latest_s - step_s * given[given > last_common_step + thruster.delay_steps]
+        arms_s = arms_s[arms_s > 0.0]
         spent = thruster.greatest_impulse_m_s * np.arange(len(arms_s))
         sizes = np.clip(thruster.budget_m_s - spent, 0.0, thruster.greatest_impulse_m_s)
         return float(sizes @ arms_s)
@@ -346,16 +359,24 @@ class _Approach:
         nothing = (0.0, 0.0, np.zeros(len(self.ranges_m)), 0.0)
         found = [farthest[planar] if name in axes else nothing for name, planar in self._models.items()]
         offset, velocity, acceleration, end_m = (np.array(each) for each in zip(*found, strict=True))
-        model, sides = self.scenario.set_model, np.array([0.5, -0.5])
+        step_s, sides, eta = self.scenario.set_model.step_s, np.array([0.5, -0.5]), self.speed_change
         boxes = [planar.bounds for planar in self._models.values()]
         z = np.array([0.5 * sum(box.z_m) for box in boxes])[:, None]
         vz = np.array([0.5 * sum(box.vz_m_s) for box in boxes])[:, None]
-        speeds = np.abs(vz + sides * velocity[:, None]) + 0.5 * np.abs(acceleration).sum(axis=1)[:, None] * model.step_s
-        across_m_s = float(np.hypot.reduce(speeds).max()) + greatest_impulses_m_s(model, self.scenario.thruster)
-        correction_m = self.correction_m(last_common_step)
-        apart_m = math.hypot(*end_m)
-        slope = (across_m_s / -self.vx_m_s) + max(0.0, 0.5 * apart_m - correction_m) / self.ranges_m
-        share = self._admissible_share(last_common_step, offset, velocity, acceleration, slope)
+        by_manoeuvre = np.abs(acceleration).sum(axis=1) * step_s
+        speeds = np.abs(vz + sides * velocity[:, None]) + 0.5 * by_manoeuvre[:, None]
+        across_m_s = float(np.hypot.reduce(speeds).max()) + self.impulses_m_s
+        across_m_s = (across_m_s - eta * self.vx_m_s) / (1.0 - eta)
+        correction_m, apart_m = self.correction_m(last_common_step), math.hypot(*end_m)
+        positions, velocities = _motion(offset, velocity, acceleration, self.times_s)
+        misses = positions + velocities * (self.arrival_s - self.times_s)
+        # Gravity changes the difference of the two and the time of arrival.
+        change_m = eta / (2.0 - eta) * float(np.hypot.reduce(positions).max())
+        late_m = self.late_s * float(np.hypot.reduce(np.abs(velocity) + by_manoeuvre))
+        shift_m = change_m + 2.0 * eta * correction_m
+        gravity_m = 0.5 * (change_m + late_m) + eta * correction_m + shift_m * across_m_s / -self.vx_m_s
+        left_m = max(0.0, 0.5 * apart_m - correction_m)
+        share = self._admissible_share(last_common_step, positions, misses, change_m, late_m, across_m_s, left_m)
         halves = share * sides
         pushes = halves[:, None] * acceleration[:, None, :]
         return TruthPair(
@@ -364,6 +385,7 @@ class _Approach:
             last_common_step,
             share * apart_m,
             correction_m,
+            gravity_m,
             across_m_s,
             np.column_stack([*(z + halves * offset[:, None]), np.full(2, self.label_m)]),
             np.column_stack([*(vz + halves * velocity[:, None]), np.full(2, self.vx_m_s)]),
@@ -371,18 +393,35 @@ class _Approach:
         )
 
     def _admissible_share(
-        self, last_common_step: int, offset: Floats, velocity: Floats, acceleration: Floats, slope: Floats
+        self,
+        last_common_step: int,
+        positions_m: Floats,
+        misses_m: Floats,
+        change_m: float,
+        late_m: float,
+        across_m_s: float,
+        left_m: float,
     ) -> float:
         """Return the share of a difference, at most 1, with which all measurements up to a step can be the same.
 
-        `slope` is that of `Apart` at each step. The linear programs neglect its square.
+        The linear programs neglect gravity and the square of the slope of the line of sight.
         """
-        positions, speeds = (values[:, :-1] for values in _motion(offset, velocity, acceleration, self.times_s))
-        misses = positions + speeds * (self.arrival_s - self.times_s[:-1])
+        nearest_m = self.ranges_m - 0.5 * self.speed_change * self.label_m
+        if self.speed_change >= GREATEST_SPEED_CHANGE or nearest_m[: last_common_step + 1].min(initial=np.inf) <= 0.0:
+            return 0.0
         greatest = 1.0 - MARGIN
         for name, sensor in self.scenario.sensors.items():
             due = self._due[name][self._due[name] <= last_common_step]
-            apart = Apart(positions[:, due], misses[:, due], self.ranges_m[due], slope[due], -self.vx_m_s)
+            slope = across_m_s / -self.vx_m_s + left_m / nearest_m[due]
+            apart = Apart(
+                offset_m=np.abs(positions_m[:, due]) + (1.0 + slope) * change_m,
+                predicted_miss_m=np.abs(misses_m[:, due]) + (2.0 + 4.0 * slope) * change_m + 3.0 * late_m,
+                shift_m=change_m,
+                range_m=nearest_m[due],
+                farthest_m=(2.0 * self.ranges_m[due] - nearest_m[due]) * np.hypot(1.0, slope),
+                slope=slope,
+                closing_speed_m_s=-self.vx_m_s * (1.0 + self.speed_change),
+            )
             greatest = max(greatest, float(sensor.share(apart).max(initial=0.0)))
         return (1.0 - MARGIN) / greatest
 

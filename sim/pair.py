@@ -122,8 +122,7 @@ def fly_pair(
     """Simulate two motions with the same measurements up to the last common step.
 
     `strategy` None is the scenario's. The pair replaces the noise of the scenario and the manoeuvre of its target. For
-    every deterministic strategy, the greater one of the two misses is at least `pair.bound_m`. The bound leaves gravity
-    out; here gravity curves the motion.
+    every deterministic strategy, the greater one of the two misses is at least `pair.bound_m`.
     """
     *shape, steps = pair.acceleration_m_s2.shape
     nothing = np.zeros((*shape, steps + STEPS_BEYOND))

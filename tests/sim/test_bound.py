@@ -8,9 +8,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from experiments import load_scenario
 from guidance import Thruster
 from infoset import AngleSensor, Convention, ErrorShape, RangeSensor, RateSensor, SetModel, StateBox
-from sim import Scenario
+from sim import Scenario, Sun
 from sim.bound import TruthPair, label_grid, lower_bound, pair_at
 from sim.pair import fly_pair
 from tests.space import in_space
@@ -282,6 +283,23 @@ def test_fewer_measurements_raise_the_bound(asteroid: Scenario) -> None:
     assert (seldom.last_common_step + 1) % 4 == 0 or seldom.last_common_step == 200
 
 
+def test_gravity_on_both_motions_is_allowed_for() -> None:
+    """A flight of 4 h at 0.3 au, with the Sun across the approach: the arrival is later, and images are nearer."""
+    scenario = replace(load_scenario("dart-2022"), sun=Sun(1.327e20, 45e9, 0.5 * np.pi))
+    box = scenario.set_model.bounds
+    pair = pair_at(scenario, sum(box.x_m) / 2.0, sum(box.vx_m_s) / 2.0)
+    flight = fly_pair(scenario, pair)
+    assert flight.greatest_error_share <= 1.0
+    assert flight.results.miss_m.max() >= pair.bound_m > 33.0
+    assert pair.bound_m < pair_at(replace(scenario, sun=None), pair.label_m, pair.vx_m_s).bound_m
+
+
+def test_strong_gravity_leaves_no_bound() -> None:
+    """100 000 km from the Earth, a flight of 4 h at 6 km/s is no straight line."""
+    scenario = replace(load_scenario("dart-2022"), sun=Sun(3.986e14, 1e8, 0.0))
+    assert pair_at(scenario, 88416e3, -6140.0).bound_m == 0.0
+
+
 def test_gravity_as_a_free_choice_would_hardly_matter(asteroid: Scenario) -> None:
     gravity = 1.5 * 1.324948e20 / 150e9**3 * 6301.3e3
     strict, free = (
@@ -337,7 +355,8 @@ def test_one_label_and_one_speed(asteroid: Scenario) -> None:
 def test_bounds_in_space_by_the_last_common_step(
     last_common_step: int, half_m: float, correction_m: float, disc_m: float, box_m: float, asteroid: Scenario
 ) -> None:
-    """A_s and M_s by an independent linear program, and the bounds for errors in a disc and in a box."""
+    """A_s and M_s by an independent linear program, and the bounds for errors in a disc and in a box; no gravity."""
+    asteroid = replace(asteroid, sun=None)
     box, disc = in_space(asteroid), in_space(asteroid, error_shape=ErrorShape.DISC)
     planar, joint, single = (
         pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step)
