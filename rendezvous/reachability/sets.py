@@ -65,6 +65,7 @@ class ReachableSets:
 
     def bounds(self, kind: SetKind) -> Floats:
         """Return the least and greatest value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
+        _need_kind(kind)
         result = np.zeros((self.problem.periods + 1, self.problem.states, 2))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
             result[:, block.states] = part.bounds(kind) * block.scale[:, None]
@@ -75,13 +76,18 @@ class ReachableSets:
 
         `directions`, shape (k, n), are such that direction . x is taken in the units of the problem.
         """
-        total = np.zeros(len(directions))
+        self._need_time(kind, time)
+        rows = np.asarray(directions, dtype=float)
+        if rows.ndim != 2 or rows.shape[1] != self.problem.states:
+            raise ValueError(f"directions must have the shape (k, {self.problem.states}): got {rows.shape}")
+        total = np.zeros(len(rows))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
-            total += part.support(kind, time, directions[:, block.states] * block.scale)
+            total += part.support(kind, time, rows[:, block.states] * block.scale)
         return total
 
     def counts(self, kind: SetKind, time: int) -> SetCounts | None:
         """Return the counts of the set of a `kind` at a `time`; None if its vertices are not known."""
+        self._need_time(kind, time)
         sets = [polytope for part in self.parts if (polytope := part.polytope(kind, time)) is not None]
         if len(sets) < len(self.parts):
             return None
@@ -97,6 +103,7 @@ class ReachableSets:
         `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error of the projection of
         a set that is represented by programs.
         """
+        self._need_time(kind, time)
         wanted = list(axes)
         order: list[int] = []
         points = np.zeros((1, 0))
@@ -108,6 +115,18 @@ class ReachableSets:
             scaled = part.shadow(kind, time, np.eye(block.size)[mine], tolerance).vertices * block.scale[mine]
             points = np.hstack([np.repeat(points, len(scaled), axis=0), np.tile(scaled, (len(points), 1))])
         return points[:, [order.index(axis) for axis in wanted]]
+
+    def _need_time(self, kind: SetKind, time: int) -> None:
+        _need_kind(kind)
+        if not isinstance(time, int | np.integer):
+            raise TypeError(f"time must be a whole number of periods: got {time!r}")
+        if not 0 <= time <= self.problem.periods:
+            raise ValueError(f"time must be from 0 to {self.problem.periods}, the number of periods: got {time}")
+
+
+def _need_kind(kind: object) -> None:
+    if not isinstance(kind, SetKind):
+        raise TypeError(f"kind must be SetKind.FORWARD or SetKind.TUBE: got {kind!r}")
 
 
 class Meter:

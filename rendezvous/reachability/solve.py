@@ -126,6 +126,14 @@ class Solution:
     route: Route
     reason: str
 
+    def __repr__(self) -> str:
+        problem, optimal = self.problem, self.optimal
+        return (
+            f"<solution for {problem.states} states and {problem.controls} controls in {problem.periods} periods: "
+            f"least terminal norm {optimal.miss:.4g},\n optimal controls of dimension {optimal.dimension}, "
+            f"{self.route.value} sets ({self.reason})>"
+        )
+
 
 def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) -> OptimalControls:
     """Return all controls of least terminal norm; see `block_optimum` for `relative` and errors."""
@@ -144,10 +152,16 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
         If no control keeps the constraints.
     TooLargeError, UncertainHullError
         If `route` is the exact route and it is not possible.
+    TypeError
+        If an argument has a wrong type.
     """
+    _need_type("problem", problem, ReachabilityProblem)
+    _need_type("route", route or Route.LIFTED, Route)
+    budget = budget or Budget()
+    _need_type("budget", budget, Budget)
     optimal = optimal_controls(problem)
     lifted: tuple[BlockSets, ...] = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
-    meter = Meter(budget or Budget())
+    meter = Meter(budget)
     reason = "as asked" if route is Route.LIFTED else _refusal(problem, asked=route is Route.EXACT)
     if reason is None:
         try:
@@ -163,6 +177,11 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
     elif route is Route.EXACT:
         raise TooLargeError(reason)
     return Solution(problem, optimal, ReachableSets(problem, lifted), Route.LIFTED, reason)
+
+
+def _need_type(name: str, value: object, kind: type) -> None:
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} must be of the type {kind.__name__}: got {value!r:.80}")
 
 
 def _exact(optima: tuple[BlockOptimum, ...], meter: Meter) -> tuple[BlockSets, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import pytest
@@ -206,3 +207,42 @@ def test_shadows_of_both_routes(paper: Paper) -> None:
         seen = np.random.default_rng(0).standard_normal((40, len(axes)))
         gap = np.abs((seen @ one.T).max(axis=1) - (seen @ other.T).max(axis=1))
         assert gap.max() < 1e-8 * np.abs(one).max()
+
+
+def test_wrong_arguments_are_named(paper: Paper) -> None:
+    problem = paper()
+    for arguments, message in (
+        ((3,), "problem must be of the type ReachabilityProblem: got 3"),
+        ((problem, "exact"), "route must be of the type Route: got 'exact'"),
+        ((problem, None, 5.0), "budget must be of the type Budget: got 5.0"),
+    ):
+        with pytest.raises(TypeError, match=f"^{message}$"):
+            solve(*arguments)
+    wrong_sets: tuple[tuple[Any, Any, type[Exception], str], ...] = (
+        (SetKind.TUBE, problem.periods + 1, ValueError, f"time must be from 0 to {problem.periods}, the number of "),
+        (SetKind.TUBE, -1, ValueError, f"time must be from 0 to {problem.periods}, the number of periods: got -1"),
+        (SetKind.TUBE, 1.5, TypeError, r"time must be a whole number of periods: got 1\.5"),
+        ("tube", 1, TypeError, r"kind must be SetKind\.FORWARD or SetKind\.TUBE: got 'tube'"),
+    )
+    for route in Route:
+        sets = solve(problem, route).sets
+        for kind, time, error, message in wrong_sets:
+            with pytest.raises(error, match=message):
+                sets.support(kind, time, np.eye(problem.states))
+            with pytest.raises(error, match=message):
+                sets.shadow(kind, time, (0, 1))
+            with pytest.raises(error, match=message):
+                sets.counts(kind, time)
+        with pytest.raises(TypeError, match="kind must be"):
+            sets.bounds("tube")  # type: ignore[arg-type]
+        for directions in (np.ones(problem.states), np.ones((3, problem.states + 1))):
+            with pytest.raises(ValueError, match=rf"directions must have the shape \(k, {problem.states}\): got"):
+                sets.support(SetKind.TUBE, 1, directions)
+
+
+def test_a_solution_is_shown_in_few_lines(paper: Paper) -> None:
+    shown = repr(solve(paper(), Route.LIFTED))
+    assert "6 states and 3 controls in 4 periods" in shown
+    assert "lifted sets (as asked)" in shown
+    assert max(map(len, shown.splitlines())) <= 100
+    assert len(shown.splitlines()) <= 3
