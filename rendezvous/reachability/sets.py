@@ -75,6 +75,11 @@ class ReachableSets:
         """Return the maximum of direction . x over the set of a `kind` at a `time`, shape (k,).
 
         `directions`, shape (k, n), are such that direction . x is taken in the units of the problem.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument has a wrong type, the time is not from 0 to T, or directions have a wrong shape.
         """
         self._need_time(kind, time)
         rows = np.asarray(directions, dtype=float)
