@@ -668,3 +668,11 @@ def test_too_few_inputs_and_an_empty_set_of_errors_are_refused() -> None:
 def test_an_estimate_is_shown_without_its_arrays() -> None:
     estimate = LinearObserver(np.eye(2), np.eye(2), Zonotope.box([0, 0], [1, 1]), noise=1.0).estimate()
     assert repr(estimate) == "Estimate(step=0, single=True, states=2)"
+
+
+def test_an_observer_is_shown_in_one_line() -> None:
+    system = np.eye(2), [[1.0, 0.0]], Zonotope.box([0, 0], [1, 1])
+    one, several = LinearObserver(*system, noise=1.0), LinearObserver(*system, noise=1.0, runs=5)
+    several.predict()
+    assert repr(one) == "<linear observer of a single run at step 0; states: 2, outputs: 1, inputs: 0>"
+    assert repr(several) == "<linear observer of 5 runs at step 1; states: 2, outputs: 1, inputs: 0>"
