@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
@@ -12,6 +15,7 @@ from infoset.arrays import Floats
 from infoset.limits import COUNT, LARGEST, NOT_NEGATIVE, WHOLE, real_values, shown
 
 Set = TypeVar("Set")
+Kind = TypeVar("Kind", bound=type)
 
 
 def need_finite(name: str, values: Floats) -> None:
@@ -108,6 +112,35 @@ def need_set(name: str, value: object, kind: type[Set]) -> Set:
     if not isinstance(value, kind):
         raise TypeError(f"{name} must be of the type {kind.__name__}: got {shown(value)}")
     return value
+
+
+def is_set(value: object) -> bool:
+    """Whether a value is a set, of any class: it tells NumPy that it is no array."""
+    return getattr(value, "__array_ufunc__", True) is None
+
+
+def with_hint(hint: str) -> Callable[[Kind], Kind]:
+    """Return a decorator of a class: the message about missing or superfluous arguments has its name and a hint."""
+
+    def decorate(kind: Kind) -> Kind:
+        decorated: Any = kind
+        construct = decorated.__init__
+
+        @functools.wraps(construct)
+        def checked(*arguments: Any, **named: Any) -> None:
+            try:
+                construct(*arguments, **named)
+            except TypeError:
+                try:
+                    inspect.signature(construct).bind(*arguments, **named)
+                except TypeError as error:
+                    raise TypeError(f"{decorated.__name__}: {error}; {hint}") from None
+                raise
+
+        decorated.__init__ = checked
+        return kind
+
+    return decorate
 
 
 def not_negative(name: str, value: float) -> float:

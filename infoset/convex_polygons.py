@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset import polygon_batches as kernels
-from infoset._set_arguments import axis_numbers, finite_values, need_plot_axes, not_negative, random_source
+from infoset._set_arguments import (
+    axis_numbers,
+    finite_values,
+    is_set,
+    need_plot_axes,
+    not_negative,
+    random_source,
+    with_hint,
+)
 from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, need_pair, real_values, shown
 from infoset.pictures import outlines_svg
@@ -23,6 +31,7 @@ if TYPE_CHECKING:
 _NAMES = ("empty set", "point", "segment", "triangle", "quadrangle", "pentagon", "hexagon")
 
 
+@with_hint("use ConvexPolygons.from_vertices(rings)")
 class ConvexPolygons(PolygonArrays):
     """A batch of convex polygons with any batch shape; a single polygon is a batch of shape ().
 
@@ -385,7 +394,8 @@ class ConvexPolygons(PolygonArrays):
         return self.intersection(other) if isinstance(other, ConvexPolygons) else NotImplemented
 
     def __add__(self, other: ConvexPolygons | ArrayLike) -> ConvexPolygons:
-        return self.minkowski_sum(other) if isinstance(other, ConvexPolygons) else self.translate(other)
+        given: Any = other
+        return self.minkowski_sum(given) if is_set(given) else self.translate(given)
 
     __radd__ = __add__
 

@@ -34,6 +34,8 @@ class Zonotope:
     centre: Floats
     generators: Floats
 
+    __array_ufunc__ = None
+
     def __init__(self, centre: ArrayLike, generators: ArrayLike) -> None:
         middle = finite_values("centre", centre, "n")
         object.__setattr__(self, "centre", middle)

@@ -14,10 +14,12 @@ from infoset._set_arguments import (
     axis_numbers,
     bound_values,
     finite_values,
+    is_set,
     need_plot_axes,
     need_set,
     not_negative,
     random_source,
+    with_hint,
 )
 from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, real_values
@@ -31,6 +33,7 @@ _FLAT_WIDTH = 1e-12
 _EPS = float(np.finfo(np.float64).eps)
 
 
+@with_hint("use Polytope.from_constraints(normals, offsets) or Polytope.from_vertices(points)")
 class Polytope(PolytopeArrays):
     """A convex polytope; it may be flat, a segment, a point, or empty.
 
@@ -402,7 +405,8 @@ class Polytope(PolytopeArrays):
         return self.intersection(other) if isinstance(other, Polytope) else NotImplemented
 
     def __add__(self, other: Polytope | ArrayLike) -> Polytope:
-        return self.minkowski_sum(other) if isinstance(other, Polytope) else self.translate(other)
+        given: Any = other
+        return self.minkowski_sum(given) if is_set(given) else self.translate(given)
 
     __radd__ = __add__
 

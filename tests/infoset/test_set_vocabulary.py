@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from infoset import ConvexPolygons, Polytope
+from infoset import ConvexPolygons, Polytope, Zonotope
 from infoset.polytope import product
 
 VOCABULARY = {
@@ -274,6 +274,30 @@ def test_mistaken_arguments_of_one_class_have_one_clear_message(name: str) -> No
     operation, mistakes = ONE_CLASS[name]
     for mistake in mistakes:
         refuse(lambda mistake=mistake: operation(mistake), f"{name}({mistake!r})")  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "message"),
+    [
+        (Polytope, (EYE, np.ones(3)), "Polytope: missing a required argument: 'offsets'; use Polytope.from"),
+        (Polytope, (), "Polytope: missing a required argument: 'vertices'; use Polytope.from"),
+        (ConvexPolygons, ([(0, 0), (1, 0)],), "ConvexPolygons: missing a required argument: 'counts'; use ConvexPo"),
+        (ConvexPolygons, (1, 2, 3), "ConvexPolygons: too many positional arguments; use ConvexPolygons.from_vertices"),
+    ],
+)
+def test_a_constructor_names_its_own_class_and_the_way_to_make_a_set(kind: Any, arguments: Any, message: str) -> None:
+    with pytest.raises(TypeError) as raised:
+        kind(*arguments)
+    assert str(raised.value).startswith(message)
+
+
+@pytest.mark.parametrize("sample", [SQUARE, CUBE])
+def test_a_sum_with_a_set_of_another_class_names_the_class(sample: Any) -> None:
+    other: Any
+    for other in (Zonotope(np.zeros(2), np.eye(2)), CUBE if sample is SQUARE else SQUARE):
+        for one, two in ((sample, other), (other, sample)):
+            with pytest.raises(TypeError, match=r"^other must be of the type (Polytope|ConvexPolygons): got "):
+                one + two
 
 
 def test_every_public_operation_is_in_the_table() -> None:
