@@ -77,7 +77,8 @@ def least_greatest_excess(solution: EncounterSolution) -> Floats:
     With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), least t with w_i
     e_i(p) <= t, then Newton's method on the conditions of the active craft.
     """
-    roots, centres, _, weights = _parts(solution)
+    counts = solution.encounter.weights > 0.0
+    roots, centres, _, weights = (part[counts] for part in _parts(solution))
     matrices = np.einsum("n,nca,ncb->nab", weights, roots, roots)
     scale = np.linalg.inv(np.linalg.cholesky(matrices.mean(axis=0)).T)
     scaled = np.einsum("ca,ncd,db->nab", scale, matrices, scale)

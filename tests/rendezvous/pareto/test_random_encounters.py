@@ -378,6 +378,12 @@ CHECKS = [
 ]
 
 
+def test_craft_of_weight_zero_have_no_influence_on_the_least_greatest_excess() -> None:
+    solution = solve_encounter(some_encounter(1721))
+    assert solution.encounter.weights.tolist() == [0.0, 1.0]
+    np.testing.assert_array_equal(least_greatest_excess(solution), solution.ideals[1])
+
+
 @pytest.mark.parametrize("seed", FEW)
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_random_encounters(check: Check, seed: int) -> None:
