@@ -9,7 +9,7 @@ import numpy as np
 from guidance.noise import LineOfSight, TieRule, draws_of_step, need_draws
 from infoset import AngleSensor, InformationSetView, PredictedMiss, RangeSensor
 from infoset.arrays import Flags, Floats
-from infoset.sensors import Measurements
+from infoset.sensor import Measurements
 
 TIE_TOLERANCE = 1e-6
 

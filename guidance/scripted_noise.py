@@ -11,7 +11,7 @@ import numpy as np
 from guidance.noise import LineOfSight, draws_of_step, need_draws
 from infoset import AngleSensor, InformationSetView
 from infoset.arrays import Floats
-from infoset.sensors import Measurements
+from infoset.sensor import Measurements
 
 DISC_TOLERANCE = 1e-9
 """Greatest distance outside the unit disc that is taken as rounding."""

@@ -11,7 +11,8 @@ import numpy as np
 from guidance.thruster import Thruster
 from infoset import InformationSetView, PredictedMiss
 from infoset.arrays import Flags, Floats
-from infoset.sensors import AngleSensor, Measurements, Sensor
+from infoset.sensor import Measurements, Sensor
+from infoset.sensors import AngleSensor
 
 
 @dataclass(frozen=True)

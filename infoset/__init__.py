@@ -12,7 +12,8 @@ from infoset.convex_polygons import ConvexPolygons
 from infoset.information_set import InformationSet, InformationSetView
 from infoset.model import InitialSet, Model, Recovery, SetModel, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.sensors import AngleSensor, Bias, Convention, ErrorShape, RangeSensor, RateSensor, Sensor
+from infoset.sensor import Sensor
+from infoset.sensors import AngleSensor, Bias, Convention, ErrorShape, RangeSensor, RateSensor
 from infoset.set_queries import Section, to_omega_alpha
 from infoset.set_state import SetStatus
 from infoset.shapes import from_shapely, to_shapely

@@ -9,7 +9,8 @@ from functools import cached_property
 from typing import Annotated
 
 from infoset.limits import ADDED_LATER, NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
-from infoset.sensors import AngleSensor, Sensor
+from infoset.sensor import Sensor
+from infoset.sensors import AngleSensor
 
 Interval = tuple[float, float]
 

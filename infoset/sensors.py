@@ -1,26 +1,19 @@
-"""Sensors with bounded errors, of unknown distribution, and how their measurements cut an information set.
-
-A kind of sensor is one class here: what it measures, its error bound, and the cut that it makes.
-"""
+"""Sensors with bounded errors, of unknown distribution: one class for each kind."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats
 from infoset.limits import ADDED_LATER, Checked, Fraction, NotNegative, Part, Positive, check_fields
+from infoset.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
 
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
-Measurements = Mapping[str, Floats]
-"""Measured values of a batch by the name of the sensor; a sensor that does not measure in a step is left out."""
 
 
 class Convention(Enum):
@@ -56,169 +49,10 @@ class Bias(Enum):
     CONSTANT = "constant"
 
 
-class Geometry(Protocol):
-    """True geometry of a batch of engagements, or other points with angles, rates and ranges.
-
-    Arrays of angles and rates have the shape (B,) in a plane, (2, B) along y and z in space; below, (..., B) means
-    both.
-    """
-
-    @property
-    def alpha_rad(self) -> Floats:
-        """Line-of-sight angles in the planes of x and each lateral axis, atan2(y, x) and atan2(z, x), rad."""
-
-    @property
-    def omega_rad_s(self) -> Floats:
-        """Their rates, rad/s."""
-
-    @property
-    def range_m(self) -> Floats:
-        """Distance, m, shape (B,), or for points that differ by axis (2, B)."""
-
-
-@dataclass(frozen=True)
-class Apart:
-    """Two true motions at n times, for the lower bound of the miss (`sim.lower_bound`).
-
-    Parameters
-    ----------
-    offset_m, predicted_miss_m : ndarray, shape (axes, n)
-        Greatest differences of their positions z and of their predicted misses z + V x/e along each lateral axis, m.
-    shift_m : float
-        Greatest difference of their ranges x, m.
-    range_m, farthest_m : ndarray, shape (n,)
-        Their least range x and greatest distance, m.
-    slope : ndarray, shape (n,)
-        Greatest distance from the x axis, and greatest change of it until x = 0, of both, as a share of x.
-    closing_speed_m_s : float
-        Their closing speed e.
-    """
-
-    offset_m: Floats
-    predicted_miss_m: Floats
-    shift_m: float
-    range_m: Floats
-    farthest_m: Floats
-    slope: Floats
-    closing_speed_m_s: float
-
-
-class Cuttable(Protocol):
-    """A batch of sets that measurements cut; `InformationSet` describes the methods."""
-
-    def measure_angle(self, alpha_rad: Floats, where: Flags) -> None:
-        """Cut by a line-of-sight angle."""
-
-    def measure_range(
-        self, range_m: Floats, relative_error: float, where: Flags, *, alpha_rad: ArrayLike | None
-    ) -> None:
-        """Cut by a range."""
-
-    def measure_rate(self, omega_rad_s: Floats, error_rad_s: float, where: Flags) -> None:
-        """Cut by a rate of the line of sight."""
-
-
 TIME_TOLERANCE = 1e-6
 """Rounding of the first and the last image, as a share of the time between two images."""
 NEGLIGIBLE_ERROR_RAD = 1e-60
 """Error bound of an axis that is measured without error."""
-
-
-class Sensor(ABC):
-    """A sensor that measures one quantity of the line of sight, with a bounded error.
-
-    Attributes
-    ----------
-    name : str
-        Key of its measurements and errors.
-    quantity : str
-        What it measures, with the unit: ``measured_<quantity>`` is its column in files.
-    stream : int
-        Its stream of random numbers: a number below 16 that no other kind and no stream of `sim.draws` has.
-    is_lateral : bool
-        Whether it measures one value for each lateral axis; in space its arrays are of shape (2, B), not (B,).
-    """
-
-    name: ClassVar[str]
-    quantity: ClassVar[str]
-    stream: ClassVar[int]
-    is_lateral: ClassVar[bool] = True
-    period_s: float
-
-    @abstractmethod
-    def true_value(self, sight: Geometry) -> Floats:
-        """Return the measured quantity without error, shape (..., B); that of a range has shape (B,)."""
-
-    @abstractmethod
-    def bound(self, sight: Geometry) -> Floats | float:
-        """Return the greatest size of the error, in the unit of the quantity, broadcast against the true value."""
-
-    @abstractmethod
-    def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
-        """Cut sets by the measurement of this sensor.
-
-        Parameters
-        ----------
-        sets : Cuttable
-            Sets of a batch, for example an `InformationSet`.
-        measured : mapping of str to ndarray, shape (..., B)
-            All measurements of the step (rad, m, rad/s), that of this sensor among them.
-        where : ndarray of bool, shape (B,)
-            Engagements that have measured.
-        """
-
-    def measures_at(self, before_arrival_s: float) -> bool:
-        """Return whether the sensor measures at a time before the nominal arrival, s."""
-        return True
-
-    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats] | None:
-        """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
-
-        Parameters
-        ----------
-        range_m : ndarray
-            Ranges x, m.
-        closing_speed_m_s : float
-            Closing speed e.
-        errors : float
-            Half-width of the interval of the measured quantity, in units of the bound.
-
-        Returns
-        -------
-        tuple of (bool, ndarray), or None
-            Whether it is a band of the predicted miss z + V x/e (otherwise of z), and its half-width, m. None if a
-            measurement leaves V and z as they are.
-        """
-        return None
-
-    def share(self, apart: Apart) -> Floats:
-        """Return half of the greatest difference of the measured values of two motions, in units of the bound.
-
-        Shape (n,). Both can have the same measured value where it is at most 1. This default is that of `band`, which
-        neglects the square of the slope.
-        """
-        band = self.band(apart.range_m, apart.closing_speed_m_s, 2.0)
-        if band is None:
-            return np.zeros(len(apart.range_m))
-        size = apart.predicted_miss_m if band[0] else apart.offset_m
-        return np.asarray(np.abs(size).max(axis=0) / band[1])
-
-    def measured(self, sight: Geometry, error: Floats | float) -> Floats:
-        """Return the measured value for an error in units of the bound, from -1 to 1."""
-        return self.true_value(sight) + self.bound(sight) * error
-
-    def error(self, sight: Geometry, measured: Floats) -> Floats:
-        """Return the error of a measured value in units of the bound."""
-        return (measured - self.true_value(sight)) / self.bound(sight)
-
-    def limited(self, error: Floats) -> Floats:
-        """Return the possible error (in units of the bound) that is nearest to an error."""
-        return np.clip(error, -1.0, 1.0)
-
-    def nearest(self, sight: Geometry, wanted: Floats) -> Floats:
-        """Return the possible measurement that is nearest to a wanted one."""
-        true, bound = self.true_value(sight), self.bound(sight)
-        return np.minimum(np.maximum(wanted, true - bound), true + bound)
 
 
 @dataclass(frozen=True)

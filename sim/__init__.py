@@ -1,9 +1,10 @@
 """The simulator: scenarios, true motion, closed loop, records, campaigns, bounds and statistics."""
 
 from sim.adversary import NothingCountsError, WorstEngagement, find_worst
-from sim.bound import BoundError, LowerBound, lower_bound
+from sim.bound import LowerBound, lower_bound
 from sim.campaign import Campaign, CampaignResult, Sweep
 from sim.chunk import CampaignNoise
+from sim.farthest_pair import BoundError
 from sim.record import AxisStep, Inconsistency, Record, StepRecord, fly_one
 from sim.requirement import HitRequirement, Requirement
 from sim.results import Outcome, Results

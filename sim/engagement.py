@@ -22,7 +22,7 @@ from guidance.noise import checked_measurements
 from guidance.strategy import decide, start
 from guidance.thruster import modulus
 from infoset import AngleSensor, InformationSet, InformationSetView, PredictedMiss
-from infoset.sensors import Measurements
+from infoset.sensor import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.closed_form import worst_shift_m
 from sim.draws import Draws

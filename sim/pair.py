@@ -10,7 +10,7 @@ from guidance import Strategy
 from guidance.noise import LineOfSight
 from infoset import AngleSensor, Convention, InformationSetView
 from infoset.arrays import Floats
-from infoset.sensors import Measurements, Sensor
+from infoset.sensor import Measurements, Sensor
 from sim.bound import TruthPair
 from sim.draws import Draws
 from sim.engagement import Engagements

@@ -13,7 +13,7 @@ from guidance.game_noise import SwitchingNoise
 from guidance.scripted_noise import errors_made, measure_with_errors
 from infoset import InformationSetView
 from infoset.arrays import Flags, Floats, Integers
-from infoset.sensors import Measurements, Sensor
+from infoset.sensor import Measurements, Sensor
 
 ROWS = ("angle", "range", "rate")
 """Sensors of the first rows of a sequence, also if absent: the random numbers of a search depend on the row count."""

@@ -13,7 +13,8 @@ from guidance.strategy import Strategy
 from guidance.thruster import Thruster
 from infoset.limits import ADDED_LATER, Checked, Limits, NotNegative, Positive, check_fields
 from infoset.model import SetModel, StateBox
-from infoset.sensors import RangeSensor, RateSensor, Sensor
+from infoset.sensor import Sensor
+from infoset.sensors import RangeSensor, RateSensor
 
 _DIRECTION = Limits(least=-2.0 * math.pi, most=2.0 * math.pi)
 _ELEVATION = Limits(least=-0.5 * math.pi, most=0.5 * math.pi)

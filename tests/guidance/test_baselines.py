@@ -28,7 +28,7 @@ from guidance.estimate import independent_error_rad
 from guidance.scripted_noise import ScriptedNoise
 from infoset import AngleSensor, Bias, InformationSet, RangeSensor, SetModel, StateBox
 from infoset.arrays import Flags, Floats
-from infoset.sensors import Sensor
+from infoset.sensor import Sensor
 from sim.draws import draw
 from sim.engagement import Engagements
 

@@ -21,7 +21,7 @@ from infoset import (
     StateBox,
 )
 from infoset.model import InitialSet, Model
-from infoset.sensors import Sensor
+from infoset.sensor import Sensor
 from sim import Scenario, Sun
 from sim.bound import lower_bound, pair_at
 from sim.pair import PairNoise, ScheduledMotion, fly_pair, middle

@@ -11,7 +11,8 @@ import pytest
 from guidance import LineOfSight, NoiseKind
 from infoset import Convention, InformationSetView, InitialSet, Model, RangeSensor, Recovery, Sensor
 from infoset.arrays import Flags, Floats
-from infoset.sensors import SENSORS, Cuttable, Geometry, Measurements
+from infoset.sensor import Cuttable, Geometry, Measurements
+from infoset.sensors import SENSORS
 from sim import Outcome, Scenario, fly_one, lower_bound, simulate
 from sim.draws import EXECUTION, START, TARGET, TIE
 from tests.space import in_space

@@ -11,7 +11,7 @@ from guidance import LineOfSight, NoiseKind, TieRule
 from guidance.scripted_noise import ScriptedNoise
 from guidance.thruster import modulus
 from infoset import AngleSensor, Convention, InformationSet, InformationSetView, InitialSet, Model, RateSensor, StateBox
-from infoset.sensors import Measurements
+from infoset.sensor import Measurements
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements, Step

@@ -28,8 +28,8 @@ from experiments.interception.runs.shared import Progress, WorstMisses, find_wor
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import greatest_guarantee_m
 from guidance import Strategy
-from sim import Record, Results, Scenario
-from sim.bound import BoundError, LowerBound, TruthPair, lower_bound, pair_at
+from sim import BoundError, Record, Results, Scenario
+from sim.bound import LowerBound, TruthPair, lower_bound, pair_at
 from sim.pair import PairFlight, fly_pair
 from sim.results import join
 

@@ -226,7 +226,7 @@ def test_nothing_is_replaced_unless_told(infoset: Infoset, short_file: Path, tmp
 def test_a_program_without_a_solution_is_one_message(
     infoset: Infoset, short_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from sim.bound import BoundError
+    from sim import BoundError
 
     def fail(*_: object, **__: object) -> None:
         raise BoundError("label 1 m")
