@@ -36,12 +36,16 @@ class ProblemTables(Table):
 OfProblem = TypeVar("OfProblem", bound=ProblemTables)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReadProblem(Generic[OfProblem]):
     """A problem as read: its tables, and the name of its file for messages."""
 
     tables: OfProblem
     source: str
+
+    def __repr__(self) -> str:
+        about = f"\n {self.tables.description}" if self.tables.description else ""
+        return f"<{self.tables.kind} problem {self.name}, hash {self.hash}{about}>"
 
     @property
     def name(self) -> str:

@@ -261,7 +261,7 @@ FORM = problem_form(
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MultipointProblem(ReadProblem[MultipointTables]):
     """A problem as read; `times_s`, by target as listed, is None if a time is missing."""
 

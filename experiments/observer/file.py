@@ -188,7 +188,7 @@ FORM = problem_form(
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ObserverProblem(ReadProblem[ObserverTables]):
     """A problem as read.
 

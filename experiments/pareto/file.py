@@ -118,7 +118,7 @@ def _checks(known: Known) -> Iterator[Problem]:
 FORM = problem_form(KIND, ParetoTables, _checks)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ParetoProblem(ReadProblem[ParetoTables]):
     """A problem as read."""
 

@@ -151,7 +151,7 @@ class ReachabilityTables(ProblemTables):
     navigation: NavigationTable | None = key("navigation errors", "", default=None)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Rendezvous(ReadProblem[ReachabilityTables]):
     """A problem as read, in SI.
 

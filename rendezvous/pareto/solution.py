@@ -125,6 +125,17 @@ class EncounterSolution:
     costs: tuple[CraftCost, ...]
     point: Floats
 
+    def __repr__(self) -> str:
+        encounter = self.encounter
+        free = ", ".join(
+            f"{component.name.lower()} = {value:.4g} {'m' if component.value < 3 else 'm/s'}"
+            for component, value in zip(encounter.free, self.point.tolist(), strict=True)
+        )
+        return (
+            f"<{encounter.meeting.value} of {len(self.costs)} craft at {encounter.meeting_s:g} s: "
+            f"group loss {self.group_loss():.4g} m^2/s^3\n at {free}>"
+        )
+
     @property
     def ideals(self) -> Floats:
         """p* of the craft, shape (n, f)."""

@@ -155,6 +155,12 @@ class ReachabilityProblem:
         if broken:
             raise InadmissibleStartError(tuple(broken))
 
+    def __repr__(self) -> str:
+        return (
+            f"<problem of {self.sizes}: thrust in a {self.thrust.value}, "
+            f"constraints beyond the bounds: {len(self.further[0])}>"
+        )
+
     def name_of(self, constraint: int) -> str:
         """Return the name of a `constraint` beyond the bounds, by its index."""
         return self.constraint_names[constraint] if self.constraint_names else f"constraint {constraint + 1}"
@@ -205,6 +211,11 @@ class ReachabilityProblem:
     def controls(self) -> int:
         """Number of controls m."""
         return int(self.control.shape[2])
+
+    @property
+    def sizes(self) -> str:
+        """Numbers of states, controls and periods as text."""
+        return f"{self.states} states and {self.controls} controls in {self.periods} periods"
 
     def run(self, controls: ArrayLike) -> Floats:
         """Return the states, shape (..., T + 1, n), under `controls`, shape (..., T, m)."""

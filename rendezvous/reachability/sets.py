@@ -63,6 +63,14 @@ class ReachableSets:
     problem: ReachabilityProblem
     parts: tuple[BlockSets, ...]
 
+    def __repr__(self) -> str:
+        sizes = ", ".join(str(block.size) for block in self.problem.blocks)
+        exact = all(isinstance(part, ExactSets) for part in self.parts)
+        return (
+            f"<reachable sets for {self.problem.sizes}:\n "
+            f"{'exact' if exact else 'lifted'} sets in blocks of {sizes} states>"
+        )
+
     def bounds(self, kind: SetKind) -> Floats:
         """Return the least and greatest value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
         _need_kind(kind)
@@ -107,9 +115,21 @@ class ReachableSets:
 
         `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error of the projection of
         a set that is represented by programs.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument has a wrong type, the time is not from 0 to T, or an axis is not the index of a state.
         """
         self._need_time(kind, time)
-        wanted = list(axes)
+        indices = np.asarray(axes)
+        if indices.ndim != 1 or indices.dtype.kind not in "iu":
+            raise TypeError(f"axes must be a list of indices of states: got {axes!r:.80}")
+        if indices.min() < 0 or indices.max() >= self.problem.states:
+            raise ValueError(
+                f"axes must be from 0 to {self.problem.states - 1}, the index of a state: got {axes!r:.80}"
+            )
+        wanted: list[int] = indices.tolist()
         order: list[int] = []
         points = np.zeros((1, 0))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):

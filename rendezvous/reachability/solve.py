@@ -48,6 +48,12 @@ class OptimalControls:
     problem: ReachabilityProblem
     blocks: tuple[BlockOptimum, ...]
 
+    def __repr__(self) -> str:
+        return (
+            f"<optimal controls for {self.problem.sizes}:\n "
+            f"a set of dimension {self.dimension}, least terminal norm {self.miss:.4g}>"
+        )
+
     @cached_property
     def space(self) -> Lifted:
         """The set in coordinates z of its affine hull; controls divided by their bounds."""
@@ -127,10 +133,9 @@ class Solution:
     reason: str
 
     def __repr__(self) -> str:
-        problem, optimal = self.problem, self.optimal
         return (
-            f"<solution for {problem.states} states and {problem.controls} controls in {problem.periods} periods: "
-            f"least terminal norm {optimal.miss:.4g},\n optimal controls of dimension {optimal.dimension}, "
+            f"<solution for {self.problem.sizes}: "
+            f"least terminal norm {self.optimal.miss:.4g},\n optimal controls of dimension {self.optimal.dimension}, "
             f"{self.route.value} sets ({self.reason})>"
         )
 

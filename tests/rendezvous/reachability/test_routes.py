@@ -238,6 +238,13 @@ def test_wrong_arguments_are_named(paper: Paper) -> None:
         for directions in (np.ones(problem.states), np.ones((3, problem.states + 1))):
             with pytest.raises(ValueError, match=rf"directions must have the shape \(k, {problem.states}\): got"):
                 sets.support(SetKind.TUBE, 1, directions)
+        for axes in ((0, problem.states), (-1, 0)):
+            with pytest.raises(ValueError, match=f"axes must be from 0 to {problem.states - 1}, .*: got"):
+                sets.shadow(SetKind.TUBE, 1, axes)
+        wrong_axes: tuple[Any, ...] = (("x", "y"), (0, 1.5), 3, ())
+        for axes in wrong_axes:
+            with pytest.raises(TypeError, match="axes must be a list of indices of states: got"):
+                sets.shadow(SetKind.TUBE, 1, axes)
 
 
 def test_a_solution_is_shown_in_few_lines(paper: Paper) -> None:

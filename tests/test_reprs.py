@@ -1,0 +1,40 @@
+"""Problems and results at a prompt: a few lines, with their sizes or their main number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from experiments import load_multipoint, load_observer, load_pareto, load_pursuit, load_rendezvous
+from rendezvous import pareto, reachability
+
+
+def reachable() -> reachability.Solution:
+    return reachability.solve(load_rendezvous("rendezvous-2021").problem)
+
+
+def encounter() -> pareto.EncounterSolution:
+    return pareto.solve_encounter(load_pareto("pareto-2008").encounter)
+
+
+SHOWN: list[tuple[Callable[[], object], str]] = [
+    (lambda: load_multipoint("service-5"), "multipoint problem service-5"),
+    (lambda: load_observer("vehicle"), "observer problem vehicle"),
+    (lambda: load_pareto("pareto-2008"), "pareto-encounter problem pareto-2008"),
+    (lambda: load_pursuit("geo-pursuit"), "pursuit-evasion problem geo-pursuit"),
+    (lambda: load_rendezvous("approach-cone"), "reachable-rendezvous problem approach-cone"),
+    (lambda: load_rendezvous("approach-cone").problem, "6 states and 3 controls in 12 periods: thrust in a box"),
+    (reachable, "least terminal norm"),
+    (lambda: reachable().optimal, "a set of dimension 6, least terminal norm"),
+    (lambda: reachable().sets, "exact sets in blocks of 4, 2 states"),
+    (encounter, "rendezvous of 3 craft at 30 s: group loss"),
+]
+
+
+@pytest.mark.parametrize(("make", "shown"), SHOWN, ids=[shown for _, shown in SHOWN])
+def test_a_problem_or_result_is_shown_in_few_lines(make: Callable[[], object], shown: str) -> None:
+    text = repr(make())
+    assert shown in text
+    assert len(text) < 500
+    assert len(text.splitlines()) <= 3
