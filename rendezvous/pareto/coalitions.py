@@ -10,6 +10,7 @@ from math import factorial
 import numpy as np
 
 from rendezvous._arrays import Floats
+from rendezvous._repr import short_repr
 from rendezvous.pareto.solution import EncounterSolution, weighted_point
 
 MOST_CRAFT = 12
@@ -63,6 +64,8 @@ class Coalitions:
     shapley: Floats
     transfers: Floats
     core: Core
+
+    __repr__ = short_repr
 
 
 def analyse_coalitions(solution: EncounterSolution) -> Coalitions:

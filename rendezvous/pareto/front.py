@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 from rendezvous._halton import halton
+from rendezvous._repr import short_repr
 from rendezvous.pareto.solution import EncounterSolution
 
 
@@ -23,6 +24,8 @@ class ParetoSet:
     weights: Floats
     points: Floats
     excess: Floats
+
+    __repr__ = short_repr
 
 
 def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
+from rendezvous._repr import short_repr
 from rendezvous.pareto.encounter import Craft, Encounter
 from rendezvous.relative_motion import TimeVaryingMotion
 
@@ -21,6 +22,8 @@ class PlanSamples:
     state: Floats
     control_m_s2: Floats
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -31,6 +34,8 @@ class Plan:
     craft: Craft
     meeting_s: float
     costate: Floats
+
+    __repr__ = short_repr
 
     def control(self, time_s: ArrayLike) -> Floats:
         """Return u(t) = B' Phi(T, t)' lambda, m/s^2, shape (..., 3): (2.1) of the paper."""
@@ -102,6 +107,8 @@ class CraftCost:
     effort_base: Floats
     effort_slope: Floats
     to_costate: Floats
+
+    __repr__ = short_repr
 
     @property
     def matrix(self) -> Floats:
@@ -255,6 +262,8 @@ class DurationSweep:
     cost_squared: Floats
     ideal_cost_squared: Floats
     group_loss: Floats
+
+    __repr__ = short_repr
 
 
 def sweep_meeting_time(encounter: Encounter, meeting_s: ArrayLike) -> DurationSweep:

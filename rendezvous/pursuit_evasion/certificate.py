@@ -13,6 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
+from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import MOST_RESIDUAL, Craft, KnownPath, Node, Pair, Side
 from rendezvous.pursuit_evasion._scan import greater, scan
@@ -94,6 +95,8 @@ class Certificate:
     directions_tried: int
     greatest_excess_m: float | None
     unit_length_m: float
+
+    __repr__ = short_repr
 
     @property
     def failures(self) -> tuple[str, ...]:

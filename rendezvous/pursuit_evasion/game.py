@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rendezvous._arrays import Floats
+from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._pair import Craft, Pair
 from rendezvous.two_body import perigee_m, semi_major_axis_m
 
@@ -122,6 +123,8 @@ class Game:
     evader: Player
     capture_radius_m: float = 0.0
     longest_s: float = math.inf
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         _need(self.pursuer.thrust_n > 0.0, "the pursuer's thrust must be positive")

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
+from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._extremal import STATES, end_of, flow_back, rate
 from rendezvous.pursuit_evasion._pair import FINE, Craft, Node
 from rendezvous.pursuit_evasion.game import Units, scaled_game
@@ -139,6 +140,8 @@ class PlayerHistory:
     thrust_direction: Floats
     switching: Floats
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class History:
@@ -147,6 +150,8 @@ class History:
     time_s: Floats
     pursuer: PlayerHistory
     evader: PlayerHistory
+
+    __repr__ = short_repr
 
 
 def history(solution: Solution, count: int = 400) -> History:

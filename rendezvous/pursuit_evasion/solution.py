@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from rendezvous._arrays import Floats
+from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion.game import Game, Units
 
@@ -58,6 +59,8 @@ class DistanceCurve:
     distance_m: Floats
     least_curvature: Floats
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Capture:
@@ -91,6 +94,8 @@ class Capture:
     residual: float
     extremal: Node
 
+    __repr__ = short_repr
+
     @property
     def is_local_saddle(self) -> bool:
         """Whether closing speed and curvature, with the capture radius, are those of a saddle."""
@@ -117,3 +122,8 @@ class Solution:
     exhausted: str | None = None
     fallback: Capture | None = None
     fallback_route: Route | None = None
+
+    def __repr__(self) -> str:
+        capture = "" if self.capture is None else f", capture after {self.capture.time_s:.6g} s"
+        fallback = "" if self.fallback is None else f", fallback with a capture after {self.fallback.time_s:.6g} s"
+        return f"<pursuit: {self.verdict.value}{capture}{fallback}; durations up to {self.looked_at_s:.6g} s solved>"
