@@ -1,6 +1,6 @@
 """Random scenarios of the guaranteed model: every sensor, fast and slow, near and far, with and without a Sun.
 
-    from benchmarks.random_scenarios import camera_scenario, random_scenario
+    from benchmarks.random_scenarios import camera_scenario, gravity_scenario, random_scenario
     scenario = random_scenario(7, rate_sensor=True)
     scenario = camera_scenario(7)
 
@@ -31,6 +31,7 @@ from infoset import (
     StateBox,
 )
 from sim import Manoeuvre, Scenario, Sun, Target
+from sim.gravity import on_board_model
 
 SOLAR_PARAMETER_M3_S2 = 1.324948e20
 STRATEGIES = ("symmetric-miss", "patient")
@@ -49,6 +50,73 @@ def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
             return read_scenario(scenario_to_toml(scenario), f"random scenario {number}")
         except InputError:
             continue  # an invalid scenario is drawn again
+
+
+def gravity_scenario(number: int) -> Scenario:
+    """Return the random scenario with a number, in strong gravity of a planet, a star or a body between.
+
+    The range is 0.3 % to 90 % of the distance from the attractor, and the speed 0.5 to 100 times that of the orbit. In
+    a third of the scenarios the target starts near the attractor, and is up to 1000 times as fast. One of two is in
+    space.
+
+    Raises
+    ------
+    ValueError
+        If gravity has no bound in this scenario.
+    """
+    generator = np.random.default_rng(np.random.SeedSequence(entropy=34, spawn_key=(number,)))
+
+    def power(least: float, greatest: float) -> float:
+        return float(10.0 ** generator.uniform(least, greatest))
+
+    scenario = random_scenario(number, rate_sensor=number % 8 == 5)
+    parameter, distance_m = power(13.5, 20.2), power(6.9, 11.2)
+    direction, elevation = generator.uniform(-np.pi, np.pi), generator.uniform(-1.5, 1.5)
+    range_m, speed = distance_m * power(-2.5, -0.05), power(-0.3, 2.0)
+    wide = range_m * power(-4.0, -2.0)
+    if number % 3 == 0:
+        range_m, speed = distance_m * (1.0 - power(-3.0, -0.3)), power(1.0, 3.0)
+        direction, elevation = power(-4.0, -0.3), power(-4.0, -0.3)
+        wide = (distance_m - range_m) * power(-4.0, -1.0)
+    speed_m_s = min(float(np.sqrt(parameter / distance_m)) * speed, 3e5)
+    flight_s, fast = range_m / speed_m_s, speed_m_s * power(-4.0, -2.0)
+    step_s, axial, along = flight_s / float(generator.integers(30, 200)), power(-1.0, 0.0), power(-5.0, -1.5)
+    is_spatial = number % 2 == 1
+    box = StateBox(
+        z_m=(-wide, wide),
+        x_m=(range_m - axial * wide, range_m + axial * wide),
+        vz_m_s=(-fast, fast),
+        vx_m_s=(-speed_m_s * (1.0 + along), -speed_m_s * (1.0 - along)),
+        y_m=(-0.3 * wide, wide) if is_spatial else None,
+        vy_m_s=(-fast, 0.2 * fast) if is_spatial else None,
+    )
+    impulse_m_s = float(generator.uniform(0.05, 0.5)) * (fast + wide / flight_s)
+    model = replace(
+        scenario.set_model,
+        closing_speed_m_s=speed_m_s,
+        step_s=step_s,
+        bounds=box,
+        angle_sensor=AngleSensor(step_s, power(-6.0, -4.0), power(-6.0, -4.0), range_m),
+        range_threshold_m=float(generator.uniform(1.0, 3.0)) * speed_m_s * step_s,
+        disturbance_m_s2=0.0,
+        sections=min(scenario.set_model.sections, 29),
+        fewest_sections=3,
+    )
+    ranging, rates = scenario.range_sensor, scenario.rate_sensor
+    scenario = replace(
+        scenario,
+        name=f"gravity-{number}",
+        sun=Sun(parameter, distance_m, float(direction), float(elevation) if is_spatial else 0.0),
+        nominal_range_m=range_m,
+        dispersion=box,
+        set_model=model,
+        range_sensor=None if ranging is None else replace(ranging, period_s=step_s),
+        rate_sensor=None if rates is None else replace(rates, period_s=step_s),
+        target=None,
+        thruster=Thruster(30.0 * impulse_m_s, 0.01 * impulse_m_s, impulse_m_s, execution_error_relative=0.01),
+    )
+    on_board_model(scenario)
+    return scenario
 
 
 def camera_scenario(number: int) -> Scenario:

@@ -7,9 +7,11 @@
     python -m benchmarks.soundness --engagements 200000 --space        # out of the plane, all conventions, Sun anywhere
     python -m benchmarks.soundness --engagements 40000 --camera        # random scenarios with a camera
     python -m benchmarks.soundness --engagements 40000 --camera scheduled  # with a cut-off or times of impulses
+    python -m benchmarks.soundness --engagements 20000 --gravity       # random scenarios in strong gravity
 
 Counted are engagements whose true state left its section (by any amount), whose set was lost, whose true miss exceeded
-Phi, and those without a Phi. All counts must be zero; a warning ends the run. A batch has all kinds of noise, the true
+Phi, and those without a Phi. All counts must be zero; a warning ends the run. Scenarios whose gravity has no bound are
+refused before the flight, and counted apart. A batch has all kinds of noise, the true
 motion is Keplerian, and V_x is anywhere in D.
 """
 
@@ -25,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.random_scenarios import camera_scenario, random_scenario, scheduled
+from benchmarks.random_scenarios import camera_scenario, gravity_scenario, random_scenario, scheduled
 from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from infoset import AngleSensor, Convention, ErrorShape, InformationSetView, InitialSet, Model, RateSensor
@@ -149,6 +151,7 @@ class Count:
     lost: int = 0
     above: int = 0
     unknown: int = 0
+    refused: int = 0
 
     def __add__(self, other: Count) -> Count:
         return Count(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
@@ -218,6 +221,15 @@ def fly_camera_batch(number: int, seed: int, *, has_schedule: bool = False) -> C
     return fly(scheduled(scenario, number) if has_schedule else scenario, number * BATCH, BATCH, seed)
 
 
+def fly_gravity_batch(number: int, seed: int) -> Count:
+    """Simulate batch `number`, which has a random scenario in strong gravity, unless that is refused."""
+    try:
+        scenario = gravity_scenario(seed * 1_000_000 + number)
+    except ValueError:
+        return Count(refused=BATCH)
+    return fly(guaranteed(scenario, hostile=False), number * BATCH, BATCH, seed)
+
+
 def main() -> None:
     """Simulate, count and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -228,6 +240,7 @@ def main() -> None:
     parser.add_argument("--space", action="store_true", help="out of the plane")
     kinds = ("plain", "scheduled")
     parser.add_argument("--camera", nargs="?", const="plain", choices=kinds, help="random scenarios with a camera")
+    parser.add_argument("--gravity", action="store_true", help="random scenarios in strong gravity")
     parser.add_argument("--first", type=int, default=0, metavar="BATCH", help="number of the first batch")
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
@@ -242,6 +255,8 @@ def main() -> None:
             jobs = [
                 pool.submit(fly_camera_batch, number, options.seed, has_schedule=has_schedule) for number in numbers
             ]
+        elif options.gravity:
+            jobs = [pool.submit(fly_gravity_batch, number, options.seed) for number in numbers]
         elif options.random is None:
             fly_one_batch = fly_space_batch if options.space else fly_batch
             jobs = [pool.submit(fly_one_batch, number, options.hostile, options.seed) for number in numbers]
@@ -250,7 +265,7 @@ def main() -> None:
             jobs = [pool.submit(fly_random_batch, number, rate, options.seed) for number in numbers]
         for number, job in enumerate(jobs):
             count = job.result()
-            if count != Count(count.engagements):
+            if count != Count(count.engagements, refused=count.refused):
                 sys.stdout.write(f"batch {numbers[number]}: {count}\n")
             total += count
             if number % 50 == 49 or number == len(jobs) - 1:

@@ -27,7 +27,7 @@ from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.closed_form import worst_shift_m
 from sim.draws import Draws
 from sim.gravity import on_board_model
-from sim.kepler import KeplerMotion, Sight, longest_substep_s
+from sim.kepler import KeplerMotion, Sight
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
 from sim.target import acceleration_m_s2
@@ -95,9 +95,7 @@ class Engagements:
         self._draws = draws
         self._batch = batch = len(draws.position_m)
         self._noise = noise or _make_noise(scenario, draws)
-        self._truth = truth or KeplerMotion(
-            draws.position_m, draws.velocity_m_s, scenario.sun, longest_substep_s(scenario)
-        )
+        self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._model = model = on_board_model(scenario)
         self._states = start(self._strategy, batch, model.axes)

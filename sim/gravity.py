@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from guidance import Thruster
 from infoset import SetModel
+from infoset.arrays import Floats
+from sim.flight_bounds import flight_bounds, greater_of_neighbours, no_bound
 from sim.scenario import Scenario, Sun
 
-MARGIN = 1.05
 LEAST_SPEED_CHANGE = 1e-8
 
 
@@ -30,9 +30,8 @@ def on_board_model(scenario: Scenario) -> SetModel:
     model = with_gravity(model, scenario.sun, greatest_impulses_m_s(model, thruster))
     if model.speed_error >= 1.0:
         raise ValueError(
-            f"the guaranteed model needs a closing speed known to better than 100 %: bounds.vx_m_s, gravity and the "
-            f"impulses let it differ by {100.0 * model.speed_error:.3g} % of the nominal "
-            f"{model.closing_speed_m_s:g} m/s; narrow bounds.vx_m_s"
+            f"the guaranteed model needs a closing speed known to better than 100 %: bounds.vx_m_s lets it differ by "
+            f"{100.0 * model.speed_error:.3g} % of the nominal {model.closing_speed_m_s:g} m/s; narrow bounds.vx_m_s"
         )
     return model
 
@@ -47,36 +46,57 @@ def greatest_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
 def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetModel:
     """Return a model with the bounds of gravity, along each lateral axis and of the closing speed.
 
-    `impulses_m_s` is the greatest sum of the impulses' moduli, which change the lateral velocity.
+    Parameters
+    ----------
+    model : SetModel
+        Model without these bounds.
+    sun : Sun or None
+        The attracting body; None is free space.
+    impulses_m_s : float
+        Greatest sum of the impulses' moduli, which change the lateral velocity.
 
-    To first order, the difference of the Sun's attraction at two points with distance vector r is
-    (K/R^3)(3 (n . r) n - r), with the direction n of the Sun. Along a lateral axis, with offset a, it is at most
-    (K/R^3)(1.5 |r| + 0.5 |a|), in any direction at most 2 K/R^3 |r|. The lengths of the model scale with V_x, which
-    gravity changes; this adds 0.7 |a| and 2 (|r| + |a|) V/|V_x|, with the velocity V across x. R decreases by at most
-    the range and the distance travelled. A margin of 5 % covers the second order and the change of n. docs/guarantee.md
-    has the derivation.
+    Raises
+    ------
+    ValueError
+        If gravity has no bound, because the motions may come too near the attracting body.
+
+    Notes
+    -----
+    Lemma 2 of docs/guarantee.md, evaluated along the flight (`flight_bounds`). `pull` and `jerk` are bounds of the
+    difference of gravity between spacecraft and object and of its derivative.
     """
     if sun is None:
         return replace(model, gravity_m_s2=0.0, gravity_y_m_s2=None, gravity_speed_change=LEAST_SPEED_CHANGE)
-    box, by_axis = model.bounds, [model.axis(name) for name in model.axes]
-    slowest = -box.vx_m_s[1]
-    flight_s = box.x_m[1] / slowest
-    disturbance_m_s2 = math.hypot(*(axis.disturbance_m_s2 for axis in by_axis))
-    across_m_s = box.lateral_speed_m_s + impulses_m_s + disturbance_m_s2 * flight_s
-    greatest_range = float(np.hypot(box.x_m[1], box.offset_m + across_m_s * flight_s))
-    orbital_speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
-    nearest = sun.distance_m - greatest_range - 0.5 * (orbital_speed * flight_s) ** 2 / sun.distance_m
-    gradient = MARGIN * sun.gravitational_parameter_m3_s2 / max(nearest, 0.1 * sun.distance_m) ** 3
-
-    def along(axis: SetModel) -> float:
-        speed_m_s = axis.bounds.lateral_speed_m_s + impulses_m_s + axis.disturbance_m_s2 * flight_s
-        offset = axis.bounds.offset_m + speed_m_s * flight_s
-        scaled = 2.0 * (greatest_range + offset) * across_m_s / slowest
-        return float(gradient * (1.5 * greatest_range + 1.2 * offset + scaled))
-
+    disturbances = tuple(model.axis(name).disturbance_m_s2 for name in model.axes)
+    flight = flight_bounds(model.bounds, disturbances, sun, impulses_m_s)
+    gradient = sun.gravitational_parameter_m3_s2 / flight.nearest_m**3
+    distance, speed = np.linalg.norm(flight.offset_m, axis=0), np.linalg.norm(flight.velocity_m_s, axis=0)
+    pull = 2.0 * gradient * distance
+    jerk = 2.0 * gradient * (speed + 3.0 * distance * flight.fastest_m_s / flight.nearest_m)
+    m, later_pull, later_jerk = flight.closing_speed_m_s, _greatest_later(pull), _greatest_later(jerk)
+    offset, velocity = flight.offset_m[:-1], flight.velocity_m_s[:-1]
+    tide = gradient * (1.5 * distance + 0.5 * offset)
+    scale = later_pull / m * velocity + (0.5 * (later_pull / m) ** 2 + later_jerk / (3.0 * m)) * offset
+    *along_y, along_z = (_greatest(each) for each in tide + scale)
+    # All that gravity has changed until the end of each step.
+    changes = np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / min(m, model.closing_speed_m_s)
+    allowed = 1.0 - replace(model, gravity_speed_change=0.0).speed_error
+    if model.is_guaranteed and changes[-1] >= allowed > 0.0:
+        cause = f"it may change the closing speed by {allowed:.3g} of itself, all that the guaranteed model allows,"
+        raise no_bound(cause, distance[np.argmax(changes >= allowed)])
     return replace(
         model,
-        gravity_m_s2=along(by_axis[-1]),
-        gravity_y_m_s2=along(by_axis[0]) if len(by_axis) > 1 else None,
-        gravity_speed_change=float(max(LEAST_SPEED_CHANGE, 2.0 * gradient * greatest_range * flight_s / slowest)),
+        gravity_m_s2=along_z,
+        gravity_y_m_s2=along_y[0] if along_y else None,
+        gravity_speed_change=float(max(LEAST_SPEED_CHANGE, changes[-1])),
     )
+
+
+def _greatest_later(values: Floats) -> Floats:
+    """Return the greatest value from each time on."""
+    return np.asarray(np.maximum.accumulate(values[::-1])[::-1])
+
+
+def _greatest(values: Floats) -> float:
+    """Return the greatest value of a function between times that are close together."""
+    return float(values.max() + np.abs(np.diff(values)).max())

@@ -8,16 +8,16 @@ from functools import reduce
 
 import numpy as np
 
-from infoset._compile import entry, inlined
+from infoset._compile import allocation_free, entry, inlined
 from infoset.arrays import Flags, Floats
-from sim.scenario import Scenario, Sun
+from sim.scenario import Sun
 
-LONGEST_SUBSTEP_S = 0.5
-"""Greatest length of a substep, s, if longer ones are not accurate enough for a scenario (`longest_substep_s`)."""
-POSITION_ERROR_M = 1e-3
-"""Error of the position over a flight that allows longer substeps."""
-ARRIVAL_LEAPS = 64
-PASSAGE_LEAPS = 8
+POSITION_ERROR_M = 1e-5
+"""Error of the position at arrival for which the length of a leap is chosen, m. The leap of a step is shorter than the
+step only where gravity is strong."""
+SHORTEST_LEAP = 1e-6
+"""Least length of a leap in units of the step. Only a motion that falls into the attracting body needs shorter ones."""
+NEWTON_STEPS = 8
 X = -1
 """Axis x of a motion, after the lateral axes: z in a plane, y and z in space."""
 RELATIVE, SPACECRAFT = 0, 1
@@ -71,49 +71,56 @@ class KeplerMotion:
     """Motion of the object relative to the spacecraft, both in the Sun's gravity, or in free space without a `sun`.
 
     `position_m` and `velocity_m_s` are the relative (z, x) and (V_z, V_x) at t = 0, shape (B, 2); in space (y, z, x)
-    and (V_y, V_z, V_x), shape (B, 3). Velocity Verlet on the exact difference of the two accelerations, in substeps of
-    at most `substep_s`: with 0.5 s about 1e-8 m over 100 s here. The spacecraft's orbit is circular at t = 0, in the
-    plane of the Sun and the x axis and toward +x; it gives the position of the Sun. Impulses change it.
+    and (V_y, V_z, V_x), shape (B, 3). The spacecraft's orbit is circular at t = 0, in the plane of the Sun and the x
+    axis and toward +x; it gives the position of the Sun. Impulses change it.
+
+    The motion is integrated in leaps of order four (`leap`) on the exact difference of the two accelerations. The error
+    of the position at arrival is below 1 mm, or 1e-9 of the miss if that is greater.
 
     References
     ----------
     Kumkov and Patsko (1997), equations (1) to (3).
     """
 
-    def __init__(
-        self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None, substep_s: float = LONGEST_SUBSTEP_S
-    ) -> None:
-        self._substep_s = substep_s
+    def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None) -> None:
         batch, axes = position_m.shape
-        # For each axis the relative motion and that of the spacecraft.
-        self._motion = np.zeros((4, axes, 2, batch))
-        self._motion[POSITION, :, RELATIVE] = position_m.T
-        self._motion[VELOCITY, :, RELATIVE] = velocity_m_s.T
+        # For each engagement and axis the relative motion and that of the spacecraft.
+        self._motion = np.zeros((batch, 4, axes, 2))
+        self._motion[:, POSITION, :, RELATIVE] = position_m
+        self._motion[:, VELOCITY, :, RELATIVE] = velocity_m_s
         # An index of one axis and a slice of two: arrays of shape (B,) in a plane, (2, B) in space.
         self._lateral: int | slice = 0 if axes == 2 else slice(0, 2)
-        self._manoeuvre = np.zeros((axes - 1, batch))
+        self._manoeuvre = np.zeros((batch, axes - 1))
+        self._scratch = np.empty((3, *self._motion.shape[1:]))
         self._gravitational_parameter = 0.0
+        # An acceleration with this error over the whole flight changes the position by POSITION_ERROR_M.
+        self._acceleration_error = POSITION_ERROR_M * (velocity_m_s[:, X] / position_m[:, X]) ** 2
         if sun is not None:
             toward_sun, along_orbit = sun_and_orbit(sun)
             speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
-            self._motion[POSITION, :, SPACECRAFT] = (-sun.distance_m * toward_sun[-axes:])[:, None]
-            self._motion[VELOCITY, :, SPACECRAFT] = (speed * along_orbit[-axes:])[:, None]
+            self._motion[:, POSITION, :, SPACECRAFT] = -sun.distance_m * toward_sun[-axes:]
+            self._motion[:, VELOCITY, :, SPACECRAFT] = speed * along_orbit[-axes:]
             self._gravitational_parameter = float(sun.gravitational_parameter_m3_s2)
         accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
 
     @property
     def position_m(self) -> Floats:
         """Relative (z, x), shape (B, 2); in space (y, z, x), shape (B, 3)."""
-        return np.asarray(self._motion[POSITION, :, RELATIVE].T)
+        return self._motion[:, POSITION, :, RELATIVE].copy()
 
     @property
     def velocity_m_s(self) -> Floats:
         """Relative (V_z, V_x), shape (B, 2); in space (V_y, V_z, V_x), shape (B, 3)."""
-        return np.asarray(self._motion[VELOCITY, :, RELATIVE].T)
+        return self._motion[:, VELOCITY, :, RELATIVE].copy()
+
+    def bodies(self) -> Floats:
+        """Return position and velocity of spacecraft and object from the Sun, shape (2, 2, axes, B)."""
+        own, relative = (self._motion[:, :ACCELERATION, :, part].transpose(1, 2, 0) for part in (SPACECRAFT, RELATIVE))
+        return np.stack([own, own + relative], axis=1)
 
     def sight(self) -> Sight:
         """Return the present geometry."""
-        position, velocity = self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]
+        position, velocity = self.position_m.T, self.velocity_m_s.T
         lateral, x, speed, v_x = position[self._lateral], position[X], velocity[self._lateral], velocity[X]
         slope = _ratio(lateral, x)
         return Sight(
@@ -126,23 +133,25 @@ class KeplerMotion:
 
     def fire(self, impulse_m_s: Floats) -> None:
         """Change the spacecraft's lateral velocity by impulses of shape (B,), or (2, B) in space: V becomes V - k."""
-        self._motion[VELOCITY, self._lateral, RELATIVE] -= impulse_m_s
-        self._motion[VELOCITY, self._lateral, SPACECRAFT] += impulse_m_s
+        self._motion[:, VELOCITY, self._lateral, RELATIVE] -= impulse_m_s.T
+        self._motion[:, VELOCITY, self._lateral, SPACECRAFT] += impulse_m_s.T
 
     def arrival_s(self) -> Floats:
         """Return the times from now to x = 0, shape (B,), s.
 
-        The motion without impulses in 64 leaps, and a straight line at the end. Impulses, which are across x, change
-        this time through gravity by some nanoseconds.
+        The motion is that without further impulses. Impulses, which are across x, change this time through gravity by
+        some nanoseconds.
         """
-        return self._time_to_zero(self._motion, self._manoeuvre, ARRIVAL_LEAPS)
-
-    def _time_to_zero(self, motion: Floats, manoeuvre_m_s2: Floats, leaps: int) -> Floats:
-        """Return the times to x = 0 of some motions without impulses, s."""
-        duration = motion[POSITION, X, RELATIVE] / -motion[VELOCITY, X, RELATIVE]
-        for _ in range(leaps):
-            motion, _ = self._leap(motion, duration / leaps, manoeuvre_m_s2)
-        return np.asarray(duration - motion[POSITION, X, RELATIVE] / motion[VELOCITY, X, RELATIVE])
+        arrival_s = np.empty(len(self._motion))
+        arrive_all(
+            self._motion,
+            self._manoeuvre,
+            self._gravitational_parameter,
+            self._acceleration_error,
+            self._scratch,
+            arrival_s,
+        )
+        return arrival_s
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         """Advance by one step.
@@ -151,60 +160,24 @@ class KeplerMotion:
         leaves it as it is.
         """
         if manoeuvre_m_s2 is not None:
-            self._manoeuvre = np.ascontiguousarray(np.atleast_2d(manoeuvre_m_s2))
+            self._manoeuvre = np.ascontiguousarray(np.atleast_2d(manoeuvre_m_s2).T)
             accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
-        # In free space one leap gives the exact motion over a step, a parabola.
-        free_space = self._gravitational_parameter == 0.0
-        substeps = 1 if free_space else max(1, int(np.ceil(step_s / self._substep_s * (1.0 - 1e-12))))
-        duration = np.full(self._motion.shape[-1], step_s / substeps)
-        passed = np.zeros(self._motion.shape[-1], dtype=bool)
-        least, arrival = np.full(passed.shape, np.inf), np.zeros(passed.shape)
-        closest = np.zeros(self._motion.shape[1:2] + passed.shape)
-        for substep in range(substeps):
-            before, (self._motion, some_recede) = self._motion, self._leap(self._motion, duration, self._manoeuvre)
-            if not some_recede:
-                continue
-            new = (_dot(self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]) >= 0.0) & ~passed
-            if new.any():
-                position, velocity, acceleration = before[:LOST, :, RELATIVE, new]
-                closest[:, new] = closest_position(position, velocity, acceleration, step_s / substeps)
-                least[new] = np.hypot.reduce(closest[:, new])
-                to_zero = self._time_to_zero(
-                    np.ascontiguousarray(before[..., new]),
-                    np.ascontiguousarray(self._manoeuvre[:, new]),
-                    PASSAGE_LEAPS,
-                )
-                arrival[new] = substep * (step_s / substeps) + to_zero
-                passed |= new
+        batch, _, axes, _ = self._motion.shape
+        passed = np.zeros(batch, dtype=bool)
+        arrival, closest = np.zeros(batch), np.zeros((axes, batch))
+        advance_all(
+            self._motion,
+            self._manoeuvre,
+            self._gravitational_parameter,
+            self._acceleration_error,
+            float(step_s),
+            self._scratch,
+            passed,
+            arrival,
+            closest,
+        )
+        least = np.where(passed, np.hypot.reduce(closest), np.inf)
         return Passage(passed, least, arrival, closest[self._lateral])
-
-    def _leap(self, motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats) -> tuple[Floats, bool]:
-        """Return a motion at a later time, in new memory, and whether some distance increases then."""
-        after = np.empty_like(motion)
-        return after, leap_all(motion, duration_s, manoeuvre_m_s2, self._gravitational_parameter, after)
-
-
-def longest_substep_s(scenario: Scenario) -> float:
-    """Return the length of substeps for which the position has an error of at most 1 mm at arrival, at least 0.5 s.
-
-    Velocity Verlet with substeps h neglects a' h^3/6 of the position in each substep, where a' is the derivative of the
-    acceleration: h^2 T a'/6 over a flight of T, and T^2 h^2 a''/24 by later derivatives. With the distance r of the two
-    bodies, which changes at the speed v, and the velocity w of both around the Sun at the distance R,
-
-        a' <= (K/R^3) (2 v + 6 r w/R).
-
-    The bound is twice that, which covers the second term while the Sun turns by less than a radian.
-    """
-    box, sun = scenario.dispersion, scenario.sun
-    if sun is None:
-        return LONGEST_SUBSTEP_S
-    slowest, fastest = -box.vx_m_s[1], math.hypot(box.vx_m_s[0], box.lateral_speed_m_s)
-    flight_s, reach_m = box.x_m[1] / slowest, math.hypot(box.x_m[1], box.offset_m)
-    orbital = math.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
-    nearest = max(sun.distance_m - reach_m, 0.1 * sun.distance_m)
-    turned = (orbital + fastest) / nearest
-    jerk = sun.gravitational_parameter_m3_s2 / nearest**3 * (2.0 * fastest + 6.0 * reach_m * turned)
-    return max(LONGEST_SUBSTEP_S, math.sqrt(POSITION_ERROR_M / (flight_s * jerk / 3.0)))
 
 
 def sun_and_orbit(sun: Sun) -> tuple[Floats, Floats]:
@@ -225,80 +198,218 @@ def attraction_share(squared_m2: float, gravitational_parameter_m3_s2: float) ->
     return -gravitational_parameter_m3_s2 / (squared_m2 * math.sqrt(squared_m2))
 
 
+@allocation_free
+def accelerate(state: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float) -> None:
+    """Write the accelerations of a state, relative and of the spacecraft.
+
+    A state, shape (4, A + 1, 2), has position, velocity, acceleration and lost rounding; along the A lateral axes and
+    x; relative, and of the spacecraft. `manoeuvre_m_s2`, shape (A,), is the lateral acceleration of the object. The
+    gravitational parameter K of the Sun is zero in free space.
+    """
+    own_share = object_share = 0.0
+    if gravitational_parameter_m3_s2 > 0.0:
+        own_squared = object_squared = 0.0
+        for axis in range(state.shape[1]):
+            own = state[POSITION, axis, SPACECRAFT]
+            of_object = state[POSITION, axis, RELATIVE] + own
+            own_squared += own * own
+            object_squared += of_object * of_object
+        own_share = attraction_share(own_squared, gravitational_parameter_m3_s2)
+        object_share = attraction_share(object_squared, gravitational_parameter_m3_s2)
+    for axis in range(state.shape[1]):
+        own = state[POSITION, axis, SPACECRAFT]
+        of_object = state[POSITION, axis, RELATIVE] + own
+        state[ACCELERATION, axis, SPACECRAFT] = own_share * own
+        state[ACCELERATION, axis, RELATIVE] = object_share * of_object - own_share * own
+    for axis in range(len(manoeuvre_m_s2)):
+        state[ACCELERATION, axis, RELATIVE] += manoeuvre_m_s2[axis]
+
+
+@allocation_free
+def leap(
+    state: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float, duration_s: float, stage: Floats
+) -> None:
+    """Advance a state by a time: one step of the method of Runge, Kutta and Nystroem of order four.
+
+    With the acceleration a(p) at the position p, and a1 = a(p), a2 = a(p + h v/2 + h^2 a1/8), a3 = a(p + h v + h^2
+    a2/2), the position gains h v + h^2 (a1 + 2 a2)/6 and the velocity h (a1 + 4 a2 + a3)/6. It is exact for a constant
+    acceleration. `stage` is memory of the shape of the state.
+
+    References
+    ----------
+    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.14 (the method of Nystroem).
+    """
+    sixth = duration_s / 6.0
+    for axis in range(state.shape[1]):
+        for craft in (RELATIVE, SPACECRAFT):
+            speed, first = state[VELOCITY, axis, craft], state[ACCELERATION, axis, craft]
+            stage[POSITION, axis, craft] = state[POSITION, axis, craft] + 0.5 * duration_s * (
+                speed + 0.25 * duration_s * first
+            )
+    accelerate(stage, manoeuvre_m_s2, gravitational_parameter_m3_s2)
+    for axis in range(state.shape[1]):
+        for craft in (RELATIVE, SPACECRAFT):
+            before, speed = state[POSITION, axis, craft], state[VELOCITY, axis, craft]
+            first, second = state[ACCELERATION, axis, craft], stage[ACCELERATION, axis, craft]
+            stage[POSITION, axis, craft] = before + duration_s * (speed + 0.5 * duration_s * second)
+            # Rounding errors must not accumulate: the set allows for those of one step.
+            way = duration_s * (speed + sixth * (first + 2.0 * second)) + state[LOST, axis, craft]
+            position = before + way
+            state[POSITION, axis, craft] = position
+            state[LOST, axis, craft] = way - (position - before)
+            state[VELOCITY, axis, craft] = speed + sixth * (first + 4.0 * second)
+    accelerate(stage, manoeuvre_m_s2, gravitational_parameter_m3_s2)
+    for axis in range(state.shape[1]):
+        for craft in (RELATIVE, SPACECRAFT):
+            state[VELOCITY, axis, craft] += sixth * stage[ACCELERATION, axis, craft]
+    accelerate(state, manoeuvre_m_s2, gravitational_parameter_m3_s2)
+
+
+@inlined
+def longest_leap_s(state: Floats, gravitational_parameter_m3_s2: float, acceleration_error_m_s2: float) -> float:
+    """Return the greatest length of a leap for which its mean acceleration has at most a given error.
+
+    At the distance R from the Sun, a motion with the speed v changes in the time t = min(R/v, (R^3/K)^(1/2)). A leap of
+    order four and length h has an error of the order of (K/R^2) (h/t)^4. The shorter length of the two bodies' counts.
+    """
+    if gravitational_parameter_m3_s2 == 0.0:
+        return math.inf
+    shortest = math.inf
+    for share_of_relative in (0.0, 1.0):
+        squared = speed_squared = 0.0
+        for axis in range(state.shape[1]):
+            place = state[POSITION, axis, SPACECRAFT] + share_of_relative * state[POSITION, axis, RELATIVE]
+            speed = state[VELOCITY, axis, SPACECRAFT] + share_of_relative * state[VELOCITY, axis, RELATIVE]
+            squared += place * place
+            speed_squared += speed * speed
+        of_orbit = gravitational_parameter_m3_s2 / math.sqrt(squared)
+        time_s = math.sqrt(squared / max(speed_squared, of_orbit))
+        share = acceleration_error_m_s2 * squared / gravitational_parameter_m3_s2
+        shortest = min(shortest, time_s * math.sqrt(math.sqrt(share)))
+    return shortest
+
+
+@inlined
+def copy_state(state: Floats, copy: Floats) -> None:
+    """Write a copy of a state."""
+    for part in range(state.shape[0]):
+        for axis in range(state.shape[1]):
+            for craft in (RELATIVE, SPACECRAFT):
+                copy[part, axis, craft] = state[part, axis, craft]
+
+
+@inlined
+def products(state: Floats) -> tuple[float, float]:
+    """Return r . v, which is zero at the closest approach, and its rate v . v + r . a, of the relative motion."""
+    radial = rate = 0.0
+    for axis in range(state.shape[1]):
+        place, speed = state[POSITION, axis, RELATIVE], state[VELOCITY, axis, RELATIVE]
+        radial += place * speed
+        rate += speed * speed + place * state[ACCELERATION, axis, RELATIVE]
+    return radial, rate
+
+
+@allocation_free
+def approach(
+    state: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float, longest_s: float, stage: Floats
+) -> None:
+    """Advance a state to the closest approach, at most `longest_s` later: Newton's method on r . v = 0."""
+    moment = 0.0
+    for _ in range(NEWTON_STEPS):
+        radial, rate = products(state)
+        after = min(max(moment - radial / rate, 0.0), longest_s)
+        if after == moment:
+            return
+        leap(state, manoeuvre_m_s2, gravitational_parameter_m3_s2, after - moment, stage)
+        moment = after
+
+
+@allocation_free
+def arrive(
+    state: Floats,
+    manoeuvre_m_s2: Floats,
+    gravitational_parameter_m3_s2: float,
+    acceleration_error_m_s2: float,
+    stage: Floats,
+) -> float:
+    """Advance a state to x = 0 without impulses, and return the time, s: Newton's method in leaps of limited length."""
+    total = 0.0
+    last = 0
+    while last < NEWTON_STEPS:
+        x, speed = state[POSITION, X, RELATIVE], state[VELOCITY, X, RELATIVE]
+        rest = -x / speed
+        if speed >= 0.0 or abs(rest) <= 1e-16 * total:
+            return float(total + rest)
+        longest = longest_leap_s(state, gravitational_parameter_m3_s2, acceleration_error_m_s2)
+        longest = max(longest, SHORTEST_LEAP * abs(total + rest))
+        if abs(rest) <= longest:
+            last += 1
+        duration = min(max(rest, -longest), longest)
+        leap(state, manoeuvre_m_s2, gravitational_parameter_m3_s2, duration, stage)
+        total += duration
+    return total
+
+
 @entry
 def accelerate_all(motion: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float) -> None:
-    """Write the accelerations of a motion, relative and of the spacecraft.
-
-    A motion, shape (4, A + 1, 2, B), has position, velocity, acceleration and lost rounding; along the A lateral axes
-    and x; relative, and of the spacecraft. `manoeuvre_m_s2`, shape (A, B), is the lateral acceleration of the object.
-    The gravitational parameter K of the Sun is zero in free space.
-    """
-    for b in range(motion.shape[3]):
-        own_share = object_share = 0.0
-        if gravitational_parameter_m3_s2 > 0.0:
-            own_squared = object_squared = 0.0
-            for axis in range(motion.shape[1]):
-                own = motion[POSITION, axis, SPACECRAFT, b]
-                of_object = motion[POSITION, axis, RELATIVE, b] + own
-                own_squared += own * own
-                object_squared += of_object * of_object
-            own_share = attraction_share(own_squared, gravitational_parameter_m3_s2)
-            object_share = attraction_share(object_squared, gravitational_parameter_m3_s2)
-        for axis in range(motion.shape[1]):
-            own = motion[POSITION, axis, SPACECRAFT, b]
-            of_object = motion[POSITION, axis, RELATIVE, b] + own
-            motion[ACCELERATION, axis, SPACECRAFT, b] = own_share * own
-            motion[ACCELERATION, axis, RELATIVE, b] = object_share * of_object - own_share * own
-        for axis in range(len(manoeuvre_m_s2)):
-            motion[ACCELERATION, axis, RELATIVE, b] += manoeuvre_m_s2[axis, b]
+    """Write the accelerations of all states, shape (B, 4, A + 1, 2); manoeuvres have the shape (B, A)."""
+    for b in range(len(motion)):
+        accelerate(motion[b], manoeuvre_m_s2[b], gravitational_parameter_m3_s2)
 
 
 @entry
-def leap_all(
-    motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float, after: Floats
-) -> bool:
-    """Write a motion after times of shape (B,), in the form of `accelerate_all`: one step of velocity Verlet.
+def arrive_all(
+    motion: Floats,
+    manoeuvre_m_s2: Floats,
+    gravitational_parameter_m3_s2: float,
+    acceleration_error_m_s2: Floats,
+    scratch: Floats,
+    arrival_s: Floats,
+) -> None:
+    """Write the times to x = 0 of all states."""
+    state, stage = scratch[0], scratch[1]
+    for b in range(len(motion)):
+        copy_state(motion[b], state)
+        error = acceleration_error_m_s2[b]
+        arrival_s[b] = arrive(state, manoeuvre_m_s2[b], gravitational_parameter_m3_s2, error, stage)
 
-    Return whether the distance of some relative motion increases then.
+
+@entry
+def advance_all(
+    motion: Floats,
+    manoeuvre_m_s2: Floats,
+    gravitational_parameter_m3_s2: float,
+    acceleration_error_m_s2: Floats,
+    step_s: float,
+    scratch: Floats,
+    passed: Flags,
+    arrival_s: Floats,
+    closest_m: Floats,
+) -> None:
+    """Advance all states by a step, and write the closest approaches within it: see `Passage`.
+
+    The length of a leap depends on the state of the engagement alone, so a run does not depend on the others of its
+    batch. `closest_m`, shape (A + 1, B), are the relative positions at the closest approach.
     """
-    for axis in range(motion.shape[1]):
-        for craft in (RELATIVE, SPACECRAFT):
-            for b in range(motion.shape[3]):
-                before = motion[POSITION, axis, craft, b]
-                half = 0.5 * duration_s[b] * motion[ACCELERATION, axis, craft, b]
-                at_middle = motion[VELOCITY, axis, craft, b] + half
-                # Rounding errors must not accumulate: the set allows for those of one step.
-                way = duration_s[b] * at_middle + motion[LOST, axis, craft, b]
-                position = before + way
-                after[POSITION, axis, craft, b] = position
-                after[LOST, axis, craft, b] = way - (position - before)
-                after[VELOCITY, axis, craft, b] = at_middle
-    accelerate_all(after, manoeuvre_m_s2, gravitational_parameter_m3_s2)
-    for axis in range(motion.shape[1]):
-        for craft in (RELATIVE, SPACECRAFT):
-            for b in range(motion.shape[3]):
-                after[VELOCITY, axis, craft, b] += 0.5 * duration_s[b] * after[ACCELERATION, axis, craft, b]
-    for b in range(motion.shape[3]):
-        growth = 0.0
-        for axis in range(motion.shape[1]):
-            growth += after[POSITION, axis, RELATIVE, b] * after[VELOCITY, axis, RELATIVE, b]
-        if growth >= 0.0:
-            return True
-    return False
-
-
-def closest_position(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats, duration_s: float) -> Floats:
-    """Return the position (m) nearest to the origin during uniformly accelerated motion, vectors of shape (axes, B).
-
-    Four Newton steps, starting from the closest approach of straight motion.
-    """
-    moment = np.clip(-_dot(position_m, velocity_m_s) / _dot(velocity_m_s, velocity_m_s), 0.0, duration_s)
-    for _ in range(4):
-        at = position_m + moment * velocity_m_s + 0.5 * moment**2 * acceleration_m_s2
-        speed = velocity_m_s + moment * acceleration_m_s2
-        slope = _dot(speed, speed) + _dot(at, acceleration_m_s2)
-        moment = np.clip(moment - _dot(at, speed) / slope, 0.0, duration_s)
-    return position_m + moment * velocity_m_s + 0.5 * moment**2 * acceleration_m_s2
+    before, trial, stage = scratch[0], scratch[1], scratch[2]
+    for b in range(len(motion)):
+        state, manoeuvre, error = motion[b], manoeuvre_m_s2[b], acceleration_error_m_s2[b]
+        left = step_s
+        while left > 0.0:
+            longest = longest_leap_s(state, gravitational_parameter_m3_s2, error)
+            leaps = max(1.0, math.ceil(left / max(longest, SHORTEST_LEAP * step_s)))
+            duration = left / leaps
+            copy_state(state, before)
+            leap(state, manoeuvre, gravitational_parameter_m3_s2, duration, stage)
+            if not passed[b] and products(state)[0] >= 0.0:
+                passed[b] = True
+                copy_state(before, trial)
+                approach(trial, manoeuvre, gravitational_parameter_m3_s2, duration, stage)
+                for axis in range(trial.shape[1]):
+                    closest_m[axis, b] = trial[POSITION, axis, RELATIVE]
+                to_zero = arrive(before, manoeuvre, gravitational_parameter_m3_s2, error, stage)
+                arrival_s[b] = step_s - left + to_zero
+            left = left - duration if leaps > 1.0 else 0.0
 
 
 def _ratio(over: Floats, under: Floats) -> Floats:

@@ -14,7 +14,7 @@ from infoset.sensor import Measurements, Sensor
 from sim.bound import TruthPair
 from sim.draws import Draws
 from sim.engagement import Engagements
-from sim.kepler import LONGEST_SUBSTEP_S, KeplerMotion, Passage, longest_substep_s
+from sim.kepler import KeplerMotion, Passage
 from sim.results import Results
 from sim.scenario import Scenario, Sun
 
@@ -35,9 +35,8 @@ class ScheduledMotion(KeplerMotion):
         velocity_m_s: Floats,
         sun: Sun | None,
         acceleration_m_s2: Floats,
-        substep_s: float = LONGEST_SUBSTEP_S,
     ) -> None:
-        super().__init__(position_m, velocity_m_s, sun, substep_s)
+        super().__init__(position_m, velocity_m_s, sun)
         self._schedule = acceleration_m_s2
         self._step = 0
 
@@ -128,8 +127,7 @@ def fly_pair(
     nothing = np.zeros((*shape, steps + STEPS_BEYOND))
     draws = Draws(pair.position_m, pair.velocity_m_s, {}, nothing)
     noise = PairNoise(pair.last_common_step)
-    substep_s = longest_substep_s(scenario)
-    truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2, substep_s)
+    truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2)
     flight = Engagements(scenario, draws, strategy, truth, noise)
     impulses: list[Floats] = []
     while flight.flying:

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
-from experiments.common.errors import InputError, shown
+from experiments.common.errors import InputError, input_errors, shown
 from experiments.common.toml_file import load_tables, read_tables
 from experiments.common.toml_form import Form, keys_of, template
 from experiments.common.toml_values import si_name, si_values, value_text
@@ -22,6 +22,7 @@ from experiments.interception.scenario_tables import LATER_KEYS, OPTIONAL_SENSOR
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor
+from sim.gravity import on_board_model
 from sim.scenario import Body, Scenario, Sun, Target
 from sim.storage.codec import scenario_hash as scenario_hash  # noqa: PLC0414 (users import it from here)
 
@@ -261,12 +262,15 @@ def scenario_to_toml(scenario: Scenario) -> str:
 
 def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
     try:
-        return _composed(tables)
+        scenario = _composed(tables)
     except ValueError as error:
         # The decimals are valid, but two that differ only beyond the sixteenth digit are equal after rounding.
         raise InputError(
             f"{source}: {error}; numbers are rounded to 16 digits: change it in the first of them"
         ) from None
+    with input_errors(source):
+        on_board_model(scenario)
+    return scenario
 
 
 def _composed(tables: ScenarioTables) -> Scenario:

@@ -1,0 +1,209 @@
+"""Bounds of all motions that a set model allows for, with their distance from the attracting body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from infoset import StateBox
+from infoset.arrays import Floats
+from sim.kepler import KeplerMotion, X
+from sim.scenario import Sun
+
+INSTANTS = 500
+"""Number of times at which a flight is bounded."""
+STRETCHES = (1.001, 1.02, 1.2, 4.0)
+"""Lengths of the flight that are tried, in units of the longest one without gravity."""
+NEAREST_SHARE = 0.1
+"""Least share of the nominal distance from the attracting body that the deviations must leave."""
+INFLATION = 1.001
+"""Factor between a trial and the deviations that follow from the one before."""
+TRIALS = 100
+TOO_NEAR = "the motions may come too near the attracting body"
+TOO_SLOW = "gravity may take away the closing speed"
+
+
+@dataclass(frozen=True)
+class FlightBounds:
+    """Bounds of all motions that a model allows for, at N equal steps of time until the last of them has x = 0.
+
+    Parameters
+    ----------
+    times_s : ndarray, shape (N,)
+        Times since t = 0.
+    nearest_m : ndarray, shape (N,)
+        Least distance of the segment between spacecraft and object from the attracting body, within half a step.
+    fastest_m_s : ndarray, shape (N,)
+        Greatest speed of a point of the segment relative to the attracting body.
+    offset_m, velocity_m_s : ndarray, shape (axes, N)
+        Greatest modulus of each component of the relative position and velocity, x last.
+    closing_speed_m_s : float
+        Least closing speed of the flight.
+    """
+
+    times_s: Floats
+    nearest_m: Floats
+    fastest_m_s: Floats
+    offset_m: Floats
+    velocity_m_s: Floats
+    closing_speed_m_s: float
+
+
+def no_bound(cause: str, range_m: float) -> ValueError:
+    """Return the error of a scenario whose gravity has no bound from a range on."""
+    return ValueError(
+        f"sun: gravity has no bound: {cause} at a range of {range_m / 1000.0:.4g} km; start nearer to the target, "
+        "narrow the bounds of the start, or omit the attracting body"
+    )
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Positions and velocities of spacecraft and object, in this order, or their deviations: shape (2, axes, N)."""
+
+    place_m: Floats
+    speed_m_s: Floats
+
+    @property
+    def relative(self) -> tuple[Floats, Floats]:
+        """Position and velocity of the object relative to the spacecraft, shape (axes, N)."""
+        return self.place_m[1] - self.place_m[0], self.speed_m_s[1] - self.speed_m_s[0]
+
+    @property
+    def range_m(self) -> Floats:
+        """Distance between the two, shape (N,)."""
+        return np.asarray(np.linalg.norm(self.relative[0], axis=0))
+
+
+@lru_cache(maxsize=64)
+def flight_bounds(
+    bounds: StateBox, disturbances_m_s2: tuple[float, ...], sun: Sun, impulses_m_s: float
+) -> FlightBounds:
+    """Return bounds of all motions from a box of starts, as in Lemma 2 of docs/guarantee.md.
+
+    The nominal motion starts in the middle of the box and has no impulses. All deviations from it have a bound.
+
+    Parameters
+    ----------
+    bounds : StateBox
+        Possible starts.
+    disturbances_m_s2 : tuple of float
+        Greatest acceleration of the object along each lateral axis.
+    sun : Sun
+        The attracting body.
+    impulses_m_s : float
+        Greatest sum of the impulses' moduli.
+
+    Raises
+    ------
+    ValueError
+        If the motions may come too near the attracting body, or may never have x = 0; the message names the range.
+    """
+    boxes = [bounds.axis(name) for name in bounds.axes]
+    start = np.array([[*(box.z_m for box in boxes), bounds.x_m], [*(box.vz_m_s for box in boxes), bounds.vx_m_s]])
+    middle, half = start.mean(axis=2), 0.5 * np.ptp(start, axis=2)
+    # All impulses at once, along each axis: the deviations are greatest then.
+    impulses = np.array([*(impulses_m_s for _ in boxes), 0.0])
+    first = np.array([[np.zeros_like(half[0]), half[0]], [impulses, half[1]]])
+    disturbance = np.array([np.zeros_like(half[0]), [*disturbances_m_s2, 0.0]])
+    for stretch in STRETCHES:
+        times_s = np.linspace(0.0, stretch * bounds.x_m[1] / -bounds.vx_m_s[1], INSTANTS)
+        nominal = _nominal(middle, sun, times_s)
+        deviation = _deviation(first, disturbance, nominal, times_s, sun)
+        beyond = np.flatnonzero(nominal.relative[0][X] + deviation.place_m[:, X].sum(axis=0) <= 0.0)
+        if len(beyond):
+            return _bounds(nominal, deviation, times_s, beyond[0] + 1)
+    raise no_bound(TOO_SLOW, nominal.range_m[-1])
+
+
+def _nominal(middle: Floats, sun: Sun, times_s: Floats) -> _Motion:
+    """Return the motion from a relative position and velocity, shape (2, axes), around the attracting body."""
+    motion = KeplerMotion(middle[None, 0], middle[None, 1], sun)
+    states = [motion.bodies()]
+    for _ in times_s[1:]:
+        motion.advance(times_s[1])
+        states.append(motion.bodies())
+    place_m, speed_m_s = np.moveaxis(np.array(states)[..., 0], 0, -1)
+    return _Motion(place_m, speed_m_s)
+
+
+def _deviation(first: Floats, disturbance_m_s2: Floats, nominal: _Motion, times_s: Floats, sun: Sun) -> _Motion:
+    """Return bounds of all deviations from the nominal motion.
+
+    A deviation d satisfies |d_i''| <= (K/R^3) (1.5 |d| + 0.5 |d_i|) + disturbance along axis i, with the least distance
+    R from the attracting body that the deviation allows for. The right side increases with |d_i|. A function that is
+    not less than the double integral of the right side for it is therefore a bound of all deviations.
+    """
+    step_s, far_m = times_s[1], np.linalg.norm(nominal.place_m, axis=1)
+    fast_m_s = np.linalg.norm(nominal.speed_m_s, axis=1)
+    place = np.repeat(first[0, ..., None], INSTANTS, axis=2)
+    speed = np.repeat(first[1, ..., None], INSTANTS, axis=2)
+    for _ in range(TRIALS):
+        size_m, size_m_s = np.linalg.norm(place, axis=1), np.linalg.norm(speed, axis=1)
+        nearest_m = far_m - size_m - 0.5 * step_s * (fast_m_s + size_m_s)
+        too_near = (nearest_m < NEAREST_SHARE * far_m).any(axis=0)
+        if too_near.any():
+            raise no_bound(TOO_NEAR, nominal.range_m[too_near.argmax()])
+        gradient = (sun.gravitational_parameter_m3_s2 / nearest_m**3)[:, None]
+        growth = gradient * (1.5 * size_m[:, None] + 0.5 * place) + disturbance_m_s2[..., None]
+        new_place, new_speed = place.copy(), speed.copy()
+        new_speed[..., 1:] = first[1, ..., None] + step_s * np.cumsum(greater_of_neighbours(growth), axis=-1)
+        new_place[..., 1:] = first[0, ..., None] + step_s * np.cumsum(new_speed[..., 1:], axis=-1)
+        if (new_place <= place).all() and (new_speed <= speed).all():
+            return _Motion(new_place, new_speed)
+        place, speed = INFLATION * new_place, INFLATION * new_speed
+    raise no_bound(TOO_NEAR, nominal.range_m[-1])
+
+
+def greater_of_neighbours(values: Floats) -> Floats:
+    """Return the greater value of each two neighbours along the last axis: a bound between them, if monotonic."""
+    return np.asarray(np.maximum(values[..., 1:], values[..., :-1]))
+
+
+def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int) -> FlightBounds:
+    """Return the bounds of a flight until its last arrival."""
+    place, speed = nominal.relative
+    place_error, speed_error = deviation.place_m.sum(axis=0), deviation.speed_m_s.sum(axis=0)
+    low, high = place - place_error, place + place_error
+    # Flights end at x = 0.
+    low[X], high[X] = np.maximum(low[X], 0.0), np.maximum(high[X], 0.0)
+    fastest = np.linalg.norm(nominal.speed_m_s, axis=1) + np.linalg.norm(deviation.speed_m_s, axis=1)
+    fastest_m_s = fastest.max(axis=0)
+    closest_m, nearest_m = _distances_of_segment(nominal, deviation)
+    nearest_m -= 0.5 * times_s[1] * fastest_m_s
+    closing_m_s = -speed[X] - speed_error[X]
+    for cause, is_bad in (
+        (TOO_NEAR, nearest_m < NEAREST_SHARE * closest_m),
+        (TOO_SLOW, closing_m_s <= 0.0),
+    ):
+        if is_bad[:instants].any():
+            raise no_bound(cause, nominal.range_m[is_bad.argmax()])
+    return FlightBounds(
+        times_s=times_s[:instants],
+        nearest_m=nearest_m[:instants],
+        fastest_m_s=fastest_m_s[:instants],
+        offset_m=np.maximum(np.abs(low), np.abs(high))[:, :instants],
+        velocity_m_s=(np.abs(speed) + speed_error)[:, :instants],
+        closing_speed_m_s=float(closing_m_s[:instants].min()),
+    )
+
+
+def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats, Floats]:
+    """Return the least distance of the segment from the attracting body: of the nominal one, and of all possible ones.
+
+    At the length u of the nominal segment it is (height^2 + (u - foot)^2)^(1/2). The deviation is at most linear in u.
+    """
+    own, (relative, _) = nominal.place_m[0], nominal.relative
+    length = np.maximum(np.linalg.norm(relative, axis=0), np.finfo(float).tiny)
+    foot = -(own * relative / length).sum(axis=0)
+    height = np.sqrt(np.maximum((own * own).sum(axis=0) - foot**2, 0.0))
+
+    def least(of_craft: Floats, of_object: Floats) -> Floats:
+        slope = np.clip((of_object - of_craft) / length, -1.0 + 1e-12, 1.0 - 1e-12)
+        at = np.clip(foot + height * slope / np.sqrt(1.0 - slope**2), 0.0, length)
+        return np.asarray(np.hypot(height, at - foot) - of_craft - (of_object - of_craft) * (at / length))
+
+    sizes = np.linalg.norm(deviation.place_m, axis=1)
+    return least(*np.zeros_like(sizes)), least(*sizes)
