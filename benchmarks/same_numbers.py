@@ -32,7 +32,7 @@ COMMANDS = (
     "reach rendezvous-2021 --select energy,l1,norms,peak,chebyshev,analytic,vertices,samples:5 --replan",
     "reach rendezvous-16-periods",
     "reach approach-cone",
-    "pareto pareto-2008 --prefer y_m=0,z_m=50",
+    "pareto pareto-2008 --prefer x_m=0,z_m=50",
     "multipoint service-2",
     "multipoint service-3 --order best --times best",
     "multipoint service-5 --order best",

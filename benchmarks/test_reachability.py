@@ -53,7 +53,7 @@ def paper(periods: int) -> ReachabilityProblem:
     """Return the paper's problem of 720 s with another number of periods."""
     orbit = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
     transition, control = discretised(motion_of(orbit, MotionModel.FROZEN), periods, 720.0 / periods, 0.15)
-    start = np.array([2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0])
+    start = np.array([-2540.0, -2650.0, 2120.0, 2.0, 3.0, 3.0])
     return ReachabilityProblem(transition, control, start, np.array([3000.0] * 3 + [7.5] * 3), np.ones(3))
 
 

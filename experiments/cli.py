@@ -60,7 +60,7 @@ COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
             "pursuit-map geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map",
         ),
         (Reach, "reachability.run", "reach rendezvous-2021 --select energy,vertices --replan --out reach"),
-        (Pareto, "pareto.run", "pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures"),
+        (Pareto, "pareto.run", "pareto pareto-2008 --prefer x_m=0,z_m=50 --out figures"),
         (Multipoint, "multipoint.run", "multipoint service-3 --order best --times best --out figures"),
     ],
     "Set-membership estimation": [(Observe, "observer.run", "observe vehicle --smooth --out results")],

@@ -65,6 +65,24 @@ def perigee_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_
     return latus_rectum / (1.0 + math.sqrt(max(0.0, 1.0 - latus_rectum / axis)))
 
 
+def orbit_fault(position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, planet_radius_m: float) -> str | None:
+    """Return why a craft cannot stay on the orbit of a state: it is no ellipse, or meets the planet; None if it can."""
+    if not position_m.any():
+        return "the position is the centre of the planet"
+    axis = semi_major_axis_m(position_m, velocity_m_s, mu_m3_s2)
+    if not 0.0 < axis < math.inf:
+        return "the orbit is a parabola or a hyperbola: the velocity is not below the escape velocity"
+    perigee = perigee_m(position_m, velocity_m_s, mu_m3_s2)
+    if perigee <= 1e-6 * axis:
+        return "the orbit is a fall along a line through the planet's centre"
+    if perigee <= planet_radius_m:
+        return (
+            f"the orbit meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the planet's "
+            f"radius is {planet_radius_m / 1e3:.6g} km"
+        )
+    return None
+
+
 def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: float) -> Floats:
     """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting; `duration_s` may be negative.
 

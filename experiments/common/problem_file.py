@@ -18,10 +18,16 @@ from experiments.common.errors import InputError
 from experiments.common.output import library_version
 from experiments.common.toml_form import Form, KeyPath, Known, Problem, Tables
 from experiments.common.toml_values import Constant, Description, Name, Table, key, quoted_text
+from rendezvous.two_body import OrbitalElements, orbit_fault, semi_major_axis_m
 
 MOST_RADIANS = Decimal(1000)
 LEAST_RADIANS = Decimal("1e-9")
 """Angles of the orbit during a problem, within which linear motion is meaningful."""
+EARTH_M3_S2, EARTH_RADIUS_M = 3.986004418e14, 6378137.0
+_MOST_RADII = 1000.0
+"""Greatest semi-major axis in radii of the planet: that of an orbit in metres, read as kilometres, is greater."""
+_STAR_M3_S2 = 1e19
+"""Gravitational parameter between that of Jupiter, 1.27e17, and that of the Sun, 1.33e20."""
 
 
 class ProblemTables(Table):
@@ -149,6 +155,43 @@ def angle_problems(path: KeyPath, duration_s: Decimal | None, rate_rad_s: Decima
             f"is {float(angle):.3g} radians of the orbit; {LEAST_RADIANS:g} to {MOST_RADIANS} make sense",
             f"check the units of orbit_rate_rad_s and {path[-1]}",
         )
+
+
+def orbit_problems(
+    path: KeyPath,
+    state: tuple[ArrayLike, ArrayLike],
+    mu_m3_s2: float,
+    remedy: str,
+    planet_radius_m: float | None = None,
+) -> Iterator[Problem]:
+    """Yield a problem if the orbit of a state (position and velocity, SI) meets its planet, or is absurdly large.
+
+    Without a radius, that of a planet with the density of the Earth is used. No planet or moon is denser, so that
+    theirs are greater. Orbits about a star have no upper limit.
+    """
+    position, velocity = (np.asarray(vector, dtype=float) for vector in state)
+    densest_m = EARTH_RADIUS_M * (mu_m3_s2 / EARTH_M3_S2) ** (1.0 / 3.0)
+    fault = orbit_fault(position, velocity, mu_m3_s2, densest_m if planet_radius_m is None else planet_radius_m)
+    if fault is None and mu_m3_s2 < _STAR_M3_S2:
+        radii = semi_major_axis_m(position, velocity, mu_m3_s2) / densest_m
+        if radii > _MOST_RADII:
+            fault = f"the orbit is {radii:.4g} times as large as the planet; at most {_MOST_RADII:g} times make sense"
+    if fault is not None:
+        of_density = "" if planet_radius_m is not None else " (the radius is that of the Earth's density)"
+        yield Problem(path, fault, remedy + of_density)
+
+
+def rate_problems(rate_rad_s: Decimal | None, eccentricity: Decimal | None = None) -> Iterator[Problem]:
+    """Yield a problem if the orbit of this mean motion about the Earth has one; see `orbit_problems`.
+
+    The rate at the surface of a planet depends on its density only, so that the Earth stands for all of them.
+    """
+    if rate_rad_s is None or rate_rad_s <= 0:
+        return
+    axis_m = (EARTH_M3_S2 / float(rate_rad_s) ** 2) ** (1.0 / 3.0)
+    state = OrbitalElements(axis_m, float(eccentricity or 0), 0.0, 0.0, 0.0, 0.0).state(EARTH_M3_S2)
+    remedy = "check its unit; these are numbers of the orbit about the Earth"
+    yield from orbit_problems(("orbit_rate_rad_s",), state, EARTH_M3_S2, remedy, EARTH_RADIUS_M)
 
 
 def _plain(value: object) -> str:

@@ -56,7 +56,7 @@ def draw_path(scene: Scene) -> Figure:
     positions = positions * per_m
     hill = scene.axes is FrameAxes.HILL
     planes = ((1, 0), (1, 2)) if hill else ((0, 1), (0, 2))
-    labels = ("x (radial)", "y (along-track)", "z (normal)") if hill else ("x", "y", "z")
+    labels = scene.axis_titles
     figure, panels = figure_grid(88.0, 1, 2, (14.0, 4.0, 20.0, 7.0), (17.0, 0.0))
     for panel, (across, up), letter in zip(panels, planes, "ab", strict=True):
         for visit in range(len(scene.order)):
@@ -122,8 +122,8 @@ def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
     times = scene.times
     control = scene.path.control(times) * 1e3
     figure, (above, below) = figure_grid(100.0, 2, 1, (17.0, 8.0, 12.0, 9.0), (0.0, 8.0))
-    for axis, letter in enumerate("xyz"):
-        _line(above, scene, times, control[:, axis], label=f"$u_{letter}$", **_COMPONENTS[axis])
+    for axis, title in enumerate(scene.axis_titles):
+        _line(above, scene, times, control[:, axis], label=title, **_COMPONENTS[axis])
     _line(below, scene, times, np.linalg.norm(control, axis=1), color=INK)
     if bound_m_s2 is not None:
         below.axhline(1e3 * bound_m_s2, linewidth=0.9, **_DOTTED)
@@ -141,9 +141,9 @@ def draw_costates(scene: Scene) -> Figure:
     times = scene.times
     costate = scene.path.costate(times)
     figure, (above, below) = figure_grid(100.0, 2, 1, (17.0, 8.0, 12.0, 9.0), (0.0, 8.0))
-    for axis, letter in enumerate("xyz"):
-        _line(above, scene, times, costate[:, axis], label=rf"$\lambda_{{r,{letter}}}$", **_COMPONENTS[axis])
-        _line(below, scene, times, costate[:, 3 + axis], label=rf"$\lambda_{{V,{letter}}}$", **_COMPONENTS[axis])
+    for axis, title in enumerate(scene.axis_titles):
+        _line(above, scene, times, costate[:, axis], label=title, **_COMPONENTS[axis])
+        _line(below, scene, times, costate[:, 3 + axis], label=title, **_COMPONENTS[axis])
     above.set_ylabel(r"$\lambda_r$, m/s$^3$")
     below.set_ylabel(r"$\lambda_V$, m/s$^2$")
     for panel in (above, below):

@@ -12,7 +12,15 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError, input_errors
-from experiments.common.problem_file import ProblemTables, ReadProblem, angle_problems, duplicate_names, problem_form
+from experiments.common.problem_file import (
+    ProblemTables,
+    ReadProblem,
+    angle_problems,
+    duplicate_names,
+    orbit_problems,
+    problem_form,
+    rate_problems,
+)
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import KeyPath, Known, Problem
 from experiments.common.toml_values import (
@@ -88,7 +96,7 @@ class BodyTable(Table):
     """State of a body: at t = 0 in Hill axes, or at an epoch in inertial axes."""
 
     position_m: Vector | None = key(
-        "at t = 0: x radial, y along the motion, z along the normal of the orbit",
+        "at t = 0: x radially outward, y along the motion, z along the orbit's normal",
         "[0.0, 0.0, 0.0]",
         "[100.0, 2000.0, 50.0]",
         "[-150.0, 3500.0, -80.0]",
@@ -175,9 +183,13 @@ def _checks(known: Known) -> Iterator[Problem]:
             yield Problem((*path, "dwell_s"), f"is {dwell}, but a flyby has no stay", remedy)
     yield from _time_problems(known, paths)
     if axes is Axes.HILL:
+        yield from rate_problems(known.number("orbit_rate_rad_s"), known.number("eccentricity"))
         times = [*((*path, "time_s") for path in paths), ("times", "latest_s")]
         last = max(times, key=lambda path: known.number(*path) or ZERO)
         yield from angle_problems(last, known.number(*last), known.number("orbit_rate_rad_s"))
+    else:
+        for path in (("chaser",), *paths):
+            yield from _orbit_problems(known, path)
 
 
 def _axes_problems(known: Known, axes: Axes) -> Iterator[Problem]:
@@ -212,6 +224,28 @@ def _body_problems(known: Known, path: KeyPath, axes: Axes) -> Iterator[Problem]
     for name in needed:
         if name not in table:
             yield Problem((*path, name), "is missing", f"add {name} = [x, y, z]")
+
+
+def _orbit_problems(known: Known, path: KeyPath) -> Iterator[Problem]:
+    """Check the orbit of a body about the attracting one."""
+    mu, elements = known.number("gravitational_parameter_km3_s2"), known.value(*path, "elements")
+    position, velocity = (known.value(*path, name) for name in ("position_km", "velocity_km_s"))
+    if mu is None:
+        return
+    name, mu_si = "elements", si(mu, 3 * KILO)
+    if isinstance(elements, list):
+        axis, eccentricity = Decimal(elements[0]), Decimal(elements[1])
+        state = OrbitalElements(si(axis, KILO), si(eccentricity), 0.0, 0.0, 0.0, 0.0).state(mu_si)
+    elif isinstance(position, list) and isinstance(velocity, list):
+        name, state = "position_km", (_si_km(position), _si_km(velocity))
+    else:
+        return
+    remedy = "choose an ellipse above the attracting body, or check the units"
+    yield from orbit_problems((*path, name), state, mu_si, remedy)
+
+
+def _si_km(values: list[object]) -> Floats:
+    return np.array([si(Decimal(str(value)), KILO) for value in values])
 
 
 def _time_problems(known: Known, paths: Sequence[KeyPath]) -> Iterator[Problem]:

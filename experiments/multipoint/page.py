@@ -22,8 +22,7 @@ def multipoint_page(name: str, scene: Scene, bound_m_s2: float | None = None) ->
         until_s = nodes.leave_s[visit] if visit < len(scene.order) - 1 else scene.end_s
         tracks.append(Track(target, 1 + visit, scene.target_path(visit, time_s[time_s <= until_s])))
     marks = [Mark("" if visit else "visit", state[:3], "diamond") for visit, state in enumerate(path.arrival_states)]
-    hill = scene.axes is Axes.HILL
-    axes = ("x (radial)", "y (along-track)", "z (normal)") if hill else ("x", "y", "z")
+    hill, axes = scene.axes is Axes.HILL, scene.axis_titles
     if not hill:
         marks.append(Mark("centre of attraction", np.zeros(3), "plus"))
     unit = length_unit(float(np.abs(positions).max()))
@@ -35,7 +34,7 @@ def multipoint_page(name: str, scene: Scene, bound_m_s2: float | None = None) ->
     ]
     magnitude = np.linalg.norm(control, axis=1)
     control_unit = ("mm/s²", 1e3) if magnitude.max() < 1.0 else ("m/s²", 1.0)
-    components = [Curve(f"u{letter}", look, control[:, look]) for look, letter in enumerate("xyz")]
+    components = [Curve(f"u along {title}", look, control[:, look]) for look, title in enumerate(axes)]
     levels = [] if bound_m_s2 is None else [bound_m_s2]
     graphs = [
         Graph("Magnitude of the control", "|u|", control_unit, [Curve("|u|", 0, magnitude)], levels),
@@ -45,5 +44,5 @@ def multipoint_page(name: str, scene: Scene, bound_m_s2: float | None = None) ->
     visits = ", ".join(
         f"{target} at {time * per_s:.6g} {clock}" for target, time in zip(scene.names, nodes.arrive_s, strict=True)
     )
-    about = [f"cost I = {path.cost:.8g} m²/s³", f"order: {visits}"]
+    about = [f"cost I = {path.cost:.8g} m²/s³", f"order: {visits}", f"axes: {scene.axes_text}"]
     return motion_page(f"Visits {name}", about, time_s, views, graphs)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from experiments.common.display_units import Unit, time_unit
+from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, trajectories_csv
 from experiments.common.screen import Part, number_table
 from experiments.multipoint.command import BEST, GIVEN
@@ -36,6 +37,16 @@ class Scene:
     def names(self) -> list[str]:
         """Return the names of the targets in the order of the visits."""
         return [self.tour.targets.targets[target].name for target in self.order]
+
+    @property
+    def axis_titles(self) -> tuple[str, str, str]:
+        """Return the titles of the axes."""
+        return AXIS_TITLES if self.axes is Axes.HILL else INERTIAL_TITLES
+
+    @property
+    def axes_text(self) -> str:
+        """Return the directions of the axes."""
+        return AXES if self.axes is Axes.HILL else "inertial, those of the problem file"
 
     @property
     def end_s(self) -> float:
@@ -151,10 +162,9 @@ class Report:
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
     problem, path = report.problem, report.scene.path
-    hill = report.scene.axes is Axes.HILL
     return {
         **problem.head,
-        "units": "m, s; " + ("x radial, y along the motion, z along the orbit's normal" if hill else "inertial axes"),
+        "units": f"m, s; axes: {report.scene.axes_text}",
         "order_chosen": report.search.order,
         "times_chosen": report.search.times,
         "cost_m2_s3": path.cost,
@@ -204,6 +214,7 @@ def report_parts(report: Report) -> Iterator[Part]:
     """Yield the cost, the visits and the extent of the search, for the screen."""
     path, nodes = report.scene.path, report.scene.path.nodes
     yield f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"
+    yield f"axes: {report.scene.axes_text}"
     if report.problem.price_per_s > 0.0:
         yield f"cost including the price of time = {report.best.objective:.8g} m^2/s^3"
     unit, per_s = report.scene.time_unit

@@ -19,6 +19,8 @@ class Pareto(FileOptions):
     coalitions and the bound on the control are also evaluated.
 
     Without --out, --json, --csv or --html no file is written.
+
+    Axes: x radially outward, y along the motion, z along the orbit's normal (Hill's).
     """
 
     problem: ProblemName = "pareto-2008"
@@ -27,7 +29,7 @@ class Pareto(FileOptions):
         str | None,
         typer.Option(
             metavar="NAME=VALUE,..",
-            help="Preferred meeting, for example y_m=0,z_m=50. The nearest Pareto-optimal meeting is also evaluated.",
+            help="Preferred meeting, for example x_m=0,z_m=50. The nearest Pareto-optimal meeting is also evaluated.",
         ),
     ] = None
     samples: Annotated[

@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from experiments.common.display_units import length_unit
 from experiments.common.figure_style import INK, LIMIT, LINE_LOOKS, SET_EDGE, SET_FILL, figure_grid, new_figure, style
+from experiments.common.hill_axes import AXIS_TITLES, component_titles
 from experiments.pareto.report import Report
 from infoset.arrays import Floats
 from rendezvous.pareto import (
@@ -25,8 +26,7 @@ from rendezvous.pareto import (
     simplex_weights,
 )
 
-_AXES = ("x (against the motion)", "y (outward)", "z (normal)")
-_PLANES = ((0, 1), (0, 2), (1, 2))
+_PLANES = ((1, 0), (1, 2), (0, 2))
 _POINTS = 241
 _MARKS = 4
 _LEAST_WEIGHT = 1e-9
@@ -82,16 +82,15 @@ def draw_trajectories(solution: EncounterSolution) -> Figure:
             plane.plot(*(path[:, axes] * per_m).T, label=name, **marks, **_look(index))
     meeting = solution.meeting_state()[:3] * per_m
     space.plot(*meeting[:, None], **_MEETING)
-    space.set_xlabel(f"x, {unit}", labelpad=-4.0)
-    space.set_ylabel(f"y, {unit}", labelpad=-3.0)
-    space.set_zlabel(f"z, {unit}", labelpad=-2.0)
+    for name, title, pad in zip("xyz", AXIS_TITLES, (-4.0, -3.0, -2.0), strict=True):
+        getattr(space, f"set_{name}label")(f"{title}, {unit}", labelpad=pad)
     space.tick_params(pad=-2.0, labelsize=6.5)
     for axis in (space.xaxis, space.yaxis, space.zaxis):
         axis.set_major_locator(MaxNLocator(4))
     figure.text(0.012, 0.975, f"(a) in space; {_spacing(solution)}", fontsize=8.5)
     for plane, (first, second), letter in zip(planes, _PLANES, "bcd", strict=True):
         plane.plot(meeting[first], meeting[second], **_MEETING)
-        plane.set(xlabel=f"{_AXES[first]}, {unit}", ylabel=f"{_AXES[second]}, {unit}")
+        plane.set(xlabel=f"{AXIS_TITLES[first]}, {unit}", ylabel=f"{AXIS_TITLES[second]}, {unit}")
         plane.set_title(f"({letter})", loc="left")
         plane.margins(0.08)
     if len(paths) <= _MOST_NAMED:
@@ -122,8 +121,8 @@ def draw_controls(solution: EncounterSolution, bound_m_s2: float | None = None) 
             "bound", (1.0, bound_m_s2), xycoords=("axes fraction", "data"), xytext=(-2, 2),
             textcoords="offset points", ha="right", color=LIMIT,
         )  # fmt: skip
-    for panel, quantity, letter in zip(panels, ("u_x", "u_y", "u_z", "|u|"), "abcd", strict=True):
-        panel.set_ylabel(f"${quantity}$, m/s$^2$")
+    for panel, quantity, letter in zip(panels, (*component_titles("u"), "$|u|$"), "abcd", strict=True):
+        panel.set_ylabel(f"{quantity}, m/s$^2$")
         panel.set_title(f"({letter})", loc="left")
         panel.margins(x=0.0)
     panels[3].set_ylim(bottom=0.0)

@@ -11,7 +11,14 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import input_errors
-from experiments.common.problem_file import ProblemTables, ReadProblem, angle_problems, duplicate_names, problem_form
+from experiments.common.problem_file import (
+    ProblemTables,
+    ReadProblem,
+    angle_problems,
+    duplicate_names,
+    problem_form,
+    rate_problems,
+)
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
@@ -27,7 +34,7 @@ from experiments.common.toml_values import (
     wrong,
 )
 from rendezvous.pareto import Component, Craft, Encounter, Meeting
-from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire
+from rendezvous.relative_motion import ClohessyWiltshire
 
 KIND = "pareto-encounter"
 MOST_CRAFT = 50
@@ -41,7 +48,7 @@ def _free(value: object) -> tuple[Component, ...]:
     if not isinstance(value, list):
         raise wrong("must be an array of names")
     if not value:
-        raise wrong("has no component", 'name at least one, for example free = ["y", "z"]')
+        raise wrong("has no component", 'name at least one, for example free = ["x", "z"]')
     names = [known_name(name, tuple(COMPONENTS)) for name in value]
     if len(set(names)) < len(names):
         raise wrong("names a component twice", "name each once")
@@ -51,11 +58,11 @@ def _free(value: object) -> tuple[Component, ...]:
 class TerminalTable(Table):
     """[terminal]: the fixed components of the meeting."""
 
-    x_m: Number = key("against the motion", "0.0", default=ZERO)
-    y_m: Number = key("radially outward", "0.0", default=ZERO)
+    x_m: Number = key("radially outward", "0.0", default=ZERO)
+    y_m: Number = key("along the motion", "0.0", default=ZERO)
     z_m: Number = key("along the orbit's normal", "0.0", default=ZERO)
-    vx_m_s: Number = key("velocity against the motion", "0.0", default=ZERO)
-    vy_m_s: Number = key("velocity outward", "0.0", default=ZERO)
+    vx_m_s: Number = key("velocity outward", "0.0", default=ZERO)
+    vy_m_s: Number = key("velocity along the motion", "0.0", default=ZERO)
     vz_m_s: Number = key("velocity along the normal", "0.0", default=ZERO)
 
 
@@ -64,9 +71,11 @@ class CraftTable(Table):
 
     name: Name = key("name of the craft", '"first"', '"second"')
     position_m: Vector = key(
-        "x against the motion, y outward, z along the normal", "[0.0, 60.0, 80.0]", "[40.0, -50.0, 60.0]"
+        "x radially outward, y along the motion, z along the orbit's normal",
+        "[60.0, 0.0, 80.0]",
+        "[-50.0, -40.0, 60.0]",
     )
-    velocity_m_s: Vector = key("velocity in the same axes", "[-1.2, -4.1, 0.04]", "[-9.0, 7.6, 0.07]")
+    velocity_m_s: Vector = key("velocity in the same axes", "[-4.1, 1.2, 0.04]", "[7.6, 9.0, 0.07]")
     weight: NotNegative = key("weight of its excess in the group loss", "1.0", default=Decimal(1))
     start_s: NotNegative = key("start time", "0.0", default=ZERO)
 
@@ -78,7 +87,7 @@ class ParetoTables(ProblemTables):
     orbit_rate_rad_s: Positive = key("mean motion of the circular reference orbit", "1.176e-3")
     duration_s: Positive = key("from t = 0 to the meeting", "30.0")
     free: Annotated[tuple[Component, ...], PlainValidator(_free)] = key(
-        "free components of the meeting, of x, y, z, vx, vy, vz", '["y", "z"]'
+        "free components of the meeting, of x, y, z, vx, vy, vz", '["x", "z"]'
     )
     meet: Meeting = key(
         '"rendezvous", or "intercept" (the same position, any velocities)', '"rendezvous"', default=Meeting.RENDEZVOUS
@@ -104,6 +113,7 @@ def _checks(known: Known) -> Iterator[Problem]:
     weights = [known.value("craft", str(index), "weight") for index in range(count)]
     if count and all(isinstance(weight, int | Decimal) and weight == 0 for weight in weights):
         yield Problem(("craft", "0", "weight"), "is zero, and so are all others", "give one craft a positive weight")
+    yield from rate_problems(known.number("orbit_rate_rad_s"))
     duration, rate = known.number("duration_s"), known.number("orbit_rate_rad_s")
     if duration is None or duration <= 0:
         return
@@ -135,7 +145,7 @@ def load_pareto(name_or_path: str, settings: Sequence[str] | None = None) -> Par
         If there is no such problem, or it is not sound.
     """
     tables = load_tables(FORM, name_or_path, settings)
-    motion = ClohessyWiltshire(tables.si("orbit_rate_rad_s"), ORBITAL)
+    motion = ClohessyWiltshire(tables.si("orbit_rate_rad_s"))
     craft = tuple(
         Craft(
             table.name,

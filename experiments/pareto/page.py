@@ -8,6 +8,7 @@ from importlib import resources
 import numpy as np
 
 from experiments.common.display_units import length_unit
+from experiments.common.hill_axes import AXES, AXIS_TITLES
 from experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
 from infoset.arrays import Floats
 from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
@@ -28,15 +29,15 @@ def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str,
     ]
     unit = length_unit(max(float(np.abs(track.points).max()) for track in tracks))
     meeting = Mark("meeting", solution.meeting_state()[:3], "diamond")
-    axes = ("x (against the motion)", "y (outward)", "z (normal)")
     views = [
-        View("Trajectories to the meeting", axes, unit, tracks, [meeting], equal=False),
-        View("Seen along the orbit normal", axes, unit, tracks, [meeting], plane=(0, 1), equal=False),
+        View("Trajectories to the meeting", AXIS_TITLES, unit, tracks, [meeting], equal=False),
+        View("Seen along the orbit normal", AXIS_TITLES, unit, tracks, [meeting], plane=(1, 0), equal=False),
     ]
     hull = solution.same_matrix and len(free) == 2
     about = [
         f"{len(tracks)} craft, {encounter.meeting.value} at {encounter.meeting_s:g} s; "
         f"free components: {', '.join(free)}",
+        f"axes: {AXES}",
         "Drag the meeting, or type its components, to see the costs of the craft and the group loss.",
     ]
     data = {

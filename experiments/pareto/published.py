@@ -1,4 +1,7 @@
-"""Barseghyan and Stepanyan (2008): the encounter of three craft."""
+"""Barseghyan and Stepanyan (2008): the encounter of three craft.
+
+Printed numbers, and those compared with them, are in the paper's axes; the problem and its solution are in Hill's.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from experiments.common.hill_axes import from_paper, to_paper
 from experiments.common.published_number import (
     CUT_OR_ROUNDED,
     Band,
@@ -19,7 +23,7 @@ from experiments.common.published_number import (
 from experiments.pareto.file import load_pareto
 from infoset.arrays import Floats
 from rendezvous.pareto import Encounter, EncounterSolution, Plan, solve_encounter
-from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire
+from rendezvous.relative_motion import ClohessyWiltshire
 
 PAPER = "pareto"
 TITLE = "Barseghyan and Stepanyan (2008), encounter of three craft"
@@ -133,11 +137,11 @@ def reproduce(progress: Progress) -> Reproduction:
 
 
 def _solved(encounter: Encounter, velocities: Floats) -> EncounterSolution:
-    """Solve the encounter with the paper's rate and other start velocities, shape (3, 3)."""
-    motion = ClohessyWiltshire(RATE_RAD_S, ORBITAL)
+    """Solve the encounter with the paper's rate and other start velocities, shape (3, 3), in the paper's axes."""
+    motion = ClohessyWiltshire(RATE_RAD_S)
     craft = tuple(
         replace(member, motion=motion, state=np.concatenate([member.state[:3], velocity]))
-        for member, velocity in zip(encounter.craft, velocities, strict=True)
+        for member, velocity in zip(encounter.craft, from_paper(velocities), strict=True)
     )
     return solve_encounter(replace(encounter, craft=craft))
 
@@ -184,7 +188,7 @@ def _results(solution: EncounterSolution) -> tuple[PublishedNumber, ...]:
 
 
 def _costs(solution: EncounterSolution) -> list[PublishedNumber]:
-    # The problem frees y (beta) and z (alpha), in this order.
+    # The problem frees x (beta) and z (alpha), in this order.
     quadratics = []
     for cost in solution.costs:
         slope = -2.0 * cost.matrix @ cost.ideal
@@ -247,7 +251,9 @@ def _fitted(
     return [
         _number(source, f"{craft}, {quantity}, {term} (SI)", text, float(ours))
         for index, (craft, components) in enumerate(zip(_CRAFT, printed, strict=True))
-        for quantity, terms, values in zip(quantities, components, sampled(solution.plan(index), times).T, strict=False)
+        for quantity, terms, values in zip(
+            quantities, components, to_paper(sampled(solution.plan(index), times)).T, strict=False
+        )
         for (term, text), ours in zip(terms.items(), _coefficients(terms, times, values), strict=True)
     ]
 
@@ -267,7 +273,7 @@ def _positions(solution: EncounterSolution) -> list[PublishedNumber]:
     numbers = []
     for time_s, rows in _POSITIONS.items():
         for craft, texts in enumerate(rows):
-            state = solution.plan(craft).state(float(time_s))
+            state = to_paper(solution.plan(craft).state(float(time_s)))
             for axis, text in enumerate(texts):
                 name, ours = f"{_CRAFT[craft]}, {_STATE_NAMES[axis]}({time_s}) (m)", float(state[axis])
                 zero, note = ("0.0000000", _ZERO) if "e" in text else (None, "")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.common.hill_axes import AXES
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, trajectories_csv
 from experiments.common.screen import Part, number, number_table
 from experiments.pareto.file import TERMINAL, ParetoProblem
@@ -42,7 +43,7 @@ def report_json(report: Report, samples: int) -> dict[str, object]:
     return {
         **problem.head,
         "units": {
-            "axes": "x against the motion, y radially outward, z along the orbit's normal",
+            "axes": AXES,
             "costate_at_meeting": "m/s^3 of the position's three, m/s^2 of the velocity's",
             "matrix": "m^2/s^3 over the units of two free components",
             "distances": "m/s^1.5",
@@ -149,6 +150,7 @@ def report_parts(report: Report) -> Iterator[Part]:
     names = [cost.craft.name for cost in solution.costs]
     meeting = ", ".join(f"{key} = {value:.6g}" for key, value in _named_state(solution, solution.point).items())
     yield f"{report.problem.name}: {encounter.meeting.value} at {encounter.meeting_s:g} s: {meeting}"
+    yield f"axes: {AXES}"
     table = number_table(
         "craft", "ideal J*^2\nm^2/s^3", "J^2\nm^2/s^3", "excess\nm^2/s^3", "impulse\nm/s", "peak |u|\nm/s^2"
     )

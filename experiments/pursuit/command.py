@@ -19,6 +19,9 @@ class Pursuit(FileOptions):
     Each capture has a certificate (a list of checks). The result is called a saddle point only if no check fails. The
     check with the longest computation, a search in all directions, is made with --certify only.
     Without --out, --json, --csv or --html no file is written.
+
+    Axes: inertial, z along the planet's axis. Figures and pages also show the pursuer relative to the evader: x
+    radially outward, y along the motion, z along the orbit's normal (Hill's).
     """
 
     problem: ProblemName = "geo-pursuit"

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from experiments.common.display_units import M_PER_KM, length_unit, time_unit
 from experiments.common.figure_style import IMPULSE, LIMIT, MEASURED, TRUTH, figure_grid, new_figure, style
+from experiments.common.hill_axes import AXIS_TITLES, INERTIAL_TITLES
 from experiments.pursuit.report import Report, thrust_angles
 from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict, history, orbital_axes
@@ -54,8 +55,8 @@ def draw_orbits(sampled: History) -> Figure:
     low, high = space.get_zlim()
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), _LEAST_HEIGHT * size_m * per_m)
     space.set_zlim(middle - half, middle + half)
-    for name in "xyz":
-        getattr(space, f"set_{name}label")(f"${name}$, {unit}", labelpad=-4.0)
+    for name, title in zip("xyz", INERTIAL_TITLES, strict=True):
+        getattr(space, f"set_{name}label")(f"{title}, {unit}", labelpad=-4.0)
         getattr(space, f"{name}axis").set_major_locator(_few_ticks())
     space.tick_params(pad=-2.0, labelsize=6.5)
     space.set_box_aspect((1.0, 1.0, 0.6), zoom=0.88)
@@ -65,7 +66,8 @@ def draw_orbits(sampled: History) -> Figure:
     flat.margins(0.12)
     flat.set_aspect("equal", adjustable="box", anchor="C")
     flat.xaxis.set_major_locator(_few_ticks())
-    flat.set(xlabel=f"$x$, {unit}", ylabel=f"$y$, {unit}", title="(b) seen along the planet's axis")
+    flat.set(xlabel=f"{INERTIAL_TITLES[0]}, {unit}", ylabel=f"{INERTIAL_TITLES[1]}, {unit}")
+    flat.set_title("(b) seen along the planet's axis")
     handles, _ = flat.get_legend_handles_labels()
     handles[2:2] = [Line2D([], [], color=LIMIT, label="start", **_START)]
     if sampled.pursuer.thrust_direction.any() or sampled.evader.thrust_direction.any():
@@ -77,21 +79,21 @@ def draw_orbits(sampled: History) -> Figure:
 
 @style()
 def draw_relative(sampled: History) -> Figure:
-    """Draw the path of the pursuer in the evader's orbital frame, and the distance."""
+    """Draw the path of the pursuer in Hill's axes at the evader, and the distance."""
     evader = sampled.evader
     offset = sampled.pursuer.position_m - evader.position_m
     relative = np.einsum("nij,nj->ni", orbital_axes(evader.position_m, evader.velocity_m_s), offset)
     length, per_m = length_unit(float(np.abs(relative).max()))
     offset, relative = offset * per_m, relative * per_m
     figure, (plane, side, distance) = figure_grid(66.0, 1, 3, (15.0, 4.0, 12.0, 8.0), (17.0, 0.0))
-    for axes, column, name, title in (
-        (plane, 0, "radial", "(a) pursuer relative to the evader"),
-        (side, 2, "normal", "(b) out of the orbital plane"),
+    for axes, column, title in (
+        (plane, 0, "(a) pursuer relative to the evader"),
+        (side, 2, "(b) out of the orbital plane"),
     ):
         axes.plot(relative[:, 1], relative[:, column], **PURSUER)
         axes.plot(relative[0, 1], relative[0, column], color=TRUTH, label="start", **_START)
         axes.plot(0.0, 0.0, label="evader", **_STAR)
-        axes.set(xlabel=f"along-track, {length}", ylabel=f"{name}, {length}", title=title)
+        axes.set(xlabel=f"{AXIS_TITLES[1]}, {length}", ylabel=f"{AXIS_TITLES[column]}, {length}", title=title)
         axes.xaxis.set_major_locator(_few_ticks())
     plane.legend(loc="best")
     time, unit = _times(sampled.time_s)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.common.display_units import length_unit
+from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
 from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
-from experiments.pursuit.report import thrust_angles
+from experiments.pursuit.report import INERTIAL_AXES, thrust_angles
 from rendezvous.pursuit_evasion import Solution, history, orbital_axes
 
 MOMENTS = 301
@@ -22,19 +23,17 @@ def pursuit_page(name: str, description: str, solution: Solution, claim: str = "
     pursuer, evader = sampled.pursuer, sampled.evader
     players = (("pursuer", 0, pursuer), ("evader", 1, evader))
     offset = pursuer.position_m - evader.position_m
-    # Along-track, normal, radial: the radial axis is drawn upwards.
     frames = orbital_axes(evader.position_m, evader.velocity_m_s)
-    relative = np.einsum("nij,nj->ni", frames, offset)[:, [1, 2, 0]]
+    relative = np.einsum("nij,nj->ni", frames, offset)
     far, near = length_unit(float(np.abs(pursuer.position_m).max())), length_unit(float(np.abs(relative).max()))
     marks = [Mark("centre of the planet", np.zeros(3), "plus"), Mark("capture", evader.position_m[-1], "diamond")]
     tracks = [Track(player, look, motion.position_m) for player, look, motion in players]
     path = [Track("pursuer", 0, relative), Track("evader", 1, np.zeros_like(relative))]
-    absolute_axes, relative_axes = ("x", "y", "z"), ("along-track", "normal", "radial")
     views = [
-        View("Both orbits", absolute_axes, far, tracks, marks),
-        View("Pursuer relative to the evader, in the orbital plane", relative_axes, near, path, plane=(0, 2)),
-        View("Pursuer relative to the evader, in space", relative_axes, near, path),
-        View("Both orbits, seen along the planet's axis", absolute_axes, far, tracks, marks, plane=(0, 1)),
+        View("Both orbits", INERTIAL_TITLES, far, tracks, marks),
+        View("Pursuer relative to the evader, in the orbital plane", AXIS_TITLES, near, path, plane=(1, 0)),
+        View("Pursuer relative to the evader, in space", AXIS_TITLES, near, path),
+        View("Both orbits, seen along the planet's axis", INERTIAL_TITLES, far, tracks, marks, plane=(0, 1)),
     ]
     distance, radius = Curve("distance", 0, np.linalg.norm(offset, axis=1)), solution.game.capture_radius_m
     directions = [
@@ -50,7 +49,8 @@ def pursuit_page(name: str, description: str, solution: Solution, claim: str = "
         Graph("Thrust out of the orbital plane", "out of plane", _DEGREES, out_of_plane),
         Graph("Mass", "mass", ("kg", 1.0), masses),
     ]
-    about = [line for line in (description, _verdict(solution), claim) if line]
+    axes = f"axes: {INERTIAL_AXES}; relative to the evader, {AXES}"
+    about = [line for line in (description, _verdict(solution), claim, axes) if line]
     return motion_page(f"Pursuit {name}", about, sampled.time_s, views, graphs)
 
 

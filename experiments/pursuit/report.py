@@ -30,6 +30,7 @@ from rendezvous.pursuit_evasion import (
     orbital_axes,
 )
 
+INERTIAL_AXES = "inertial, z along the planet's axis"
 _LEVELS = ("least", "10%", "50%", "90%", "greatest")
 _FEWEST = 10
 """Number of simulations from which quantiles are printed."""
@@ -91,6 +92,7 @@ def report_json(report: Report) -> dict[str, object]:
         "propellant_exhausted_by": solution.exhausted,
         "fallback_capture_time_s": None if solution.fallback is None else solution.fallback.time_s,
         "fallback_route": solution.fallback_route,
+        "axes": INERTIAL_AXES,
         "units": {"length_km": solution.units.length_m / M_PER_KM, "time_s": solution.units.time_s},
         "certificate": None if certificate is None else _certificate_json(certificate),
         "distance_curve": {
@@ -209,6 +211,7 @@ def report_parts(report: Report) -> Iterator[Part]:
     """Yield the verdict, the players, the certificate and the simulations, for the screen."""
     solution = report.solution
     yield f"{report.problem.name}: {_verdict(solution)}"
+    yield f"axes: {INERTIAL_AXES}"
     if solution.capture is not None:
         yield from _capture_parts(solution.capture, solution)
     if report.certificate is not None:

@@ -17,6 +17,8 @@ class Reach(FileOptions):
     The results are the least terminal norm, the forward sets, the tube of all optimal trajectories, and the set of
     all optimal controls. Selected optimal controls are simulated on the linear and on the nonlinear model. Without
     --out, --json, --csv or --html no file is written.
+
+    Axes: x radially outward, y along the motion, z along the orbit's normal (Hill's), at the passive craft.
     """
 
     problem: ProblemName = "rendezvous-2021"

@@ -28,6 +28,7 @@ from experiments.common.figure_style import (
     place_labels,
     style,
 )
+from experiments.common.hill_axes import AXIS_TITLES, component_titles
 from experiments.reachability.report import Member, Report
 from infoset.arrays import Floats
 from rendezvous.reachability import SetKind
@@ -63,8 +64,8 @@ _START: dict[str, Any] = {
 _END: dict[str, Any] = {"color": INK, "marker": "*", "linestyle": "none", "label": "terminal state of least norm"}
 _LABEL: dict[str, Any] = {"fontsize": 6.5, "color": SET_EDGE, "zorder": 8}
 _SET: dict[str, Any] = {"facecolor": SET_FILL, "edgecolor": SET_EDGE, "linewidth": 0.7}
-_AXES = ("x", "y", "z", "$v_x$", "$v_y$", "$v_z$")
-_PLANES = ((0, 1), (0, 2), (3, 4), (3, 5))
+_AXES = (*AXIS_TITLES, *component_titles("v"))
+_PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
 
 
 def _shown(report: Report) -> list[tuple[dict[str, Any], Member, Floats]]:
@@ -271,7 +272,7 @@ def draw_controls(report: Report) -> Figure:
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * bounds[j], color=LIMIT, linewidth=0.7, linestyle=(0, (2, 2)))
         axes.set_xlabel(f"time, periods of {report.rendezvous.period_s:g} s")
-        axes.set_ylabel(f"$u_{'xyz'[j]}$ / ({report.rendezvous.acceleration_m_s2:g} m/s²)")
+        axes.set_ylabel(f"{component_titles('u')[j]} / ({report.rendezvous.acceleration_m_s2:g} m/s²)")
         axes.set_xlim(0, periods)
         axes.use_sticky_edges = False
         axes.margins(x=0.0, y=0.08)

@@ -13,10 +13,11 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import ProblemTables, ReadProblem, problem_form
+from experiments.common.problem_file import ProblemTables, ReadProblem, orbit_problems, problem_form
 from experiments.common.toml_file import load_tables
 from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
+    KILO,
     NUMBER,
     POSITIVE,
     Degrees,
@@ -45,6 +46,7 @@ from rendezvous.reachability import (
     motion_of,
 )
 from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerHempel
+from rendezvous.two_body import OrbitalElements
 
 Rows = tuple[tuple[Decimal, ...], ...]
 
@@ -78,10 +80,12 @@ class OrbitTable(Table):
 
 
 class InitialTable(Table):
-    """[initial]: the active craft at t = 0; x against the motion, y outward, z completes."""
+    """[initial]: the active craft at t = 0."""
 
-    position_m: Vector = key("position", "[2650.0, -2540.0, 2120.0]")
-    velocity_m_s: Vector = key("velocity", "[-3.0, 2.0, 3.0]")
+    position_m: Vector = key(
+        "x radially outward, y along the motion, z along the orbit's normal", "[-2540.0, -2650.0, 2120.0]"
+    )
+    velocity_m_s: Vector = key("velocity in the same axes", "[2.0, 3.0, 3.0]")
 
 
 class BoundsTable(Table):
@@ -95,8 +99,8 @@ class BoundsTable(Table):
 class ConeTable(Table):
     """[cone]: an approach cone, replaced by a pyramid inside it."""
 
-    apex_m: Vector = key("apex", "[-20.0, 0.0, 0.0]")
-    axis: Vector = key("direction of the axis, of any length", "[1.0, 0.0, 0.0]")
+    apex_m: Vector = key("apex", "[0.0, 20.0, 0.0]")
+    axis: Vector = key("direction of the axis, of any length", "[0.0, -1.0, 0.0]")
     half_angle_deg: OpenAngle = key("angle between axis and cone", "60.0")
     faces: Annotated[int, PlainValidator(Whole(MOST_FACES, least=3))] = key(
         "number of faces of the pyramid, at least 3", "8", default=8
@@ -225,15 +229,28 @@ def _checks(known: Known) -> Iterator[Problem]:
         yield Problem(("bounds", "control"), "must be one number for thrust in a ball", "write the radius of the ball")
     direction = known.value("cone", "axis")
     if isinstance(direction, list) and not any(direction):
-        yield Problem(("cone", "axis"), "has no direction: all components are 0", "write axis = [1.0, 0.0, 0.0]")
+        yield Problem(("cone", "axis"), "has no direction: all components are 0", "write axis = [0.0, -1.0, 0.0]")
     if known.value("disturbance") is not None and known.value("checks_between_periods"):
         yield Problem(
             ("disturbance",),
             "is possible without checks between periods only",
             "remove it, or write checks_between_periods = 0",
         )
+    yield from _orbit_problems(known)
     yield from _size_problems(known)
     yield from _keep_in_problems(known)
+
+
+def _orbit_problems(known: Known) -> Iterator[Problem]:
+    """Check the size of the passive craft's orbit."""
+    axis, eccentricity, mu = (
+        known.number("orbit", name) for name in ("semi_major_axis_km", "eccentricity", "gravitational_parameter_m3_s2")
+    )
+    if axis is None or eccentricity is None or mu is None:
+        return
+    orbit = OrbitalElements(si(axis, KILO), si(eccentricity), 0.0, 0.0, 0.0, 0.0)
+    remedy = "choose an orbit above the planet, in kilometres, or correct gravitational_parameter_m3_s2"
+    yield from orbit_problems(("orbit", "semi_major_axis_km"), orbit.state(si(mu)), si(mu), remedy)
 
 
 def _size_problems(known: Known) -> Iterator[Problem]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from experiments.common.hill_axes import AXES, AXIS_TITLES
 from experiments.common.page_motion import Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
 from experiments.reachability.report import POINTS, Report
 from infoset.arrays import Floats
@@ -16,10 +17,11 @@ _ZERO = 1e-10
 _VIEWS = (
     ("Positions and tube", 0, None),
     ("Velocities and tube", 3, None),
-    ("Positions in the x-y plane", 0, (0, 1)),
-    ("Positions in the x-z plane", 0, (0, 2)),
+    ("Positions along track and radial", 0, (1, 0)),
+    ("Positions along track and normal", 0, (1, 2)),
 )
 """Caption, first state and plane of each view."""
+_VELOCITY_TITLES = ("vx (radial)", "vy (along-track)", "vz (normal)")
 
 
 def reachability_page(report: Report) -> str:
@@ -33,7 +35,7 @@ def reachability_page(report: Report) -> str:
     controls = [np.where(np.abs(member.controls) < _ZERO, 0.0, member.controls)[period_of] for member in members]
     graphs = [
         Graph(
-            f"Control along {axis}, and its range over all optimal controls",
+            f"Control along {AXIS_TITLES[j]}, and its range over all optimal controls",
             f"u{axis}",
             ("m/s²", rendezvous.acceleration_m_s2),
             [Curve(member.name, look, controls[look][:, j], look) for look, member in enumerate(members)],
@@ -45,6 +47,7 @@ def reachability_page(report: Report) -> str:
     miss = report.solution.optimal.miss
     about = [
         *filter(None, [rendezvous.tables.description]),
+        f"axes: {AXES}",
         f"least terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; trajectories of the nonlinear model",
     ]
     names = [member.name for member in members]
@@ -62,5 +65,5 @@ def _view(report: Report, time_s: Floats, caption: str, first: int, plane: tuple
     tracks = [Track(member.name, look, path[:, states], look) for look, (member, path) in enumerate(report.shown)]
     end = Mark("end of the optimal trajectories", report.tube[-1, states].mean(axis=1))
     unit = report.length_unit if first == 0 else ("m/s", 1.0)
-    names = ("x", "y", "z") if first == 0 else ("vx", "vy", "vz")
+    names = AXIS_TITLES if first == 0 else _VELOCITY_TITLES
     return View(caption, names, unit, tracks, [end], plane, equal=False, sets=tube)

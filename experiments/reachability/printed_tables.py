@@ -1,4 +1,7 @@
-"""Tables 1 to 3 of Shorikov and Goranov (2021), as printed and corrected, compared with computed controls."""
+"""Tables 1 to 3 of Shorikov and Goranov (2021), as printed and corrected, compared with computed controls.
+
+The tables and the rows of the comparison are in the paper's axes; problems, controls and states are in Hill's.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.common.hill_axes import from_paper, to_paper
 from experiments.reachability.file import Rendezvous, load_rendezvous
 from experiments.reachability.report import Member, fly_members
 from infoset.arrays import Floats
@@ -110,9 +114,9 @@ class Comparison:
         table, ours = self.table, self.ours
         corrections = {(quantity, t, component): value for quantity, t, component, value in table.misprints}
         blocks = (
-            ("u", 0, table.controls, ours.controls),
-            ("linear x", 1, table.linear, ours.linear[1:]),
-            ("nonlinear x", 1, table.nonlinear, ours.nonlinear[1:]),
+            ("u", 0, table.controls, to_paper(ours.controls)),
+            ("linear x", 1, table.linear, to_paper(ours.linear[1:])),
+            ("nonlinear x", 1, table.nonlinear, to_paper(ours.nonlinear[1:])),
         )
         rows: list[Row] = []
         for quantity, first, printed, computed in blocks:
@@ -143,12 +147,12 @@ def compare_published(rendezvous: Rendezvous, solution: Solution) -> tuple[Compa
 
 
 def corrected(table: PrintedTable) -> Floats:
-    """Return the printed controls with the misprints corrected, shape (4, 3)."""
+    """Return the printed controls with the misprints corrected, in Hill's axes, shape (4, 3)."""
     controls = np.array(table.controls)
     for quantity, t, component, value in table.misprints:
         if quantity == "u":
             controls[t, component - 1] = value
-    return controls
+    return from_paper(controls)
 
 
 def _ours(table: PrintedTable, optimal: OptimalControls, printed: Floats) -> Floats:

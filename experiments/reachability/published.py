@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from experiments.common.hill_axes import from_paper, to_paper
 from experiments.common.published_number import Progress, PublishedNumber, Reference, Reproduction
 from experiments.reachability.file import Rendezvous, load_rendezvous
 from experiments.reachability.printed_tables import PROBLEM, Comparison, Row, compare_published, corrected
@@ -71,16 +72,17 @@ def reproduce(progress: Progress) -> Reproduction:
 def _implied(rendezvous: Rendezvous, comparison: Comparison) -> Comparison:
     """Return table 2 with the controls that its states imply, and the states of its corrected controls."""
     problem, table = rendezvous.problem, comparison.table
-    states = np.vstack([problem.initial, table.linear])
+    states = np.vstack([to_paper(problem.initial), table.linear])
     for quantity, t, component, value in table.misprints:
         if quantity == "linear x":
             states[t, component - 1] = value
-    implied = [_inverse(problem) @ (after - problem.transition[0] @ before) for before, after in pairwise(states)]
-    controls = corrected(table)
+    pairs = pairwise(from_paper(states))
+    implied = to_paper([_inverse(problem) @ (after - problem.transition[0] @ before) for before, after in pairs])
+    controls = to_paper(corrected(table))
     for t, component in _CONTRADICTED:
         controls[t, component - 1] = implied[t][component - 1]
-    (member,) = fly_members(rendezvous, [comparison.ours.name], controls[None])
-    return replace(comparison, ours=replace(member, controls=np.array(implied)))
+    (member,) = fly_members(rendezvous, [comparison.ours.name], from_paper(controls)[None])
+    return replace(comparison, ours=replace(member, controls=from_paper(implied)))
 
 
 def _inverse(problem: ReachabilityProblem) -> Floats:
@@ -133,7 +135,7 @@ def _implied_rounding(problem: ReachabilityProblem, t: int, component: int) -> f
     known = np.zeros(6)
     before = known if t == 0 else np.abs(problem.transition[0]) @ _STATE_ROUNDING
     after = known if t + 1 == problem.periods else _STATE_ROUNDING
-    return float((np.abs(_inverse(problem)) @ (before + after))[component - 1])
+    return float(np.abs(to_paper(np.abs(_inverse(problem)) @ (before + after)))[component - 1])
 
 
 def _state_rounding(problem: ReachabilityProblem, t: int, component: int) -> float:
@@ -141,4 +143,4 @@ def _state_rounding(problem: ReachabilityProblem, t: int, component: int) -> flo
     total = np.zeros(6)
     for power in range(t):
         total += np.abs(np.linalg.matrix_power(problem.transition[0], power) @ problem.control[0]).sum(axis=1)
-    return float(_CONTROL_ROUNDING * total[component - 1])
+    return float(_CONTROL_ROUNDING * np.abs(to_paper(total))[component - 1])

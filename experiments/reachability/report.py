@@ -11,6 +11,7 @@ import numpy as np
 
 from experiments.common.display_units import Unit, length_unit
 from experiments.common.errors import InputError
+from experiments.common.hill_axes import AXES
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, library_version, trajectories_csv
 from experiments.reachability.file import KIND, Rendezvous
 from infoset.arrays import Floats
@@ -23,6 +24,7 @@ from rendezvous.reachability import (
     Route,
     SetKind,
     Solution,
+    ThrustShape,
     TooLargeError,
     TooManyVerticesError,
     analytic_centre,
@@ -275,6 +277,18 @@ def _conflict(rendezvous: Rendezvous, error: EmptyTubeError) -> str:
     )
 
 
+def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
+    """Return the Delta-v of controls, shape (T, 3), in m/s: the sum, and that along each axis.
+
+    The sum is over the axes, each of which has an engine; for thrust in a ball, with one engine, it is over the norms.
+    """
+    pushes = rendezvous.acceleration_m_s2 * rendezvous.period_s * controls
+    axes = np.abs(pushes).sum(axis=0)
+    ball = rendezvous.problem.thrust is ThrustShape.BALL
+    total = np.linalg.norm(pushes, axis=1).sum() if ball else axes.sum()
+    return {"sum": float(total), **dict(zip("xyz", axes.tolist(), strict=True))}
+
+
 def trajectories(report: Report) -> str:
     """Return the trajectories of the selected controls on both models, as CSV; a control is held over its period."""
     rendezvous = report.rendezvous
@@ -298,6 +312,7 @@ def report_json(report: Report) -> dict[str, object]:
         "problem_hash": rendezvous.hash,
         "units": {
             "period_s": rendezvous.period_s,
+            "axes": AXES,
             "states": "x, y, z in m and their rates in m/s",
             "misses": "Euclidean norm of six components, in m and m/s",
             "controls": "parts of acceleration_m_s2, along x, y, z",
@@ -318,9 +333,9 @@ def report_json(report: Report) -> dict[str, object]:
             }
             for t in range(1, solution.problem.periods + 1)
         ],
-        "controls": [_member_json(member) for member in report.members],
+        "controls": [_member_json(report.rendezvous, member) for member in report.members],
         "control_ranges": report.ranges,
-        "replan": None if report.flight is None else _flight_json(report.flight, report.noisy),
+        "replan": None if report.flight is None else _flight_json(report.rendezvous, report.flight, report.noisy),
         "robust": None if report.robustness is None else _robust_json(report.robustness),
     }
 
@@ -331,10 +346,11 @@ def _set_json(solution: Solution, kind: SetKind, time: int, bounds: Floats) -> d
     return {"min": bounds[:, 0], "max": bounds[:, 1]} | {key: counts and getattr(counts, key) for key in keys}
 
 
-def _member_json(member: Member) -> dict[str, object]:
+def _member_json(rendezvous: Rendezvous, member: Member) -> dict[str, object]:
     return {
         "name": member.name,
         "u": member.controls,
+        "delta_v_m_s": delta_v(rendezvous, member.controls),
         **vars(effort(member.controls)),
         "linear_end": member.linear[-1],
         "nonlinear_end": member.nonlinear[-1],
@@ -343,11 +359,12 @@ def _member_json(member: Member) -> dict[str, object]:
     }
 
 
-def _flight_json(flight: Flight, noisy: Sequence[Flight]) -> dict[str, object]:
+def _flight_json(rendezvous: Rendezvous, flight: Flight, noisy: Sequence[Flight]) -> dict[str, object]:
     return {
         "miss": flight.miss,
         "end": flight.states[-1],
         "u": flight.controls,
+        "delta_v_m_s": delta_v(rendezvous, flight.controls),
         "expected_misses": flight.expected_misses,
         "relaxations": flight.relaxations,
         "noisy_misses": [noisy_flight.miss for noisy_flight in noisy],

@@ -9,6 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from experiments.common.errors import InputError
+from experiments.common.hill_axes import AXES
 from experiments.common.options import choice, read_number
 from experiments.common.output import TRAJECTORIES, output_of, to_csv, to_json
 from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, show
@@ -23,6 +24,7 @@ from experiments.reachability.report import (
     VERTICES,
     Report,
     Request,
+    delta_v,
     make_report,
     report_json,
     trajectories,
@@ -96,6 +98,7 @@ def _summary(report: Report) -> Iterator[str]:
     yield f"{report.rendezvous.name}: least terminal norm {solution.optimal.miss:.9g} {_NORM}; {reached}"
     yield f"route: {solution.route.value} ({solution.reason})"
     yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
+    yield f"axes: {AXES}"
     yield (
         f"units: {_NORM} is the norm of a state whose components are in m and m/s; controls u are in units of "
         f"{report.rendezvous.acceleration_m_s2:g} m/s^2"
@@ -104,7 +107,8 @@ def _summary(report: Report) -> Iterator[str]:
 
 def _feedback(report: Report) -> Iterator[str]:
     if report.flight is not None:
-        yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)} {_NORM}"
+        used = delta_v(report.rendezvous, report.flight.controls)["sum"]
+        yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)} {_NORM}, Delta-v {used:.4f} m/s"
     if report.noisy:
         misses = [flight.miss for flight in report.noisy]
         relaxed = max(float(flight.relaxations.max()) for flight in report.noisy)
@@ -144,14 +148,17 @@ def _tables(report: Report, comparisons: Sequence[Comparison]) -> Iterator[Part]
 def _members_table(report: Report) -> Table:
     titles = (
         *(f"{name}\n{unit}" for name, unit in (("energy", "u^2"), ("L1", "u"), ("norms", "u"), ("peak", "u"))),
+        "Delta-v\nm/s",
+        *(f"along {axis}\nm/s" for axis in "xyz"),
         f"nonlinear miss\n{_NORM}",
         "violation between\nperiods",
     )
     table = number_table("control", *titles)
     for member in report.members:
         costs = (f"{value:.6f}" for value in vars(effort(member.controls)).values())
+        used = (f"{value:.4f}" for value in delta_v(report.rendezvous, member.controls).values())
         violation = f"{max(member.between, 0.0):.2%}"
-        table.add_row(member.name, *costs, f"{member.nonlinear_miss:.4g}", violation)
+        table.add_row(member.name, *costs, *used, f"{member.nonlinear_miss:.4g}", violation)
     return table
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rendezvous._arrays import Floats
 from rendezvous._repr import short_repr
-from rendezvous.relative_motion import Frame, LinearMotion
+from rendezvous.relative_motion import LinearMotion
 
 
 class Component(Enum):
@@ -36,8 +36,8 @@ class Meeting(Enum):
 class Craft:
     """A craft that takes part.
 
-    `state`, shape (6,), is (x, y, z, vx, vy, vz) at its start, in the frame of the motion, m and m/s. The `weight` of
-    its excess in the loss of the group is not negative.
+    `state`, shape (6,), is (x, y, z, vx, vy, vz) at its start, in Hill's axes, m and m/s. The `weight` of its excess in
+    the loss of the group is not negative.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Craft:
 
 @dataclass(frozen=True, eq=False)
 class Encounter:
-    """Craft, all in one frame, that meet at one time.
+    """Craft that meet at one time.
 
     `free` lists the free components of the terminal state, at least one; for an intercept of the position only.
     `fixed`, shape (6,), contains the values of the other components, m and m/s; those of free components are ignored.
@@ -58,7 +58,7 @@ class Encounter:
     ------
     ValueError
         If there is no craft or no free component, a weight is negative or all are zero, a craft starts at the meeting
-        or later, frames differ, names repeat, or a number is not finite.
+        or later, names repeat, or a number is not finite.
     """
 
     craft: tuple[Craft, ...]
@@ -86,17 +86,8 @@ class Encounter:
             raise ValueError("the terminal state must be six finite numbers at a finite time")
         for craft in self.craft:
             _check(craft, self.meeting_s)
-            if craft.motion.frame != self.frame:
-                raise ValueError(
-                    f"craft {craft.name!r} moves in frame {craft.motion.frame.name}, others in {self.frame.name}"
-                )
         if not any(craft.weight > 0.0 for craft in self.craft):
             raise ValueError("all weights are zero; give one craft a positive weight")
-
-    @property
-    def frame(self) -> Frame:
-        """The frame of all states."""
-        return self.craft[0].motion.frame
 
     @property
     def weights(self) -> Floats:

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rendezvous._arrays import Floats
 from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._pair import Craft, Pair
-from rendezvous.two_body import perigee_m, semi_major_axis_m
+from rendezvous.two_body import orbit_fault, semi_major_axis_m
 
 Vector = tuple[float, float, float]
 
@@ -141,24 +140,6 @@ class Game:
     def distance_m(self) -> float:
         """Return the distance of the two at the start."""
         return float(np.linalg.norm(np.subtract(self.evader.position_m, self.pursuer.position_m)))
-
-
-def orbit_fault(position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, planet_radius_m: float) -> str | None:
-    """Return why no game can start on an orbit; None if one can."""
-    if not position_m.any():
-        return "the position is the centre of the planet"
-    axis = semi_major_axis_m(position_m, velocity_m_s, mu_m3_s2)
-    if not 0.0 < axis < math.inf:
-        return "the orbit is a parabola or a hyperbola: the velocity is not below the escape velocity"
-    perigee = perigee_m(position_m, velocity_m_s, mu_m3_s2)
-    if perigee <= 1e-6 * axis:
-        return "the orbit is a fall along a line through the planet's centre"
-    if perigee <= planet_radius_m:
-        return (
-            f"the orbit meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the planet's "
-            f"radius is {planet_radius_m / 1e3:.6g} km"
-        )
-    return None
 
 
 def _need(holds: bool | np.bool_, message: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rendezvous._arrays import Flags, Floats, Places
-from rendezvous.reachability.conic import STEADY, ConeProgram, NoSolutionError, Optimum
+from rendezvous.reachability.conic import APART, STEADY, ConeProgram, NoSolutionError, Optimum
 from rendezvous.reachability.problem import Block
 
 Constraints = tuple[Floats, Floats, Places, Places]
@@ -332,9 +332,9 @@ class Maximiser:
         soft = lifted.moments >= 0
         self._use(np.ones(len(soft), dtype=bool) if soft.sum() < _MANY_ROWS else ~soft)
 
-    def maximise(self, cost: Floats) -> Floats:
-        """Return a maximiser of a linear function, both of shape (p,)."""
-        return self._solved(cost).point
+    def maximise(self, cost: Floats, greatest_gap: float = APART) -> Floats:
+        """Return a maximiser of a linear function, both of shape (p,), with at most this duality gap."""
+        return self._solved(cost, greatest_gap).point
 
     def maximise_all(self, costs: Floats) -> Floats:
         """Return a maximiser of each function, both of shape (k, p)."""
@@ -370,12 +370,12 @@ class Maximiser:
         program = ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows[used], lifted.limits[used])
         return with_thrust(program, lifted)
 
-    def _solved(self, cost: Floats) -> Optimum:
+    def _solved(self, cost: Floats, greatest_gap: float = APART) -> Optimum:
         lifted = self._lifted
         if not lifted.size:
             return Optimum(np.zeros(0), np.zeros(int(self._used.sum())))
         while True:
-            optimum = self._with_rows_used(cost)
+            optimum = self._with_rows_used(cost, greatest_gap)
             used = self._used
             if used.all():
                 return optimum
@@ -387,7 +387,7 @@ class Maximiser:
                 used = used | (near & (lifted.labels == lifted.labels[row]))
             self._use(used)
 
-    def _with_rows_used(self, cost: Floats) -> Optimum:
+    def _with_rows_used(self, cost: Floats, greatest_gap: float) -> Optimum:
         size = float(np.abs(cost).max())
         down = -cost / (size if size > 0.0 else 1.0)
         self._solver.update(q=down)
@@ -395,11 +395,11 @@ class Maximiser:
         if solution.status == clarabel.SolverStatus.Solved:
             point, multipliers = np.array(solution.x), np.array(solution.z)
             try:
-                self._program.need_solution(point, multipliers, down)
+                self._program.need_solution(point, multipliers, down, greatest_gap)
             except NoSolutionError:
                 pass
             else:
                 return Optimum(point, self._program.of_rows(multipliers))
         if self._lifted.ball:
-            return self._with_cost(down).solve()
+            return self._with_cost(down).solve(greatest_gap)
         return Optimum(self._with_cost(down).vertex(), np.zeros(int(self._used.sum())))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
-from rendezvous.relative_motion import ORBITAL, ConstantMotion, EllipticOrbit, TschaunerHempel
+from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerHempel
 
 _RELATIVE = 1e-12
 _ABSOLUTE = 1e-9
@@ -24,11 +24,11 @@ class MotionModel(Enum):
 
 
 def motion_of(orbit: EllipticOrbit, model: MotionModel) -> ConstantMotion | TschaunerHempel:
-    """Return the linear motion about an `orbit` by a `model`, in axes x against the motion, y outward.
+    """Return the linear motion about an `orbit` by a `model`, in Hill's axes.
 
     Equation (2) of Shorikov and Goranov (2021), who use the frozen model.
     """
-    return orbit.frozen(0.0, ORBITAL) if model is MotionModel.FROZEN else TschaunerHempel(orbit, ORBITAL)
+    return orbit.frozen(0.0) if model is MotionModel.FROZEN else TschaunerHempel(orbit)
 
 
 def discretised(
@@ -83,10 +83,10 @@ def _repeated(matrices: Floats, periods: int) -> Floats:
 
 @dataclass(frozen=True)
 class NonlinearMotion:
-    """Relative motion in a central field, in the orbital frame: x against the motion, y outward, z completes.
+    """Relative motion in a central field, in Hill's axes: x radially outward, y along the motion, z completes.
 
-    Equations (1) of Shorikov and Goranov (2021), with w^2 r^4 / p = mu; DOP853 to 1e-12. The passive craft is on the
-    `orbit`.
+    Equations (1) of Shorikov and Goranov (2021), whose x is -y here and whose y is x, with w^2 r^4 / p = mu; DOP853 to
+    1e-12. The passive craft is on the `orbit`.
     """
 
     orbit: EllipticOrbit
@@ -116,13 +116,13 @@ class NonlinearMotion:
             r, w = parameter / rho, k2 * rho * rho
             w_dot = -2.0 * k2 * k2 * e * np.sin(anomaly) * rho**3
             x, y, z, vx, vy, vz = state
-            pull = gravity / (x * x + (r + y) ** 2 + z * z) ** 1.5
+            pull = gravity / ((r + x) ** 2 + y * y + z * z) ** 1.5
             result = np.empty(1 + 6 * count)
             result[0] = w
             rates = result[1:].reshape(6, count)
             rates[:3] = vx, vy, vz
-            rates[3] = 2.0 * w * vy + w * w * x + w_dot * y - pull * x + push[:, 0]
-            rates[4] = -2.0 * w * vx + w * w * y - w_dot * x + gravity / r**2 - pull * (r + y) + push[:, 1]
+            rates[3] = 2.0 * w * vy + w * w * x + w_dot * y + gravity / r**2 - pull * (r + x) + push[:, 0]
+            rates[4] = -2.0 * w * vx + w * w * y - w_dot * x - pull * y + push[:, 1]
             rates[5] = -pull * z + push[:, 2]
             return result
 

@@ -12,12 +12,15 @@ import numpy as np
 from infoset.polytope import Polytope, shadow
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
+from rendezvous.reachability.conic import APART
 from rendezvous.reachability.optimum import BlockOptimum
 from rendezvous.reachability.problem import ReachabilityProblem
 
 _FEW_CONTROLS = 24
 _AT_BOUND = 1.0 - 1e-10
 _SHARP = 1e-7
+_GAP = 1e-3
+"""Greatest duality gap of the programs of a shadow, as a part of its tolerance."""
 
 
 class SetKind(Enum):
@@ -328,10 +331,12 @@ class LiftedSets:
             return Polytope.from_vertices((rows @ self._optimum.block.initial)[None, :])
         lifted, program = self._set(kind, time)
         free, response = rows @ lifted.free[time], rows @ lifted.response[time]
-        solve = program.maximise if tolerance > _SHARP else program.maximise_sharply
 
         def furthest(direction: Floats) -> Floats:
-            return np.asarray(free + response @ solve(direction @ response))
+            cost = direction @ response
+            if tolerance > _SHARP:
+                return np.asarray(free + response @ program.maximise(cost, max(APART, _GAP * tolerance)))
+            return np.asarray(free + response @ program.maximise_sharply(cost))
 
         return shadow(furthest, len(rows), tolerance)
 

@@ -1,25 +1,22 @@
-"""Linear relative motion about an orbit: circular, elliptic, frozen, and any A(t); with frames that name their axes."""
+"""Linear relative motion about an orbit: circular, elliptic, frozen, and any A(t).
+
+Motions about a reference orbit are in Hill's axes, which rotate with it: x radially outward, y along the motion, z
+along the orbit's normal, so that z = x cross y. The origin follows the reference orbit.
+"""
 
 from rendezvous.relative_motion.clohessy_wiltshire import ClohessyWiltshire
 from rendezvous.relative_motion.constant import ConstantMotion
 from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
-from rendezvous.relative_motion.frames import HILL, ORBITAL, ORBITAL_INTERLEAVED, Axis, Frame, StateOrder
 from rendezvous.relative_motion.linear_motion import LinearMotion, Segment
 from rendezvous.relative_motion.time_varying import TimeVaryingMotion
 from rendezvous.relative_motion.tschauner_hempel import TschaunerHempel
 
 __all__ = [
-    "HILL",
-    "ORBITAL",
-    "ORBITAL_INTERLEAVED",
-    "Axis",
     "ClohessyWiltshire",
     "ConstantMotion",
     "EllipticOrbit",
-    "Frame",
     "LinearMotion",
     "Segment",
-    "StateOrder",
     "TimeVaryingMotion",
     "TschaunerHempel",
 ]

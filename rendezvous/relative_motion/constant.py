@@ -9,29 +9,26 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from rendezvous._arrays import Floats
-from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks, state_scales
 
 
 @dataclass(frozen=True, eq=False)
 class ConstantMotion(LinearMotion):
-    """x' = A x + (0, u)' with a constant `matrix` A, shape (6, 6), in the frame.
+    """x' = A x + (0, u)' with a constant `matrix` A, shape (6, 6).
 
     Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it.
 
     Raises
     ------
     ValueError
-        If A has another shape or is not finite, or the frame interleaves positions and velocities.
+        If A has another shape or is not finite.
     """
 
     matrix: Floats
-    frame: Frame = HILL
 
     def __post_init__(self) -> None:
         if np.shape(self.matrix) != (6, 6) or not np.isfinite(self.matrix).all():
             raise ValueError("A must be a finite matrix of shape (6, 6)")
-        super().__post_init__()
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A, the same at all times, shape (..., 6, 6)."""

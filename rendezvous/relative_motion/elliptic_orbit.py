@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 from rendezvous.relative_motion.constant import ConstantMotion
-from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import checked_rate
 
 _MOST_STEPS = 60
@@ -79,9 +78,9 @@ class EllipticOrbit:
         )
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
-        """Return A(t) in axes of Hill, shape (..., 6, 6), for states in m and m/s.
+        """Return A(t), shape (..., 6, 6), of states in m and m/s in Hill's axes.
 
-        Equation (2) of Shorikov and Goranov (2021) in other axes; mu / r^3 = w^2 r / p.
+        Equation (2) of Shorikov and Goranov (2021), whose x is -y here and whose y is x; mu / r^3 = w^2 r / p.
         """
         anomaly, e, k2 = self.true_anomaly(time_s), self.eccentricity, self.semi_latus_rate_rad_s
         rho = 1.0 + e * np.cos(anomaly)
@@ -93,9 +92,9 @@ class EllipticOrbit:
         matrix[..., 5, 2] = -gravity
         return matrix
 
-    def frozen(self, time_s: float, frame: Frame = HILL) -> ConstantMotion:
-        """Return the motion whose constant matrix is A at a time; `frame` has position before velocity."""
-        return ConstantMotion(HILL.matrices_to(frame, self.dynamics(time_s)), frame)
+    def frozen(self, time_s: float) -> ConstantMotion:
+        """Return the motion whose constant matrix is A at a time."""
+        return ConstantMotion(self.dynamics(time_s))
 
     def _eccentric_of_true(self, true_rad: float) -> float:
         e = self.eccentricity

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
-from rendezvous.relative_motion.frames import HILL, Frame, StateOrder
 
 MOST_PANELS = 200_000
 
@@ -27,22 +26,10 @@ class Segment:
 
 
 class LinearMotion(ABC):
-    """x' = A(t) x + B(t) u + w(t), x = (position, velocity) in a frame; by default B = (0, 1)' and w = 0.
+    """x' = A(t) x + B(t) u + w(t), x = (position, velocity); by default B = (0, 1)' and w = 0.
 
-    Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front. The
-    `frame` is that of states and controls.
-
-    Raises
-    ------
-    ValueError
-        If the frame interleaves positions and velocities.
+    Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front.
     """
-
-    frame: Frame = HILL
-
-    def __post_init__(self) -> None:
-        if self.frame.order is not StateOrder.POSITION_THEN_VELOCITY:
-            raise ValueError(f"frame {self.frame.name}: motions have position before velocity; convert their results")
 
     @abstractmethod
     def dynamics(self, time_s: ArrayLike) -> Floats:

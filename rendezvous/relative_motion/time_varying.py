@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
-from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, checked_durations, state_scales
 
 OfTime = Callable[[Floats], Floats]
@@ -51,7 +50,6 @@ class TimeVaryingMotion(LinearMotion):
     """
 
     matrix_at: OfTime
-    frame: Frame = HILL
     input_at: OfTime | None = None
     drift_at: OfTime | None = None
 

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Flags, Floats
 from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
-from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
 from rendezvous.relative_motion.time_varying import TimeVaryingMotion
 
@@ -29,11 +28,10 @@ class TschaunerHempel(LinearMotion):
     """
 
     orbit: EllipticOrbit
-    frame: Frame = HILL
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""
-        return HILL.matrices_to(self.frame, self.orbit.dynamics(time_s))
+        return self.orbit.dynamics(time_s)
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start.
@@ -45,24 +43,19 @@ class TschaunerHempel(LinearMotion):
         """
         if not (np.isfinite(start_s).all() and np.isfinite(end_s).all()):
             raise ValueError("a time is not finite")
-        matrices = self._by_length(
+        return self._by_length(
             start_s, end_s, self._collocated.transition, lambda starts, ends: _closed(self.orbit, starts, ends)
         )
-        return HILL.matrices_to(self.frame, matrices)
 
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Gramian, shape (..., 6, 6); end >= start."""
         checked_durations(start_s, end_s)
-        return HILL.matrices_to(
-            self.frame, self._by_length(start_s, end_s, self._collocated.gramian, self._integrals("kai,kbi,k->ab", 2))
-        )
+        return self._by_length(start_s, end_s, self._collocated.gramian, self._integrals("kai,kbi,k->ab", 2))
 
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
         checked_durations(start_s, end_s)
-        return HILL.effects_to(
-            self.frame, self._by_length(start_s, end_s, self._collocated.held_input, self._integrals("kai,k->ai", 1))
-        )
+        return self._by_length(start_s, end_s, self._collocated.held_input, self._integrals("kai,k->ai", 1))
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the eccentric anomaly apart at most.
@@ -88,7 +81,7 @@ class TschaunerHempel(LinearMotion):
         return np.asarray(np.abs(anomalies[1] - anomalies[0]) < SHORT_RAD)
 
     def _by_length(self, start_s: ArrayLike, end_s: ArrayLike, of_short: _OfIntervals, of_long: _OfIntervals) -> Floats:
-        """Matrices of intervals, in axes of Hill: those of short and of long intervals by two methods."""
+        """Matrices of intervals: those of short and of long intervals by two methods."""
         starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
         shape, starts, ends = starts.shape, starts.ravel(), ends.ravel()
         short = self._short(starts, ends)
@@ -130,7 +123,7 @@ class TschaunerHempel(LinearMotion):
 
 
 def _closed(orbit: EllipticOrbit, starts: Floats, ends: Floats) -> Floats:
-    """Phi(end, start) in axes of Hill, shape (n, 6, 6): their equations (79) to (88)."""
+    """Phi(end, start), shape (n, 6, 6): their equations (79) to (88)."""
     e, k2 = orbit.eccentricity, orbit.semi_latus_rate_rad_s
     at_start, at_end = orbit.true_anomaly(starts), orbit.true_anomaly(ends)
     in_plane = np.zeros((len(starts), 6, 6))

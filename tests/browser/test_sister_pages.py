@@ -181,7 +181,7 @@ def test_hover_in_a_pursuit_shows_the_historys_numbers(open_page: Open, pages: d
     assert said.startswith("pursuer")
     time, *seen_km = numbers(said)
     assert time == pytest.approx(sampled.time_s[120], rel=SIX_DIGITS)
-    assert np.array(seen_km) * 1e3 == pytest.approx([along, normal, outward], rel=SIX_DIGITS)
+    assert np.array(seen_km) * 1e3 == pytest.approx([outward, along, normal], rel=SIX_DIGITS)
 
 
 def test_visits_end_at_their_targets(open_page: Open, pages: dict[str, str], solved: Solved) -> None:

@@ -17,7 +17,7 @@ from experiments.files import form_and_loader
 
 Infoset = Callable[..., tuple[int, str, str]]
 KINDS = list(PROBLEMS)
-OTHER_CASES = {"y_m", "z_m", "epoch_s", "description"}
+OTHER_CASES = {"x_m", "z_m", "epoch_s", "description"}
 """Keys that do not go with other values of a template, and the description, whose example is text."""
 
 

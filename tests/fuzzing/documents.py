@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from hypothesis import strategies as st
 
+from experiments.common.problem_file import EARTH_M3_S2, EARTH_RADIUS_M
 from experiments.pareto.file import COMPONENTS
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset.model import InitialSet, Model, Recovery
@@ -189,7 +190,7 @@ def scenarios(draw: st.DrawFn) -> str:
 @st.composite
 def encounters(draw: st.DrawFn) -> str:
     """One to four craft that meet within 0.01 to 3 radians of the orbit."""
-    rate, intercept = draw(sizes(1e-7, 1e-2)), draw(st.booleans())
+    rate, intercept = draw(sizes(1e-7, 7e-4)), draw(st.booleans())
     duration_s, size = draw(sizes(1e-2, 3.0)) / rate, draw(sizes(1e-2, 1e6))
     names = [name for name in COMPONENTS if not (intercept and name.startswith("v"))]
     free = draw(st.lists(st.sampled_from(names), min_size=1, max_size=3, unique=True))
@@ -219,7 +220,7 @@ def encounters(draw: st.DrawFn) -> str:
 @st.composite
 def tours(draw: st.DrawFn) -> str:
     """One to three targets in axes of Hill, met at given times."""
-    rate, size = draw(sizes(1e-7, 1e-2)), draw(sizes(1e-1, 1e6))
+    rate, size = draw(sizes(1e-7, 7e-4)), draw(sizes(1e-1, 1e6))
     gap_s = draw(sizes(1e-2, 1.0)) / rate
     targets = [
         {
@@ -253,7 +254,7 @@ def pursuits(draw: st.DrawFn) -> str:
         "schema": 1,
         "kind": "pursuit-evasion",
         "name": "any",
-        "gravitational_parameter_km3_s2": draw(sizes(1e3, 1e12)),
+        "gravitational_parameter_km3_s2": draw(sizes(5e3, 1e12)),
         "planet_radius_km": axis_km * draw(st.sampled_from([0.0, 0.1, 0.5])),
         "capture_radius_km": axis_km * draw(st.sampled_from([0.0, 1e-6])),
     }
@@ -279,7 +280,8 @@ def pursuits(draw: st.DrawFn) -> str:
 @st.composite
 def rendezvous(draw: st.DrawFn) -> str:
     """Two or three periods of any length toward a craft on any ellipse, in a box, perhaps in a cone."""
-    axis_km, mu = draw(sizes(1e3, 1e7)), draw(sizes(1e9, 1e15))
+    mu = draw(sizes(1e9, 1e15))
+    axis_km = EARTH_RADIUS_M / 1e3 * math.cbrt(mu / EARTH_M3_S2) * draw(sizes(6.0, 900.0))
     rate = math.sqrt(mu / (axis_km * 1e3) ** 3)
     period_s, size = draw(sizes(1e-3, 0.5)) / rate, draw(sizes(1.0, 1e6))
     position = draw(vectors(size))

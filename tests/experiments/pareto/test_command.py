@@ -54,7 +54,7 @@ def changed(old: str, new: str, text: str = EXAMPLE) -> str:
 def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "notes.txt").write_text("mine")
-    code, out, _ = infoset("--out", "results", "--prefer", "y_m=0,z_m=50", "--samples", 4, "--overwrite")
+    code, out, _ = infoset("--out", "results", "--prefer", "x_m=0,z_m=50", "--samples", 4, "--overwrite")
     assert code == 0
     assert (tmp_path / "results" / "notes.txt").read_text() == "mine"
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
@@ -67,7 +67,7 @@ def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -
     assert found["problem_hash"] == load_pareto("pareto-2008").hash
     # Numbers of the acceptance, w = 0.001176, at nine digits.
     assert list(found["meeting"]) == STATE
-    meeting = [0.0, -40.25672153628559, 36.755682761552535, 0.0, 0.0, 0.0]
+    meeting = [-40.25672153628559, 0.0, 36.755682761552535, 0.0, 0.0, 0.0]
     np.testing.assert_allclose(list(found["meeting"].values()), meeting, rtol=1e-9)
     assert [each["name"] for each in found["craft"]] == ["first", "second", "third"]
     for key, expected in (
@@ -125,7 +125,7 @@ def test_keys_that_may_be_left_out(infoset: Infoset, mine: Callable[[str], Path]
     lines = [
         line
         for line in EXAMPLE.splitlines()
-        if line.split("=")[0].strip() not in ("schema", "name", "description", "weight", "x_m", "vx_m_s")
+        if line.split("=")[0].strip() not in ("schema", "name", "description", "weight", "y_m", "vx_m_s")
     ]
     text = "\n".join(lines)
     for name in ("first", "second", "third"):
@@ -139,8 +139,8 @@ def test_keys_that_may_be_left_out(infoset: Infoset, mine: Callable[[str], Path]
 
 
 def test_an_intercept_and_craft_that_start_later(infoset: Infoset, mine: Callable[[str], Path]) -> None:
-    text = changed('free = ["y", "z"] ', 'free = ["x", "y", "z"]\nmeet = "intercept"\n#')
-    file = mine(changed("weight = 1.0", "weight = 2.0\nstart_s = 5.0", text.replace("x_m = 0.0\n", "", 1)))
+    text = changed('free = ["x", "z"] ', 'free = ["x", "y", "z"]\nmeet = "intercept"\n#')
+    file = mine(changed("weight = 1.0", "weight = 2.0\nstart_s = 5.0", text.replace("y_m = 0.0\n", "", 1)))
     code, out, _ = infoset(file, "--json", "-", "-q")
     assert code == 0
     found = strict(out)
@@ -174,12 +174,12 @@ def test_a_bound_that_another_control_meets(infoset: Infoset, mine: Callable[[st
         (["bad\x1b[31mname"], ["bad?[31mname"]),
         (["--samples", "1"], ["--samples: must be from 2 to 10001, found 1;"]),
         (["--samples", "1" + "0" * 40], ["--samples: must be from 2 to 10001, found 1000"]),
-        (["--prefer", "y_m=0"], ["--prefer: z_m is missing", "for example --prefer y_m=0,z_m=0"]),
-        (["--prefer", "y_m=0,z_m=1,x_m=2"], ["--prefer: give each of y_m, z_m once", '"x_m=2"']),
-        (["--prefer", "y_m=0,y_m=1"], ["--prefer: give each of", '"y_m=1"']),
-        (["--prefer", "y_m=0,z_m=far"], ["--prefer", '"far" is not a number']),
-        (["--prefer", "y_m=0,z_m=nan"], ["--prefer: values must be finite"]),
-        (["--prefer", "y_m=0,z_m=1e300"], ["--prefer: values must be finite and at most 1e+15 in size"]),
+        (["--prefer", "x_m=0"], ["--prefer: z_m is missing", "for example --prefer x_m=0,z_m=0"]),
+        (["--prefer", "x_m=0,z_m=1,y_m=2"], ["--prefer: give each of x_m, z_m once", '"y_m=2"']),
+        (["--prefer", "x_m=0,x_m=1"], ["--prefer: give each of", '"x_m=1"']),
+        (["--prefer", "x_m=0,z_m=far"], ["--prefer", '"far" is not a number']),
+        (["--prefer", "x_m=0,z_m=nan"], ["--prefer: values must be finite"]),
+        (["--prefer", "x_m=0,z_m=1e300"], ["--prefer: values must be finite and at most 1e+15 in size"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
         (["--out", "/dev/null"], ["is a file"]),
@@ -209,11 +209,11 @@ def test_what_is_wrong_is_said_before_the_work(
         (changed("duration_s = 30.0", "duration_s = 1e9"), ["radians of the orbit", "check the units"]),
         (changed("= 0.001176", "= 0.0"), ["orbit_rate_rad_s: must be greater than 0"]),
         (changed("= 0.001176", "= nan"), ["orbit_rate_rad_s: must be a finite number"]),
-        (changed('free = ["y", "z"]', "free = []"), ["free: has no component", 'free = ["y", "z"]']),
-        (changed('free = ["y", "z"]', 'free = ["y", "y"]'), ["free: names a component twice"]),
-        (changed('free = ["y", "z"]', 'free = ["y", "altitude"]'), ["free: must be one of", '"vz"']),
-        (changed('free = ["y", "z"]', 'free = ["x"]'), ["terminal.x_m: fixes x, which free = [...] lists as free"]),
-        (changed('free = ["y", "z"]', 'free = ["vy"]\nmeet = "intercept"'), ["free: lists vy", "always free"]),
+        (changed('free = ["x", "z"]', "free = []"), ["free: has no component", 'free = ["x", "z"]']),
+        (changed('free = ["x", "z"]', 'free = ["x", "x"]'), ["free: names a component twice"]),
+        (changed('free = ["x", "z"]', 'free = ["x", "altitude"]'), ["free: must be one of", '"vz"']),
+        (changed('free = ["x", "z"]', 'free = ["y"]'), ["terminal.y_m: fixes y, which free = [...] lists as free"]),
+        (changed('free = ["x", "z"]', 'free = ["vy"]\nmeet = "intercept"'), ["free: lists vy", "always free"]),
         (EXAMPLE.replace("weight = 1.0", "").replace("velocity_m_s", "weight = 0\nvelocity_m_s"),
             ["craft #1.weight: is zero, and so are all others"]),
         (changed("weight = 1.0", "weight = -1.0"), ["craft #1.weight: must be at least 0, found -1.0"]),
@@ -221,9 +221,9 @@ def test_what_is_wrong_is_said_before_the_work(
         (changed('name = "second"', 'name = "first"'), ['craft #2.name: "first" is also the name of craft #1']),
         (changed('name = "second"', 'name = "a\\u001b[31m"'), ["craft #2.name: must be one line without control"]),
         (changed('name = "second"', f'name = "{"n" * 900}"'), ["craft #2.name: must be at most 100 characters"]),
-        (changed("[0.0, 60.0, 80.0]", "[0.0, nan, 80.0]"), ["number 2 of the array must be a finite number"]),
-        (changed("position_m = [0.0, 60.0, 80.0]", "position_m = [0.0, 60.0]"), ["array of 3 numbers, not 2"]),
-        (changed("position_m = [0.0, 60.0, 80.0]", "position_m = [1e300, 0, 0]"), ["position_m", "1e+15 in size"]),
+        (changed("[60.0, 0.0, 80.0]", "[60.0, nan, 80.0]"), ["number 2 of the array must be a finite number"]),
+        (changed("position_m = [60.0, 0.0, 80.0]", "position_m = [60.0, 0.0]"), ["array of 3 numbers, not 2"]),
+        (changed("position_m = [60.0, 0.0, 80.0]", "position_m = [1e300, 0, 0]"), ["position_m", "1e+15 in size"]),
         (HEAD, ["craft: is missing", "add the table [[craft]]"]),
         (HEAD + "craft = []", ["craft"]),
         (changed("schema = 1", "schema = 2"), ["schema: must be 1"]),
@@ -260,16 +260,16 @@ schema = 1
 kind = "pareto-encounter"
 orbit_rate_rad_s = 0.0011
 duration_s = 818181.8
-free = ["y"]
+free = ["x"]
 greatest_control_m_s2 = 1.05e-5
 [[craft]]
 name = "a"
-position_m = [544.668, 1042.875, -206.956]
-velocity_m_s = [-0.814, 0.348, 0.248]
+position_m = [1042.875, -544.668, -206.956]
+velocity_m_s = [0.348, 0.814, 0.248]
 [[craft]]
 name = "b"
-position_m = [1098.813, -1284.581, -661.613]
-velocity_m_s = [-0.838, -1.734, 0.126]
+position_m = [-1284.581, -1098.813, -661.613]
+velocity_m_s = [-1.734, 0.838, 0.126]
 """
 
 
@@ -286,25 +286,25 @@ schema = 1
 kind = "pareto-encounter"
 orbit_rate_rad_s = 6.53e-05
 duration_s = 28.9
-free = ["y"]
+free = ["x"]
 meet = "intercept"
 [terminal]
-x_m = 66.4
+y_m = -66.4
 z_m = 87.7
 [[craft]]
 name = "c0"
-position_m = [67.6, -32.06, -3.53]
-velocity_m_s = [-0.1554, 0.00448, -0.00445]
+position_m = [-32.06, -67.6, -3.53]
+velocity_m_s = [0.00448, 0.1554, -0.00445]
 [[craft]]
 name = "c1"
-position_m = [-5328.8, -6724.3, 3198.4]
-velocity_m_s = [0.0593, 0.0145, -0.0749]
+position_m = [-6724.3, 5328.8, 3198.4]
+velocity_m_s = [0.0145, -0.0593, -0.0749]
 weight = 0.0
 start_s = 0.1
 [[craft]]
 name = "c2"
-position_m = [-21.6, -5.078, -53.25]
-velocity_m_s = [-0.1168, 0.0015925, -0.0245]
+position_m = [-5.078, 21.6, -53.25]
+velocity_m_s = [0.0015925, 0.1168, -0.0245]
 weight = 4.85
 start_s = 15.28
 """
@@ -315,11 +315,11 @@ def test_a_preferred_meeting_of_craft_that_start_late(
     wanted: float, nearest: Callable[[list[float]], float], infoset: Infoset, mine: Callable[[str], Path]
 ) -> None:
     # With one free component the Pareto set is all between the least and the greatest ideal.
-    code, out, err = infoset(mine(LATE), "--prefer", f"y_m={wanted}", "--json", "-", "-q")
+    code, out, err = infoset(mine(LATE), "--prefer", f"x_m={wanted}", "--json", "-", "-q")
     assert (code, err) == (0, "")
     found = strict(out)
-    ideals = [each["ideal"]["y_m"] for each in found["craft"]]
-    assert found["selections"]["preferred"]["meeting"]["y_m"] == pytest.approx(nearest(ideals), rel=1e-9)
+    ideals = [each["ideal"]["x_m"] for each in found["craft"]]
+    assert found["selections"]["preferred"]["meeting"]["x_m"] == pytest.approx(nearest(ideals), rel=1e-9)
 
 
 def test_numbers_of_extreme_size_end_in_a_message(infoset: Infoset, mine: Callable[[str], Path]) -> None:
@@ -373,13 +373,14 @@ def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> No
 def test_figures_say_what_they_show() -> None:
     solution = solve_encounter(load_pareto("pareto-2008").encounter)
     space, *planes = draw_trajectories(solution).axes[::-1]
-    assert {each.get_xlabel() for each in planes} <= {"x (against the motion), m", "y (outward), m"}
-    assert space.get_xlabel() == "x, m"
+    assert [each.get_xlabel() for each in planes] == ["x (radial), m", "y (along-track), m", "y (along-track), m"]
+    assert [each.get_ylabel() for each in planes] == ["z (normal), m", "z (normal), m", "x (radial), m"]
+    assert space.get_xlabel() == "x (radial), m"
     controls = draw_controls(solution, 1.0).axes
-    assert [each.get_ylabel() for each in controls][3] == "$|u|$, m/s$^2$"
+    assert [each.get_ylabel() for each in controls][2:] == ["$u_z$ (normal), m/s$^2$", "$|u|$, m/s$^2$"]
     sweep = sweep_meeting_time(solution.encounter, [20.0, 30.0, 40.0])
     front = draw_front(solution, {"least_group_loss": solution.point}, sweep).axes
-    assert front[0].get_xlabel() == "y of the meeting, m"
+    assert front[0].get_xlabel() == "x of the meeting, m"
     (hull,) = front[0].patches
     corners = np.asarray(hull.get_path().vertices)[:-1]
     assert {tuple(each) for each in corners} == {tuple(each) for each in solution.ideals}

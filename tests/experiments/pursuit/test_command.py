@@ -101,8 +101,6 @@ def test_the_json_has_what_it_is_asked_for(infoset: Infoset) -> None:
         pytest.param(["gravitational_parameter_km3_s2=1e14"], "branch-not-certified", marks=pytest.mark.slow),
         (["pursuer.thrust_N=1e9"], "propellant-exhausted"),
         (["pursuer.mass_kg=1e-9", "pursuer.dry_mass_kg=0"], "branch-not-certified"),
-        (["pursuer.semi_major_axis_km=1e12"], "branch-not-certified"),
-        (["evader.semi_major_axis_km=1e12"], "propellant-exhausted"),
         (["longest_s=1e-9"], "branch-not-certified"),
         (["capture_radius_km=6600"], "captured"),
     ],
@@ -332,9 +330,9 @@ def test_a_map_that_is_wrong(arguments: list[str], parts: list[str], infoset: In
 def test_figures(geo: Solution) -> None:
     sampled = history(geo)
     space: Any = draw_orbits(sampled).axes[0]
-    assert space.get_zlabel() == "$z$, Mm"
+    assert space.get_zlabel() == "z (inertial), Mm"
     plane, *_ = draw_relative(sampled).axes
-    assert plane.get_xlabel() == "along-track, Mm"
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("y (along-track), Mm", "x (radial), Mm")
     x, y = plane.get_lines()[0].get_xydata().T  # type: ignore[union-attr]
     assert abs(x[-1]) < 1e-6
     assert abs(y[-1]) < 1e-6

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from scipy.sparse import csc_matrix
 
 from rendezvous.pareto import Component, Craft, Encounter, Meeting, solve_encounter
-from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire, EllipticOrbit, TschaunerHempel
+from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, TschaunerHempel
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def encounters(draw: st.DrawFn) -> Encounter:
     meeting = draw(st.sampled_from(list(Meeting)))
     open_ = list(Component)[: 6 if meeting is Meeting.RENDEZVOUS else 3]
     free = draw(st.lists(st.sampled_from(open_), min_size=1, max_size=len(open_), unique=True))
-    motion = ClohessyWiltshire(rate, ORBITAL)
+    motion = ClohessyWiltshire(rate)
     scale = np.array([duration] * 3 + [1.0] * 3)
     craft = tuple(
         Craft(str(each), random.normal(size=6) * scale, motion, float(random.uniform(0.2, 3.0)))
@@ -126,8 +126,8 @@ def test_flying_the_control_ends_at_the_meeting(encounter: Encounter) -> None:
 def test_craft_with_their_own_starts_and_orbits_meet() -> None:
     orbit = EllipticOrbit(1.1e-3, 0.2, 0.5)
     craft = (
-        Craft("long", np.array([500.0, 40.0, 10.0, 0.1, 0.0, 0.0]), TschaunerHempel(orbit, ORBITAL)),
-        Craft("short", np.array([-300.0, 0.0, 0.0, 0.0, 0.2, 0.1]), TschaunerHempel(orbit, ORBITAL), 2.0, 400.0),
+        Craft("long", np.array([500.0, 40.0, 10.0, 0.1, 0.0, 0.0]), TschaunerHempel(orbit)),
+        Craft("short", np.array([-300.0, 0.0, 0.0, 0.0, 0.2, 0.1]), TschaunerHempel(orbit), 2.0, 400.0),
     )
     encounter = Encounter(craft, 1500.0, (Component.X, Component.Y, Component.Z), np.zeros(6))
     solution = solve_encounter(encounter)

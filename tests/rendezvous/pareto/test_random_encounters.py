@@ -32,7 +32,7 @@ from rendezvous.pareto import (
     solve_encounter,
     total_impulse,
 )
-from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
 Floats = NDArray[np.float64]
 Check = Callable[[int], None]
@@ -45,9 +45,9 @@ MANY = range(1000, 3000)
 def some_motion(random: np.random.Generator, rate: float, *, elliptic: float = 0.2) -> LinearMotion:
     """A circular orbit, or an elliptic one."""
     if random.random() >= elliptic:
-        return ClohessyWiltshire(rate, ORBITAL)
+        return ClohessyWiltshire(rate)
     orbit = EllipticOrbit(rate, float(random.choice([0.0, 0.1, 0.6, 0.8])), float(random.uniform(0.0, 6.0)))
-    return TschaunerHempel(orbit, ORBITAL)
+    return TschaunerHempel(orbit)
 
 
 def some_encounter(seed: int, longest_rad: float = 20.0, most_craft: int = 5) -> Encounter:

@@ -37,7 +37,7 @@ def paper() -> Paper:
         return ReachabilityProblem(
             transition,
             control,
-            np.array([2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0]),
+            np.array([-2540.0, -2650.0, 2120.0, 2.0, 3.0, 3.0]),
             np.array([3000.0] * 3 + [7.5] * 3),
             np.full(3, bound),
             thrust,

@@ -61,7 +61,7 @@ def test_noise_is_flown_through_with_bounds_relaxed_where_they_must_be(
     assert (flight.relaxations >= 0.0).all()
     # A state far outside is brought back, with a plan for bounds wide enough.
     problem = paper()
-    kicked = replan(problem, lambda t, state, _: state + (400.0 if t == 0 else 0.0) * np.eye(6)[0])
+    kicked = replan(problem, lambda t, state, _: state - (400.0 if t == 0 else 0.0) * np.eye(6)[1])
     assert kicked.relaxations[0] == 0.0
     assert kicked.relaxations[1] > 0.0
 

@@ -1,4 +1,7 @@
-"""The numbers of the paper and of its parameters as identified: acceptance/reachability.json, copied."""
+"""The numbers of the paper and of its parameters as identified: acceptance/reachability.json, copied.
+
+The numbers are in the paper's axes, problems and solutions in Hill's.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from experiments.common.hill_axes import from_paper, to_paper
 from rendezvous.reachability import (
     MotionModel,
     NonlinearMotion,
@@ -84,7 +88,8 @@ def lifted(paper: Paper) -> Solution:
 
 def test_matrices(paper: Paper) -> None:
     problem = paper()
-    a, b = problem.transition[0], problem.control[0]
+    # Rows and columns in the paper's axes.
+    a, b = (to_paper(to_paper(matrix).T).T for matrix in (problem.transition[0], problem.control[0]))
     expected = [1.0008801595082484, 0.002552748205224468, 0, 177.71697310723644, 25.082847920872695, 0]
     np.testing.assert_allclose(a[0], expected, rtol=1e-11, atol=1e-13)
     assert a[2, 2] == pytest.approx(0.9911552814183396, rel=1e-12)
@@ -93,15 +98,20 @@ def test_matrices(paper: Paper) -> None:
     np.testing.assert_allclose(found, [2414.5844342853457, 225.9057563126505, 26.920350496223215], rtol=1e-11)
 
 
+def ends_in_paper(bounds: Floats) -> Floats:
+    """Convert least and greatest values, shape (6, 2); the bounds of all axes are the same."""
+    return np.sort(to_paper(bounds.T).T, axis=1)
+
+
 @pytest.mark.parametrize("route", ["exact", "lifted"])
 def test_bounds_of_forward_sets_and_tube(route: str, request: pytest.FixtureRequest) -> None:
     solution: Solution = request.getfixturevalue(route)
     scale = solution.problem.state_bounds[:, None]
     forward, tube = solution.sets.bounds(SetKind.FORWARD), solution.sets.bounds(SetKind.TUBE)
     for t, expected in FORWARD.items():
-        assert np.abs((forward[t] - expected) / scale).max() < 1e-9
+        assert np.abs((ends_in_paper(forward[t]) - expected) / scale).max() < 1e-9
     for t, expected in TUBE.items():
-        assert np.abs((tube[t] - expected) / scale).max() < 1e-9
+        assert np.abs((ends_in_paper(tube[t]) - expected) / scale).max() < 1e-9
     assert np.abs(tube[4] / scale).max() == 0.0
 
 
@@ -139,9 +149,9 @@ def test_least_energy_l1_and_peak(exact: Solution) -> None:
     assert effort(minimum_energy(exact.optimal)).energy == pytest.approx(0.14323052820, abs=1e-11)
     sparse = minimum_l1(exact.optimal)
     assert effort(sparse).l1 == pytest.approx(0.88770050948, abs=1e-11)
-    np.testing.assert_allclose(sparse[0], [-0.1255926124, 0.0371598443, -0.2619971202], atol=1e-10)
+    np.testing.assert_allclose(to_paper(sparse[0]), [-0.1255926124, 0.0371598443, -0.2619971202], atol=1e-10)
     np.testing.assert_allclose(sparse[1:3], 0.0, atol=1e-10)
-    np.testing.assert_allclose(sparse[3], [0.0891976706, -0.2056122151, 0.1681410469], atol=1e-10)
+    np.testing.assert_allclose(to_paper(sparse[3]), [0.0891976706, -0.2056122151, 0.1681410469], atol=1e-10)
     assert effort(minimum_peak(exact.optimal)).peak == pytest.approx(0.17263864653, abs=1e-11)
     # With both ends only, the sum of norms has the same minimiser.
     np.testing.assert_allclose(minimum_norms(exact.optimal), sparse, atol=1e-6)
@@ -149,8 +159,8 @@ def test_least_energy_l1_and_peak(exact: Solution) -> None:
 
 def test_table_1_is_the_control_of_least_energy(exact: Solution) -> None:
     control = minimum_energy(exact.optimal)
-    assert np.abs(control - TABLE_1).max() <= 0.5e-4 + 1e-12
-    states = exact.problem.run(control)[1:]
+    assert np.abs(to_paper(control) - TABLE_1).max() <= 0.5e-4 + 1e-12
+    states = to_paper(exact.problem.run(control)[1:])
     printed = np.array(TABLE_1_LINEAR, dtype=float)
     rounding = np.where(np.arange(6) < 3, 0.06, 0.006)
     assert (np.abs(states - printed) <= rounding).all()
@@ -166,20 +176,20 @@ def rounding_at_the_end(problem: ReachabilityProblem) -> Floats:
 
 def test_table_3_is_optimal_to_its_rounding(exact: Solution) -> None:
     problem = exact.problem
-    assert (np.abs(problem.run(np.array(TABLE_3))[-1]) <= rounding_at_the_end(problem)).all()
-    assert float(problem.excess(np.array(TABLE_3))) <= 0.0
+    assert (np.abs(problem.run(from_paper(TABLE_3))[-1]) <= rounding_at_the_end(problem)).all()
+    assert float(problem.excess(from_paper(TABLE_3))) <= 0.0
 
 
 def test_table_2_is_near_the_control_of_least_l1_and_contradicts_itself(exact: Solution) -> None:
     problem, sparse = exact.problem, minimum_l1(exact.optimal)
-    printed = np.array(TABLE_2)
+    printed = from_paper(TABLE_2)
     np.testing.assert_allclose(sparse[[0, 3]], printed[[0, 3]], atol=1e-3)
     assert np.abs(sparse - printed).max() < 6e-3
     # Its controls lead tens of metres past zero, its states are those of the least L1.
     ends = np.abs(problem.run(printed)[-1])
     assert (ends[:2] > 4.0 * rounding_at_the_end(problem)[:2]).all()
     states = problem.run(sparse)
-    assert np.abs(states[1:3, :3] - [[1868.5, -2057.1, 2005.9], [954.3, -1343.4, 1219.6]]).max() < 5.0
+    assert np.abs(to_paper(states[1:3, :3]) - [[1868.5, -2057.1, 2005.9], [954.3, -1343.4, 1219.6]]).max() < 5.0
 
 
 @pytest.mark.parametrize(

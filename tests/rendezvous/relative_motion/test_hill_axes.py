@@ -1,0 +1,120 @@
+"""Relative motion against two-body motion of both craft in inertial axes, integrated by SciPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from experiments.multipoint.file import load_multipoint
+from experiments.pareto.file import load_pareto
+from experiments.reachability.file import load_rendezvous
+from rendezvous.multipoint import Tour
+from rendezvous.pursuit_evasion import orbital_axes
+from rendezvous.reachability import NonlinearMotion
+from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from rendezvous.two_body import OrbitalElements
+
+Floats = NDArray[np.float64]
+
+MU = 3.986004418e14
+ANGLES = (0.9, 2.1, 0.4)
+"""Inclination, ascending node and argument of perigee of a reference orbit, rad: they do not affect relative motion."""
+
+
+def reference(axis_m: float, eccentricity: float, anomaly: float) -> Floats:
+    return np.concatenate(OrbitalElements(axis_m, eccentricity, *ANGLES, anomaly).state(MU))
+
+
+def flown(state: Floats, end_s: float) -> Floats:
+    """Two-body motion by DOP853."""
+
+    def rates(_: float, y: Floats) -> Floats:
+        return np.concatenate([y[3:], -MU * y[:3] / np.linalg.norm(y[:3]) ** 3])
+
+    return np.asarray(solve_ivp(rates, (0.0, end_s), state, method="DOP853", rtol=1e-13, atol=1e-6).y[:, -1])
+
+
+def axes_and_rate(chief: Floats) -> tuple[Floats, Floats]:
+    """x outward, y along the motion, z = x cross y, as rows in inertial axes, and their angular velocity, inertial."""
+    position, velocity = chief[:3], chief[3:]
+    momentum = np.cross(position, velocity)
+    x, z = position / np.linalg.norm(position), momentum / np.linalg.norm(momentum)
+    return np.array([x, np.cross(z, x), z]), momentum / (position @ position)
+
+
+def to_hill(craft: Floats, chief: Floats) -> Floats:
+    axes, turning = axes_and_rate(chief)
+    apart = craft - chief
+    return np.concatenate([axes @ apart[:3], axes @ (apart[3:] - np.cross(turning, apart[:3]))])
+
+
+def from_hill(relative: Floats, chief: Floats) -> Floats:
+    axes, turning = axes_and_rate(chief)
+    position = axes.T @ relative[:3]
+    return np.asarray(chief + np.concatenate([position, axes.T @ relative[3:] + np.cross(turning, position)]))
+
+
+def after(relative: Floats, chief: Floats, end_s: float) -> Floats:
+    """The state in Hill's axes after both craft have coasted."""
+    return to_hill(flown(from_hill(relative, chief), end_s), flown(chief, end_s))
+
+
+def test_a_craft_behind_on_the_same_circular_orbit_has_negative_y() -> None:
+    # 10 km behind: the chord is 10 km to first order, and all six components keep their values.
+    axis, behind = 6778e3, 10e3
+    chief, craft = reference(axis, 0.0, 0.5), reference(axis, 0.0, 0.5 - behind / axis)
+    start, later = to_hill(craft, chief), to_hill(flown(craft, 5000.0), flown(chief, 5000.0))
+    second_order = behind**2 / axis
+    np.testing.assert_allclose(start, [0.0, -behind, 0.0, 0.0, 0.0, 0.0], atol=second_order)
+    np.testing.assert_allclose(later, start, atol=1e-3)
+    rate = float(np.sqrt(MU / axis**3))
+    at_rest = np.array([0.0, -behind, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(ClohessyWiltshire(rate).transition(0.0, 5000.0) @ at_rest, at_rest, rtol=1e-12)
+    # The axes in which a pursuit is drawn are the same.
+    drawn = orbital_axes(chief[None, :3], chief[None, 3:])[0] @ (craft - chief)[:3]
+    np.testing.assert_allclose(drawn, start[:3], atol=1e-8)
+
+
+@pytest.mark.parametrize(("eccentricity", "anomaly"), [(0.0, 0.3), (0.1, 2.5), (0.6, -1.0)])
+@pytest.mark.parametrize("component", range(6))
+def test_linear_motions_are_two_body_motion_to_first_order(eccentricity: float, anomaly: float, component: int) -> None:
+    axis, end_s = 9000e3, 2500.0
+    orbit = EllipticOrbit.of_size(axis, eccentricity, MU, anomaly)
+    motion: LinearMotion = TschaunerHempel(orbit) if eccentricity else ClohessyWiltshire(orbit.mean_motion_rad_s)
+    chief = reference(axis, eccentricity, anomaly)
+    small = np.where(np.arange(6) == component, 50.0 if component < 3 else 0.05, 0.0)
+    # The difference of opposite deviations has no second order.
+    found = 0.5 * (after(small, chief, end_s) - after(-small, chief, end_s))
+    expected = motion.transition(0.0, end_s) @ small
+    scale = np.array([1.0] * 3 + [1.0 / end_s] * 3)
+    np.testing.assert_allclose(found / scale, expected / scale, atol=1e-4 * float(np.abs(expected / scale).max()))
+
+
+@pytest.mark.parametrize(("eccentricity", "anomaly"), [(0.0, 0.3), (0.1, 2.5)])
+def test_the_nonlinear_motion_is_two_body_motion(eccentricity: float, anomaly: float) -> None:
+    axis = 9000e3
+    motion = NonlinearMotion(EllipticOrbit.of_size(axis, eccentricity, MU, anomaly), axis)
+    relative = np.array([40e3, -70e3, 25e3, 30.0, -20.0, 15.0])
+    found = motion.paths(0.0, relative, np.zeros(3), [1800.0])[0, 0]
+    np.testing.assert_allclose(found, after(relative, reference(axis, eccentricity, anomaly), 1800.0), rtol=1e-7)
+
+
+def test_the_problems_of_three_commands_are_in_these_axes() -> None:
+    # Each built-in problem's own motion moves the same state as two-body motion about its reference orbit.
+    cone, encounter, tour = (
+        load_rendezvous("approach-cone"),
+        load_pareto("pareto-2008"),
+        load_multipoint("service-2").tour,
+    )
+    assert isinstance(tour, Tour)
+    small = np.array([40.0, -60.0, 30.0, 0.03, 0.02, -0.01])
+    for motion, axis, eccentricity, anomaly in (
+        (cone.motion, 6778137.0, 0.001, np.radians(40.0)),
+        (encounter.encounter.craft[0].motion, (MU / 0.001176**2) ** (1 / 3), 0.0, 0.0),
+        (tour.motion, (MU / 1.13e-3**2) ** (1 / 3), 0.0, 0.0),
+    ):
+        chief = reference(axis, eccentricity, float(anomaly))
+        found = 0.5 * (after(small, chief, 600.0) - after(-small, chief, 600.0))
+        np.testing.assert_allclose(found, motion.transition(0.0, 600.0) @ small, rtol=1e-4, atol=1e-6)
