@@ -42,7 +42,7 @@ SHOWN: list[tuple[Callable[[], object], str]] = [
     (lambda: encounter().plan(0).sample(100), "state=<shape (100, 6)>"),
     (lambda: pareto.sweep_meeting_time(load_pareto("pareto-2008").encounter, [20.0, 30.0]), "points=<shape (2, 2)>"),
     (best_order, "path=Path(...)"),
-    (lambda: best_order().path, "motion=ClohessyWiltshire(...)"),
+    (lambda: best_order().path, "motion=ClohessyWiltshire(rate_rad_s=0.00113)"),
     (lambda: load_multipoint("service-5").tour, "targets=DriftingTargets(...)"),
     (lambda: load_multipoint("asteroid-tour").tour, "targets=KeplerTargets(...)"),
     (pursuit, "pursuit: captured, capture after"),

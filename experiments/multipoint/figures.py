@@ -146,8 +146,8 @@ def draw_costates(scene: Scene) -> Figure:
         _line(below, scene, times, costate[:, 3 + axis], label=title, **_COMPONENTS[axis])
     above.set_ylabel(r"$\lambda_r$, m/s$^3$")
     below.set_ylabel(r"$\lambda_V$, m/s$^2$")
+    _legend(above)
     for panel in (above, below):
-        _legend(panel)
         panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     _mark_times(scene, above, below)
     return figure
@@ -165,7 +165,8 @@ def _line(panel: Axes, scene: Scene, times: Floats, values: Floats, **look: Any)
 
 def _legend(panel: Axes) -> None:
     panel.margins(y=0.16)
-    panel.legend(loc="best", ncols=3, frameon=True, framealpha=0.85, edgecolor="none", borderpad=0.2)
+    look: dict[str, Any] = {"framealpha": 0.85, "edgecolor": "none", "borderpad": 0.2, "fontsize": 7.0}
+    panel.legend(loc="lower left", ncols=3, frameon=True, handlelength=1.6, columnspacing=1.0, **look)
 
 
 def _mark_times(scene: Scene, above: Axes, below: Axes) -> None:

@@ -1,0 +1,41 @@
+"""The check of a solution by duality."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rendezvous.reachability.conic import ConeProgram, NoSolutionError
+
+
+def program_with_solution() -> tuple[ConeProgram, np.ndarray, np.ndarray]:
+    """Minimise the first of 40 states that are linear in a control u with |u| <= 1, with its exact solution."""
+    generator = np.random.default_rng(5)
+    response = 100.0 * generator.standard_normal((40, 3))
+    cost = np.zeros(43)
+    cost[3] = 1.0
+    program = ConeProgram(cost).meet(np.hstack([-response, np.eye(40)]), np.zeros(40))
+    program.bound(np.hstack([np.eye(3), np.zeros((3, 40))]), np.zeros(3), np.zeros(43), 1.0)
+    size = np.linalg.norm(response[0])
+    control = -response[0] / size
+    multipliers = np.concatenate([-np.eye(40)[0], [size], response[0]])
+    return program, np.concatenate([control, response @ control]), multipliers
+
+
+def test_multipliers_with_a_small_residual_prove_a_solution() -> None:
+    program, point, exact = program_with_solution()
+    assert program.broken_and_apart(point, exact)[1] < 1e-13
+    # Errors of a solver's tolerance, times 43 variables of sizes up to some hundred, are a large gap.
+    noisy = exact + 1e-10 * np.random.default_rng(6).standard_normal(len(exact))
+    assert program.broken_and_apart(point, noisy)[1] > 1e-8
+    program.need_solution(point, noisy)
+
+
+@pytest.mark.parametrize("short", [1e-7, 1e-3, 0.5])
+def test_a_point_that_is_not_optimal_is_refused(short: float) -> None:
+    program, point, exact = program_with_solution()
+    with pytest.raises(NoSolutionError, match="duality gap"):
+        program.need_solution((1.0 - short) * point, exact)
+    generator = np.random.default_rng(7)
+    with pytest.raises(NoSolutionError):
+        program.need_solution((1.0 - short) * point, exact + generator.standard_normal(len(exact)))
