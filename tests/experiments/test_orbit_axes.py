@@ -59,6 +59,11 @@ def test_built_in_files_state_the_axes(name: str) -> None:
     assert HILL in problem_text(name)
 
 
+@pytest.mark.parametrize("name", ["geo-pursuit", "leo-pursuit"])
+def test_built_in_pursuits_state_the_axes(name: str) -> None:
+    assert "inertial axes, z along the planet's axis" in problem_text(name)
+
+
 def test_the_papers_axes() -> None:
     # 7 m outward, 3 m ahead, 2 m along the normal; the papers have x against the motion, y outward.
     assert to_paper([7.0, 3.0, 2.0, 0.7, 0.3, 0.2]).tolist() == [-3.0, 7.0, 2.0, -0.3, 0.7, 0.2]
