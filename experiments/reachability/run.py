@@ -29,7 +29,7 @@ from experiments.reachability.report import (
     report_json,
     trajectories,
 )
-from rendezvous.reachability import Route, SetKind, effort
+from rendezvous.reachability import Route, SetKind, ThrustShape, effort
 
 TABLES = "published-tables.csv"
 FIGURES = ("figure-positions", "figure-velocities", "figure-planes", "figure-controls")
@@ -99,9 +99,11 @@ def _summary(report: Report) -> Iterator[str]:
     yield f"route: {solution.route.value} ({solution.reason})"
     yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
     yield f"axes: {AXES}"
+    ball = report.rendezvous.problem.thrust is ThrustShape.BALL
+    engines = "the periods, of one engine that turns" if ball else "the three axes"
     yield (
         f"units: {_NORM} is the norm of a state whose components are in m and m/s; controls u are in units of "
-        f"{report.rendezvous.acceleration_m_s2:g} m/s^2"
+        f"{report.rendezvous.acceleration_m_s2:g} m/s^2; Delta-v is the sum over {engines}"
     )
 
 

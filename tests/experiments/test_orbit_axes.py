@@ -113,6 +113,7 @@ def test_reach_prints_delta_v(infoset: Infoset, thrust: str) -> None:
         assert [used[axis] for axis in "xyz"] == pytest.approx((180.0 * np.abs(control).sum(axis=0)).tolist())
         engines = np.abs(control).sum() if thrust == "box" else np.sqrt((control**2).sum(axis=1)).sum()
         assert used["sum"] == pytest.approx(180.0 * float(engines))
+    assert f"Delta-v is the sum over the {'three axes' if thrust == 'box' else 'periods'}" in err
     shown = found["controls"][0]["delta_v_m_s"]
     for axis in ("sum", *"xyz"):
         assert f" {shown[axis]:.4f}" in err
