@@ -75,7 +75,7 @@ nitpick_ignore = [
         "rendezvous.reachability.problem": ("Block",),
         "rendezvous.reachability.admissible": ("Lifted",),
         "rendezvous.reachability.optimum": ("BlockOptimum",),
-        "sim.bound": ("TruthPair",),
+        "sim.truth_pair": ("TruthPair",),
         "sim.chunk": ("Chunk",),
         "sim.storage.campaign_folder": ("CampaignFolder", "Damage"),
         "sim.storage.manifest": ("Manifest",),

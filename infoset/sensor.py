@@ -44,23 +44,23 @@ class Apart:
     ----------
     offset_m, predicted_miss_m : ndarray, shape (axes, n)
         Greatest differences of their positions z and of their predicted misses z + V x/e along each lateral axis, m.
-    shift_m : float
+    shift_m : ndarray, shape (n,)
         Greatest difference of their ranges x, m.
     range_m, farthest_m : ndarray, shape (n,)
         Their least range x and greatest distance, m.
     slope : ndarray, shape (n,)
         Greatest distance from the x axis, and greatest change of it until x = 0, of both, as a share of x.
-    closing_speed_m_s : float
-        Their closing speed e.
+    closing_speed_m_s : ndarray, shape (n,)
+        Their greatest closing speed e.
     """
 
     offset_m: Floats
     predicted_miss_m: Floats
-    shift_m: float
+    shift_m: Floats
     range_m: Floats
     farthest_m: Floats
     slope: Floats
-    closing_speed_m_s: float
+    closing_speed_m_s: Floats
 
 
 class Cuttable(Protocol):
@@ -125,15 +125,17 @@ class Sensor(ABC):
         """Return whether the sensor measures at a time before the nominal arrival, s."""
         return True
 
-    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats] | None:
+    def band(
+        self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0
+    ) -> tuple[bool, Floats] | None:
         """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
 
         Parameters
         ----------
         range_m : ndarray
             Ranges x, m.
-        closing_speed_m_s : float
-            Closing speed e.
+        closing_speed_m_s : float or ndarray
+            Closing speed e at these ranges.
         errors : float
             Half-width of the interval of the measured quantity, in units of the bound.
 

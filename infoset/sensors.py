@@ -327,7 +327,7 @@ class AngleSensor(Sensor):
         """Cut by the angle."""
         sets.measure_angle(measured[self.name], where)
 
-    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
+    def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> tuple[bool, Floats]:
         """Return a band of z."""
         return False, errors * self.error_bound(range_m) * range_m
 
@@ -449,7 +449,7 @@ class RateSensor(Checked, Sensor):
         """Cut by the rate."""
         sets.measure_rate(measured[self.name], self.error_rad_s, where)
 
-    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
+    def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> tuple[bool, Floats]:
         """Return a band of the predicted miss, omega x^2/e."""
         return True, errors * self.error_rad_s * range_m * range_m / closing_speed_m_s
 

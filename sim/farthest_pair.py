@@ -10,6 +10,7 @@ import numpy as np
 from infoset import SetModel
 from infoset.arrays import Flags, Floats, Integers
 from infoset.sensor import Sensor
+from sim.coasting import Coasting
 
 MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding."""
@@ -22,39 +23,42 @@ class BoundError(RuntimeError):
 
 
 class PairProgram:
-    """The linear programs of one axis, with its sensors and the steps in which they measure.
+    """The linear programs of one lateral axis, with its sensors and the steps in which they measure.
 
     `limits_m` is the greatest distance of the two along the axis at each step with the same measurements,
-    `miss_limits_m` that of their predicted misses; infinite where nothing is measured.
+    `miss_limits_m` that of their predicted misses w + V_w x/c; infinite where nothing is measured. The difference of
+    the two follows the transition matrices of `motion`, without its small parts along the other axes.
     """
 
     def __init__(
-        self,
-        model: SetModel,
-        sensors: Mapping[str, Sensor],
-        due: Mapping[str, Integers],
-        times_s: Floats,
-        ranges_m: Floats,
-        vx_m_s: float,
+        self, model: SetModel, sensors: Mapping[str, Sensor], due: Mapping[str, Integers], motion: Coasting, axis: int
     ) -> None:
-        self.model, self.times_s, self.ranges_m, self.vx_m_s = model, times_s, ranges_m, vx_m_s
-        self.arrival_s = float(times_s[-1])
-        self.steps = len(ranges_m)
+        self.model, self.motion, self.axis = model, motion, axis
+        self.steps = len(motion.range_m)
         self.limits_m = np.full(self.steps, np.inf)
         self.miss_limits_m = np.full(self.steps, np.inf)
         for name, sensor in sensors.items():
-            band = sensor.band(self.ranges_m[due[name]], -vx_m_s, 2.0 * (1.0 - MARGIN))
+            measured = due[name]
+            speeds_m_s = motion.closing_speed_m_s[measured]
+            band = sensor.band(motion.range_m[measured], speeds_m_s, 2.0 * (1.0 - MARGIN))
             if band is not None:
                 limits = self.miss_limits_m if band[0] else self.limits_m
-                limits[due[name]] = np.minimum(limits[due[name]], band[1])
+                limits[measured] = np.minimum(limits[measured], band[1])
+
+    def is_like(self, other: PairProgram) -> bool:
+        """Return whether another program is the same, up to differences of gravity that are negligible."""
+        here, there = (
+            each.motion.transition[:, each.axis, [each.axis, each.motion.axes + each.axis]] for each in (self, other)
+        )
+        return self.model == other.model and np.allclose(here, there, rtol=MARGIN, atol=0.0)
 
     @property
     def is_measured(self) -> Flags:
         """Whether a measurement limits the distance at a step, shape (steps,)."""
         return np.asarray(np.isfinite(np.minimum(self.limits_m, self.miss_limits_m)))
 
-    def farthest(self, last_common_step: int) -> tuple[float, float, Floats, float]:
-        """Return the difference of the two motions: offset and velocity at t = 0, acceleration over each step, end.
+    def farthest(self, last_common_step: int) -> tuple[float, float, Floats]:
+        """Return the difference of the two motions: offset and velocity at t = 0, acceleration over each step.
 
         A linear program in the offset, the velocity and the acceleration at the knots of a time grid that has the steps
         near the last common measurement and longer blocks before. An acceleration that is constant over longer blocks
@@ -69,24 +73,24 @@ class PairProgram:
 
         box = self.model.bounds
         knots = self._knots(last_common_step)
-        at_s, count = self.times_s[knots], len(knots)
-        blocks = count - 1
+        count, blocks = len(knots), len(knots) - 1
         # Units in which all variables are of order one, because the tolerances of the solver are absolute.
         second = self.model.step_s
-        metre = 1.0 / max(float(np.median(self.ranges_m)) * 2e-4, 1e-9)
+        metre = 1.0 / max(float(np.median(self.motion.range_m)) * 2e-4, 1e-9)
         push = 2.0 * self.model.disturbance_m_s2 * metre
-        step = np.diff(at_s)
         rows = np.arange(blocks)
         z, v, u = rows, count + rows, 2 * count + rows
+        (zz, zv), (vz, vv), (zu, vu) = self._responses(knots[1:], knots[:-1])
         motion = _sparse(
             (2 * blocks, 2 * count + blocks),
             (rows, z + 1, 1.0),
-            (rows, z, -1.0),
-            (rows, v, -step / second),
-            (rows, u, -0.5 * push * step**2),
+            (rows, z, -zz),
+            (rows, v, -zv / second),
+            (rows, u, -push * zu),
             (blocks + rows, v + 1, 1.0),
-            (blocks + rows, v, -1.0),
-            (blocks + rows, u, -push * step * second),
+            (blocks + rows, z, -vz * second),
+            (blocks + rows, v, -vv),
+            (blocks + rows, u, -push * second * vu),
         )
         limits, miss_limits = self.limits_m * metre, self.miss_limits_m * metre
         limits[last_common_step + 1 :] = np.inf
@@ -103,13 +107,13 @@ class PairProgram:
         )
         looked = np.concatenate([within, rated])
         block = np.searchsorted(knots, looked, side="right") - 1
-        since = self.times_s[looked] - at_s[block]
-        to_go = np.concatenate([np.zeros(len(within)), self.arrival_s - self.times_s[rated]])
+        to_go = np.concatenate([np.zeros(len(within)), self._to_go_s[rated]])
+        (zz, zv), (vz, vv), (zu, vu) = self._responses(looked, knots[block])
         row = np.arange(len(looked))
         entries = [
-            (row, block, np.ones(len(looked))),
-            (row, count + block, (since + to_go) / second),
-            (row, 2 * count + block, push * (0.5 * since**2 + since * to_go)),
+            (row, block, zz + to_go * vz),
+            (row, count + block, (zv + to_go * vv) / second),
+            (row, 2 * count + block, push * (zu + to_go * vu)),
         ]
         entries += [(len(looked) + row, column, -factor) for row, column, factor in entries]
         most = np.concatenate([limits[within], miss_limits[rated]])
@@ -126,7 +130,9 @@ class PairProgram:
             options={"presolve": False},
         )
         if solved.status != 0:
-            raise BoundError(f"label {self.ranges_m[0]:g} m, V_x {self.vx_m_s:g} m/s: {solved.message}")
+            raise BoundError(
+                f"label {self.motion.range_m[0]:g} m, V_x {-self.motion.closing_speed_m_s[0]:g} m/s: {solved.message}"
+            )
         pushes = np.clip(np.asarray(solved.x[2 * count :]), -1.0, 1.0)
         acceleration = 2.0 * self.model.disturbance_m_s2 * np.repeat(pushes, np.diff(knots))
         widths = [box.z_m[1] - box.z_m[0], box.vz_m_s[1] - box.vz_m_s[0]]
@@ -135,14 +141,35 @@ class PairProgram:
             for value, unit, width in zip((solved.x[0], solved.x[count]), (metre, metre * second), widths, strict=True)
         )
         # The solution violates the limits by up to the solver's tolerances; scaling makes it satisfy them exactly.
-        positions, speeds = motion_of(offset, velocity, acceleration, self.times_s)
-        misses = positions[:-1] + speeds[:-1] * (self.arrival_s - self.times_s[:-1])
-        sizes = np.abs(np.concatenate([positions[:-1], misses]))
+        difference = self.motion.difference(*self._alone(offset, velocity, acceleration))[:, :-1]
+        positions, speeds = difference[self.axis], difference[self.motion.axes + self.axis]
+        sizes = np.abs(np.concatenate([positions, positions + speeds * self._to_go_s]))
         allowed = np.concatenate([limits / metre, miss_limits / metre])
         share = float(np.divide(allowed, sizes, out=np.full(len(sizes), np.inf), where=sizes > 0.0).min())
         share = min(1.0, share)
-        offset, velocity, acceleration = share * offset, share * velocity, share * acceleration
-        return offset, velocity, acceleration, float(motion_of(offset, velocity, acceleration, self.times_s)[0][-1])
+        return share * offset, share * velocity, share * acceleration
+
+    @property
+    def _to_go_s(self) -> Floats:
+        """Return x/c at the steps, s."""
+        return np.asarray(self.motion.range_m / self.motion.closing_speed_m_s[:-1])
+
+    def _alone(self, offset: float, velocity: float, acceleration: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return a start and an acceleration of this axis with zeros for the other one."""
+        axis = np.eye(self.motion.axes - 1)[self.axis]
+        return offset * axis, velocity * axis, axis[:, None] * acceleration
+
+    def _responses(self, at: Integers, since: Integers) -> tuple[tuple[Floats, Floats], ...]:
+        """Return position and velocity along the axis at steps, by those at earlier steps and by an acceleration.
+
+        The first pair are the derivatives of the position with respect to (position, velocity), the second those of the
+        velocity; the third are position and velocity by a unit acceleration between the two steps.
+        """
+        motion, chosen = self.motion, [self.axis, self.motion.axes + self.axis]
+        onward = (motion.transition[at][:, chosen] @ motion.back[since])[:, :, chosen]
+        grown = motion.pushed[at, :, self.axis] - motion.pushed[since, :, self.axis]
+        pushed = np.einsum("nrs,ns->rn", motion.transition[at][:, chosen], grown)
+        return (onward[:, 0, 0], onward[:, 0, 1]), (onward[:, 1, 0], onward[:, 1, 1]), (pushed[0], pushed[1])
 
     def _knots(self, last_common_step: int) -> Integers:
         """Return the steps at which blocks of constant acceleration end, with 0 and the arrival."""
@@ -151,21 +178,6 @@ class PairProgram:
             to_go = max(0, last_common_step - knots[-1])
             knots.append(max(0, knots[-1] - 1 - to_go // STEPS_A_BLOCK))
         return np.array(knots[::-1], dtype=np.int64)
-
-
-def motion_of(
-    offset: Floats | float, velocity: Floats | float, acceleration: Floats, times_s: Floats
-) -> tuple[Floats, Floats]:
-    """Return positions and speeds at times, with constant acceleration between them, shape (..., times).
-
-    `offset` and `velocity` have the shape (...), `acceleration` (..., times - 1).
-    """
-    step = np.diff(times_s)
-    start = np.zeros((*acceleration.shape[:-1], 1))
-    changes = np.concatenate([start, np.cumsum(acceleration * step, axis=-1)], axis=-1)
-    speeds = np.asarray(velocity)[..., None] + changes
-    ways = np.cumsum(speeds[..., :-1] * step + 0.5 * acceleration * step**2, axis=-1)
-    return np.asarray(offset)[..., None] + np.concatenate([start, ways], axis=-1), speeds
 
 
 def _sparse(shape: tuple[int, int], *entries: tuple[Integers, Integers, Floats | float]) -> Any:

@@ -11,12 +11,12 @@ from guidance.noise import LineOfSight
 from infoset import AngleSensor, Convention, InformationSetView
 from infoset.arrays import Floats
 from infoset.sensor import Measurements, Sensor
-from sim.bound import TruthPair
 from sim.draws import Draws
 from sim.engagement import Engagements
 from sim.kepler import KeplerMotion, Passage
 from sim.results import Results
 from sim.scenario import Scenario, Sun
+from sim.truth_pair import TruthPair
 
 STEPS_BEYOND = 2
 """Greatest number of simulated steps after the one in which x = 0."""

@@ -10,8 +10,9 @@ import pytest
 from experiments import load_scenario
 from guidance import NoiseKind, TieRule
 from sim import Scenario, simulate
-from sim.bound import TruthPair, lower_bound, pair_at
+from sim.bound import lower_bound, pair_at
 from sim.closed_form import possible_miss_m, worst_shift_m
+from sim.truth_pair import TruthPair
 
 RUNS = 10
 

@@ -82,7 +82,7 @@ class StreakSensor(Sensor):
         rate_of_a_pixel = self.pixel_rad / self.exposure_s
         sets.measure_rate(measured[self.name] * rate_of_a_pixel, 0.5 * rate_of_a_pixel, where)
 
-    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
+    def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> tuple[bool, Floats]:
         return True, errors * 0.5 * self.pixel_rad / self.exposure_s * range_m**2 / closing_speed_m_s
 
 

@@ -13,6 +13,7 @@ from experiments.common.figure_style import INK, LIMIT, SET_EDGE, SET_FILL, figu
 from infoset.arrays import Floats
 from sim import Scenario
 from sim.bound import LowerBound
+from sim.truth_pair import TruthPair, later_impulses
 
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#7f2704", "linestyle": "-", "marker": "o"},
@@ -24,10 +25,10 @@ _SECONDS_SHOWN = 3.0
 
 
 def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
-    """Draw (a) the bound over the label, one curve per closing speed, and (b) the pair of true states that proves it.
+    """Draw (a) the bound over the label, one curve per closing speed, and (b) the true states that prove it.
 
     The bound is the result of `sim.lower_bound` for this scenario. In space, (b) has the offset of the two states along
-    the direction of their difference at x = 0.
+    the direction of their difference at x = 0. A bound by a single motion has its offset from the x axis.
     """
     with style():
         figure, (left, right) = figure_grid(85.0, 1, 2, (13.0, 4.0, 12.0, 7.0), (14.0, 0.0))
@@ -78,54 +79,62 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
 
 def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     pair, model = lower.pair, scenario.set_model
-    times, difference = pair.difference_m(model.step_s)
-    end = difference[:, -1]
-    direction = np.divide(end, pair.apart_m, out=np.zeros_like(end), where=pair.apart_m > 0.0)
-    to_go = pair.arrival_s - times
+    end = pair.track_m[:, -1]
+    half = np.divide(end, np.linalg.norm(end), out=np.zeros_like(end), where=end != 0.0) @ pair.track_m
+    to_go = pair.arrival_s - pair.times_s
     alike_until = pair.arrival_s - pair.last_common_step * model.step_s
-    shown = min(_SECONDS_SHOWN * alike_until + 2.0 * model.step_s, float(to_go[0]))
+    shown = float(to_go[0]) if pair.is_single else min(_SECONDS_SHOWN * alike_until + 2.0 * model.step_s, to_go[0])
+    top = float(half[-1])
+    if not pair.is_single:
+        top = max(top, _draw_equal_measurements(axes, scenario, pair, shown))
+    given_s, sizes = later_impulses(scenario, -1 if pair.is_single else pair.last_common_step, pair.arrival_s)
+    corrected = half - np.maximum(pair.times_s[:, None] - given_s, 0.0) @ sizes
+    after = to_go <= (np.inf if pair.is_single else alike_until + 1e-9)
+    without = "no impulses" if pair.is_single else "first true state, equal impulses"
+    looks: tuple[tuple[float, dict[str, Any], str], ...] = (
+        (1.0, {"color": "#7f2704", "linestyle": "-"}, without),
+        (-1.0, {"color": "#08306b", "linestyle": (0, (4, 1.5))}, "second true state"),
+    )
+    for sign, look, name in looks[: 1 if pair.is_single else 2]:
+        axes.plot(to_go, sign * half, marker=None if pair.is_single else "o", markersize=2.2, label=name, **look)
+        axes.plot(to_go[after], sign * corrected[after], color=look["color"], linewidth=0.8, linestyle=":")
+    axes.plot([], [], color=INK, linewidth=0.8, linestyle=":", label="with the largest correction")
+    top *= 1.12
+    if not pair.is_single:
+        axes.axvline(alike_until, ymax=0.72, color=LIMIT, linewidth=0.8, linestyle="--")
+        place: dict[str, Any] = {"ha": "left", "va": "bottom", "fontsize": 7.0}
+        axes.text(alike_until, -0.93 * top, "  measurements\n  equal until here", color=LIMIT, **place)
+    _bracket(axes, shown, float(half[-1]), pair.correction_m)
+    axes.set_xlim(shown, -0.3 * shown)
+    axes.set_ylim(0.0 if pair.is_single else -top, 1.4 * top if pair.is_single else top)
+    axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
+    axes.set_xlabel("time to arrival, s")
+    what = "offset" if scenario.is_spatial else "$z$"
+    if pair.is_single:
+        axes.set_title("(b) true state that proves the bound")
+        axes.set_ylabel(f"{what} without impulses, m")
+    else:
+        axes.set_title("(b) pair of true states that proves the bound")
+        axes.set_ylabel(f"{what} relative to the midpoint, m")
+    axes.legend(loc="upper right", handlelength=2.0, borderaxespad=0.2)
+
+
+def _draw_equal_measurements(axes: Axes, scenario: Scenario, pair: TruthPair, shown: float) -> float:
+    """Draw the limits of the offset of each state with equal measurements; return the greatest one, m."""
+    model = scenario.set_model
+    end = pair.track_m[:, -1]
+    direction = np.divide(end, np.linalg.norm(end), out=np.zeros_like(end), where=end != 0.0)
     fine = np.linspace(0.0, shown, 200)
     ranges = -pair.vx_m_s * fine
     bounds = np.array([model.angle_sensor.axis(name).error_bound(ranges) for name in model.axes])
     corridor = np.abs(direction) @ bounds * ranges
-    seen = fine >= alike_until
+    seen = fine >= pair.arrival_s - pair.last_common_step * model.step_s
     axes.fill_between(
         fine[seen], -corridor[seen], corridor[seen], facecolor=SET_FILL, linewidth=0.0, label="equal measurements"
     )
     axes.plot(fine, corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
     axes.plot(fine, -corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
-    half = 0.5 * direction @ difference
-    corrected = half - _correction(scenario, pair.last_common_step, times)
-    after = to_go <= alike_until + 1e-9
-    looks: tuple[tuple[float, dict[str, Any], str], ...] = (
-        (1.0, {"color": "#7f2704", "linestyle": "-"}, "first true state, equal impulses"),
-        (-1.0, {"color": "#08306b", "linestyle": (0, (4, 1.5))}, "second true state"),
-    )
-    for sign, look, name in looks:
-        axes.plot(to_go, sign * half, marker="o", markersize=2.2, label=name, **look)
-        axes.plot(to_go[after], sign * corrected[after], color=look["color"], linewidth=0.8, linestyle=":")
-    axes.plot([], [], color=INK, linewidth=0.8, linestyle=":", label="with the largest correction")
-    axes.axvline(alike_until, ymax=0.72, color=LIMIT, linewidth=0.8, linestyle="--")
-    top = float(max(half[-1], corridor[-1])) * 1.12
-    place: dict[str, Any] = {"ha": "left", "va": "bottom", "fontsize": 7.0}
-    axes.text(alike_until, -0.93 * top, "  measurements\n  equal until here", color=LIMIT, **place)
-    _bracket(axes, shown, float(half[-1]), pair.correction_m)
-    axes.set_xlim(shown, -0.3 * shown)
-    axes.set_ylim(-top, top)
-    axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
-    axes.set_title("(b) pair of true states that proves the bound")
-    axes.set_xlabel("time to arrival, s")
-    axes.set_ylabel(f"{'offset' if scenario.is_spatial else '$z$'} relative to the midpoint, m")
-    axes.legend(loc="upper right", handlelength=2.0, borderaxespad=0.2)
-
-
-def _correction(scenario: Scenario, last_common_step: int, times_s: Floats) -> Floats:
-    """Displacement of a true state by the greatest impulses after a step, at each time, m."""
-    thruster = scenario.thruster
-    fired_s = times_s[last_common_step + 1 : -1]
-    left = thruster.budget_m_s - thruster.greatest_impulse_m_s * np.arange(len(fired_s))
-    sizes = np.clip(left, 0.0, thruster.greatest_impulse_m_s)
-    return np.asarray(np.maximum(times_s[:, None] - fired_s[None, :], 0.0) @ sizes)
+    return float(corridor[-1])
 
 
 def _bracket(axes: Axes, shown: float, half: float, correction: float) -> None:

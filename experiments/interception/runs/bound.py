@@ -29,9 +29,10 @@ from experiments.interception.scenario_file import scenario_to_toml, scenario_wa
 from experiments.interception.study import greatest_guarantee_m
 from guidance import Strategy
 from sim import BoundError, Record, Results, Scenario
-from sim.bound import LowerBound, TruthPair, lower_bound, pair_at
+from sim.bound import LowerBound, lower_bound, pair_at
 from sim.pair import PairFlight, fly_pair
 from sim.results import join
+from sim.truth_pair import TruthPair
 
 FIGURE = "figure-bound"
 
@@ -196,9 +197,10 @@ def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
     return {
         "label_m": pair.label_m,
         "closing_speed_m_s": -pair.vx_m_s,
+        "motions": 1 if pair.is_single else 2,
         "last_common_step": pair.last_common_step,
         "alike_until_before_arrival_s": _equal_until_s(pair, scenario),
-        **_by_axis("apart", np.abs(pair.difference_m(scenario.set_model.step_s)[1][:, -1]), scenario),
+        **_by_axis("apart", np.abs(pair.difference_m[:, -1]), scenario),
     }
 
 
@@ -226,7 +228,7 @@ def _parts(
             f"{-pair.vx_m_s / M_PER_KM:g}",
             number(pair.bound_m),
             f"{pair.label_m / M_PER_KM:.1f}",
-            f"{_equal_until_s(pair, scenario):.2f}",
+            "one motion" if pair.is_single else f"{_equal_until_s(pair, scenario):.2f}",
         )
     heads = ("pairs\n\nm", "set never\nempty\nm", "also\nempty\nm", "miss /\nbound\n", "guaranteed\n\nm")
     strategies = number_table("strategy", *heads)
@@ -247,6 +249,8 @@ def _parts(
         shape, axes = ("disc", "one axis") if scenario.set_model.angle_sensor.is_disc else ("box", "both axes")
         yield f"errors of the angles in a {shape}: the states of a pair differ along {axes}"
     yield from (bounds, "", strategies)
+    if any(pair.is_single for pair in lower.pairs):
+        yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
     yield "pairs: greatest miss of the states that prove the bound"
     searched_by = f"`infoset adversary` with --model {model} --budget {options.budget} --seed {options.seed}"
     found = f"greatest misses found by {searched_by}" if options.budget else "not searched"

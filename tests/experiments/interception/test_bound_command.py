@@ -248,7 +248,7 @@ def test_figure_of_few_labels_and_of_many(short: Scenario, planar: LowerBound) -
     pair = pair_at(short, 1745e3, -58e3)
     many = LowerBound(
         (pair,),
-        tuple(replace(pair, label_m=at, apart_m=40.0 + 2.0 * math.sin(at), correction_m=0.0) for at in places),
+        tuple(replace(pair, label_m=at, correction_m=2.0 * math.sin(at)) for at in places),
         0.005,
     )
     (left, _) = draw_bound(short, many).axes

@@ -1,0 +1,338 @@
+"""The two true motions of a lower bound with the same measurements, and the single one, for one range and speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from operator import attrgetter
+
+import numpy as np
+
+from infoset import AngleSensor
+from infoset.arrays import Floats, Integers
+from infoset.sensor import Apart
+from sim.coasting import NoArrivalError, coasting
+from sim.farthest_pair import MARGIN, PairProgram
+from sim.gravity_reserve import GravityReserve, gravity_reserve
+from sim.scenario import Scenario
+
+FEW_CANDIDATES = 16
+"""Number of last common steps up to which all are tried: between few impulses, the bound has several maxima."""
+UNLIMITED = attrgetter("unlimited_bound_m")
+
+
+@dataclass(frozen=True)
+class TruthPair:
+    """Two true motions with the same measurements up to some step that are far apart at the end, or one far motion.
+
+    Parameters
+    ----------
+    label_m : float
+        Their common range x at t = 0, m.
+    vx_m_s : float
+        Their common velocity along x at t = 0, m/s; negative.
+    is_single : bool
+        Whether the two are one motion, which all impulses of the flight do not bring to the target.
+    last_common_step : int
+        Last step whose measurements, and therefore impulses, can be the same; -1 if there is none.
+    times_s : ndarray, shape (n,)
+        Times of all steps and of the arrival at x = 0 without impulses, s.
+    track_m : ndarray, shape (axes, n)
+        Position of the first motion relative to the middle of the two then, across x, with the same impulses, m; of a
+        single motion relative to the x axis and without impulses.
+    correction_m : float
+        Greatest change of one position across x at x = 0 by the impulses after `last_common_step`, for a single motion
+        by all impulses, m.
+    reserve_m : float
+        Reserve for the second order of gravity, m; infinite if gravity is too strong for the proof.
+    cosine : float
+        Least ratio of the miss to the distance across x at x = 0, with any impulses.
+    position_m, velocity_m_s : ndarray, shape (2, 2) or (2, 3)
+        (z, x) and (V_z, V_x) of the two motions at t = 0; (y, z, x) and (V_y, V_z, V_x) in space.
+    acceleration_m_s2 : ndarray, shape (2, steps) or (2, 2, steps)
+        Accelerations of the two motions along z over each step; x = 0 is in the last step. In space, those along y
+        and z: axis, motion, step.
+    """
+
+    label_m: float
+    vx_m_s: float
+    is_single: bool
+    last_common_step: int
+    times_s: Floats
+    track_m: Floats
+    correction_m: float
+    reserve_m: float
+    cosine: float
+    position_m: Floats
+    velocity_m_s: Floats
+    acceleration_m_s2: Floats
+
+    @property
+    def bound_m(self) -> float:
+        """Least distance, m, below which at least one of the two does not come with any strategy."""
+        return max(0.0, self.unlimited_bound_m)
+
+    @property
+    def unlimited_bound_m(self) -> float:
+        """The bound without its limit at zero, m."""
+        return (float(np.hypot.reduce(self.track_m[:, -1])) - self.correction_m - self.reserve_m) * self.cosine
+
+    @property
+    def apart_m(self) -> float:
+        """Distance of the two across x at the arrival, with the same impulses, m."""
+        return float(np.hypot.reduce(self.difference_m[:, -1]))
+
+    @property
+    def arrival_s(self) -> float:
+        """Time when x = 0 without impulses, s."""
+        return float(self.times_s[-1])
+
+    @property
+    def difference_m(self) -> Floats:
+        """Difference of the two motions across x at `times_s`, first minus second, shape (axes, n), m."""
+        return np.zeros_like(self.track_m) if self.is_single else 2.0 * self.track_m
+
+
+class Approach:
+    """Data of one label and velocity that all its motions use.
+
+    `choices` are the axes along which the motions of a pair differ: all at once if the errors of the angle are in a
+    box, one of them in a disc. `motion` is in the middle of the box of starts, without impulses.
+    """
+
+    def __init__(self, scenario: Scenario, label_m: float, vx_m_s: float) -> None:
+        model = scenario.set_model
+        self.scenario, self.label_m, self.vx_m_s = scenario, label_m, vx_m_s
+        self._models = [model.axis(name) for name in model.axes]
+        self.lateral = len(self._models)
+        ends = np.array([(planar.bounds.z_m, planar.bounds.vz_m_s) for planar in self._models]).swapaxes(0, 1)
+        self._middle, self._widths = ends.mean(axis=-1), np.ptp(ends, axis=-1)
+        start = np.append(self._middle[0], label_m), np.append(self._middle[1], vx_m_s)
+        self.arrives = True
+        try:
+            self.motion = coasting(*start, scenario.sun, model.step_s)
+        except NoArrivalError:
+            self.motion, self.arrives = coasting(*start, None, model.step_s), False
+        self.steps = len(self.motion.range_m)
+        self._due: dict[str, Integers] = {}
+        for name, sensor in scenario.sensors.items():
+            due = np.arange(0, self.steps, model.steps_in(sensor.period_s))
+            before_s = (scenario.nominal_arrival_s - self.motion.times_s[due]).tolist()
+            self._due[name] = due[[sensor.measures_at(each_s) for each_s in before_s]]
+        self._programs: list[PairProgram] = []
+        for i, planar in enumerate(self._models):
+            sensors = {**scenario.sensors, AngleSensor.name: planar.angle_sensor}
+            program = PairProgram(planar, sensors, self._due, self.motion, i)
+            # Two axes that are alike have one linear program.
+            self._programs.append(next(filter(program.is_like, self._programs), program))
+        every = tuple(range(self.lateral))
+        self.choices = [(i,) for i in every] if model.angle_sensor.is_disc else [every]
+
+    def best_pair(self, try_first_before_s: float | None = None) -> TruthPair:
+        """Return the best pair over the last common step, by a search that starts at a time before arrival, s."""
+        candidates = self.candidates
+        if self.scenario.thruster.impulses_s and len(candidates) <= FEW_CANDIDATES:
+            every = [self.pair(step, axes) for axes in self.choices for step in candidates.tolist()]
+            return max(every, key=UNLIMITED)
+        start = len(candidates) - 1
+        if try_first_before_s is not None:
+            wanted = (self.motion.arrival_s - try_first_before_s) / self.scenario.set_model.step_s
+            start = int(np.abs(candidates - wanted).argmin())
+        pairs = [_climb(partial(self.pair, axes=axes), candidates, start) for axes in self.choices]
+        return max(pairs, key=UNLIMITED)
+
+    @property
+    def candidates(self) -> Integers:
+        """Last common steps that may be the best: those before a measurement, and the end."""
+        measured = np.logical_or.reduce([program.is_measured for program in self._programs])
+        last = np.append(np.flatnonzero(measured) - 1, self.steps - 1).astype(np.int64)
+        thruster, steps = self.scenario.thruster, self.scenario.impulse_steps
+        if steps is None:
+            return last
+        # Between two decisions, more common measurements only bring the motions nearer to each other.
+        after_decisions = np.searchsorted(last, np.array(steps) - thruster.delay_steps)
+        return np.asarray(last[np.unique(np.append(0, np.minimum(after_decisions, len(last) - 1)))])
+
+    def _correction_m(self, last_common_step: int, late_s: float, reserve: GravityReserve) -> tuple[float, float]:
+        """Return the greatest change of the miss by impulses that are decided after a step, within the budget, m.
+
+        The first value is that on straight lines until an arrival that is late, the second one what gravity adds to it.
+        """
+        latest_s = self.motion.arrival_s + late_s
+        given_s, sizes = later_impulses(self.scenario, last_common_step, latest_s)
+        arms_s = latest_s - given_s
+        return float(sizes @ arms_s), reserve.stretch_per_s2 * float(sizes @ arms_s**3)
+
+    def pair(self, last_common_step: int, axes: Sequence[int]) -> TruthPair:
+        """Return the pair with the greatest distance at the end of those with the same measurements up to a step."""
+        offset, velocity = np.zeros((2, self.lateral))
+        acceleration = np.zeros((self.lateral, self.steps))
+        farthest = {each: each.farthest(last_common_step) for each in {self._programs[i] for i in axes}}
+        for i in axes:
+            offset[i], velocity[i], acceleration[i] = farthest[self._programs[i]]
+        difference = self.motion.difference(offset, velocity, acceleration)
+        half_m = 0.5 * float(np.hypot.reduce(difference[: self.lateral, -1]))
+        start, sides = 0.5 * np.stack([offset, velocity]), np.array([1.0, -1.0])
+        reserve = self._reserve(difference, half_m)
+        if reserve is None:
+            return self._truths(last_common_step, 0.5 * difference, start, 0.5 * acceleration, sides)
+        correction_m, longer_m = self._correction_m(last_common_step, reserve.late_s, reserve)
+        speeds = np.abs(self._middle[1]) + np.abs(start[1]) + 0.5 * self._by_manoeuvre(acceleration)
+        slope = self._slope(speeds, reserve)
+        beyond_m = reserve.position_m + reserve.drift_m
+        along_m = 0.5 * (abs(float(difference[self.lateral, -1])) + beyond_m) + longer_m
+        left_m = max(0.0, half_m - correction_m)
+        share = 0.5 * self._admissible_share(last_common_step, difference, reserve, slope, left_m)
+        return self._truths(
+            *(last_common_step, share * difference, 2.0 * share * start, share * acceleration, sides),
+            correction_m=correction_m,
+            reserve_m=0.5 * beyond_m + longer_m + slope * along_m,
+            slope=slope,
+        )
+
+    def single(self) -> TruthPair:
+        """Return the motion that is farthest from the target at x = 0 without impulses."""
+        motion = self.motion
+        onward, lateral = motion.transition[-1], slice(0, self.lateral)
+        pushed = np.einsum("rs,nsw->rwn", onward, np.diff(motion.pushed, axis=0))
+        side = np.where(motion.states[lateral, -1] < 0.0, -1.0, 1.0)
+        by_start = np.stack([np.diag(onward[lateral, lateral]), np.diag(onward[lateral, motion.axes : -1])])
+        start = 0.5 * side * self._widths * np.where(by_start < 0.0, -1.0, 1.0)
+        by_push = np.stack([pushed[i, i] for i in range(self.lateral)])
+        greatest = np.array([planar.disturbance_m_s2 for planar in self._models])
+        acceleration = (side * greatest)[:, None] * np.where(by_push < 0.0, -1.0, 1.0)
+        change = motion.difference(start[0], start[1], acceleration)
+        track, last = motion.states + change, self.steps - 1
+        far_m = float(np.hypot.reduce(track[lateral, -1]))
+        reserve = self._reserve(2.0 * change, far_m)
+        if reserve is None:
+            return self._truths(last, track, start, acceleration, np.ones(2))
+        along_m = reserve.nearer_m[-1] + abs(change[self.lateral, -1]) + 0.5 * reserve.position_m
+        correction_m, longer_m = self._correction_m(-1, float(along_m) / reserve.closing_m_s, reserve)
+        slope = self._slope(np.abs(self._middle[1] + start[1]) + self._by_manoeuvre(acceleration), reserve)
+        return self._truths(
+            *(last, track, start, acceleration, np.ones(2)),
+            correction_m=correction_m,
+            reserve_m=0.5 * reserve.position_m + longer_m + slope * float(along_m),
+            slope=slope,
+        )
+
+    def _reserve(self, difference: Floats, reach_m: float) -> GravityReserve | None:
+        """Return the reserve for gravity, or None if gravity is too strong for the proof."""
+        if not self.arrives:
+            return None
+        scenario = self.scenario
+        disturbance = math.hypot(*(planar.disturbance_m_s2 for planar in self._models))
+        step_s = scenario.set_model.step_s
+        return gravity_reserve(self.motion, difference, reach_m, disturbance, scenario.sun, scenario.thruster, step_s)
+
+    def _by_manoeuvre(self, acceleration: Floats) -> Floats:
+        """Return the greatest changes of velocity by accelerations, along each axis, m/s."""
+        return np.asarray(np.abs(acceleration).sum(axis=1) * self.scenario.set_model.step_s)
+
+    def _slope(self, speeds_m_s: Floats, reserve: GravityReserve) -> float:
+        """Return the greatest ratio of the velocities across and along x, from those along the axes by the target."""
+        across_m_s = float(np.hypot.reduce(speeds_m_s)) + reserve.impulses_m_s + reserve.across_m_s
+        return across_m_s / reserve.closing_m_s
+
+    def _truths(
+        self,
+        last_common_step: int,
+        track: Floats,
+        start: Floats,
+        acceleration: Floats,
+        sides: Floats,
+        *,
+        correction_m: float = 0.0,
+        reserve_m: float = math.inf,
+        slope: float = 0.0,
+    ) -> TruthPair:
+        """Return the motions with a start and an acceleration relative to the middle of the box, times `sides`."""
+        positions, velocities = (self._middle[i] + np.outer(sides, start[i]) for i in range(2))
+        pushes = sides[:, None] * acceleration[:, None, :]
+        return TruthPair(
+            self.label_m,
+            self.vx_m_s,
+            bool(sides[0] == sides[1]),
+            last_common_step,
+            self.motion.times_s,
+            track[: self.lateral],
+            correction_m,
+            reserve_m,
+            1.0 / math.hypot(1.0, slope),
+            np.column_stack([positions, np.full(2, self.label_m)]),
+            np.column_stack([velocities, np.full(2, self.vx_m_s)]),
+            pushes if self.scenario.is_spatial else pushes[0],
+        )
+
+    def _admissible_share(
+        self, last_common_step: int, difference: Floats, reserve: GravityReserve, slope: float, left_m: float
+    ) -> float:
+        """Return the share of a difference, at most 1, with which all measurements up to a step can be the same.
+
+        The linear programs neglect the square of the slope of the line of sight, and what impulses change in gravity.
+        """
+        motion, axes, greatest = self.motion, self.motion.axes, 1.0 - MARGIN
+        for name, sensor in self.scenario.sensors.items():
+            due = self._due[name][self._due[name] <= last_common_step]
+            x, c, apart = motion.range_m[due], motion.closing_speed_m_s[due], np.abs(difference[:, due])
+            shift = apart[self.lateral] + reserve.position_m
+            moved = 0.5 * shift + reserve.nearer_m[due]
+            nearest, farthest, fastest = x - moved, x + moved, c + reserve.deviation_m_s
+            if (nearest <= 0.0).any():
+                return 0.0
+            q = slope + left_m / nearest
+            # Equation (24) of docs/guarantee.md, from the difference of the predicted misses to first order.
+            to_go, rates = x / c, apart[axes:] + reserve.speed_m_s
+            mistimed = (moved + to_go * reserve.deviation_m_s) / reserve.closing_m_s
+            turned = 1.0 + (1.0 + fastest / reserve.closing_m_s) * farthest / nearest
+            beyond = reserve.position_m + reserve.speed_m_s * to_go + rates[: self.lateral] * mistimed
+            beyond = beyond + q * (turned * shift + rates[-1] * farthest / reserve.closing_m_s)
+            misses = np.abs(difference[: self.lateral, due] + difference[axes:-1, due] * to_go)
+            seen = Apart(
+                offset_m=apart[: self.lateral] + reserve.position_m + q * shift,
+                predicted_miss_m=misses + beyond,
+                shift_m=shift,
+                range_m=nearest,
+                farthest_m=farthest * np.hypot(1.0, q),
+                slope=q,
+                closing_speed_m_s=fastest,
+            )
+            greatest = max(greatest, float(sensor.share(seen).max(initial=0.0)))
+        return (1.0 - MARGIN) / greatest
+
+
+def later_impulses(scenario: Scenario, last_common_step: int, until_s: float) -> tuple[Floats, Floats]:
+    """Return times, s, and sizes, m/s, of the greatest impulses that are decided after a step: the earliest first."""
+    thruster, steps, step_s = scenario.thruster, scenario.impulse_steps, scenario.set_model.step_s
+    given = np.arange(thruster.delay_steps, math.ceil(until_s / step_s)) if steps is None else np.array(steps)
+    given_s: Floats = step_s * given[given > last_common_step + thruster.delay_steps].astype(np.float64)
+    given_s = given_s[given_s < until_s]
+    left = thruster.budget_m_s - thruster.greatest_impulse_m_s * np.arange(len(given_s))
+    return given_s, np.clip(left, 0.0, thruster.greatest_impulse_m_s)
+
+
+def _climb(pair_of: Callable[[int], TruthPair], candidates: Integers, start: int) -> TruthPair:
+    """Return the pair at a local maximum over candidates, found from an index with strides that double and halve.
+
+    The distance grows linearly and the correction quadratically, so the bound has one maximum.
+    """
+    known: dict[int, TruthPair] = {}
+
+    def value(index: int) -> float:
+        if not 0 <= index < len(candidates):
+            return -np.inf
+        if index not in known:
+            known[index] = pair_of(int(candidates[index]))
+        return known[index].unlimited_bound_m
+
+    at, stride = start, 1
+    while stride:
+        better = next((index for index in (at - stride, at + stride) if value(index) > value(at)), None)
+        if better is None:
+            stride //= 2
+        else:
+            at, stride = better, 2 * stride
+    return known[at]
