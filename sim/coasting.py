@@ -43,8 +43,8 @@ class Coasting:
     pushed : ndarray, shape (n, 2 C, C - 1)
         Integral of Phi^-1 over time for a unit acceleration along each lateral axis.
     nearest_m, speed_m_s : float
-        Least distance and greatest velocity of spacecraft and object relative to the Sun, at these times; infinite and
-        zero in free space.
+        Least distance of the segment between spacecraft and object from the Sun, and greatest velocity of the two
+        relative to it, at these times; infinite and zero in free space.
     """
 
     times_s: Floats
@@ -185,13 +185,15 @@ def _kepler(position_m: Floats, velocity_m_s: Floats, sun: Sun, step_s: float) -
     units = np.repeat([metres, metres / seconds], axes)
     states = units[:, None] * apart[chosen]
     states[axes - 1, -1] = 0.0
-    both = (own, own + apart)
+    share = np.clip(-(own[:3] * apart[:3]).sum(axis=0) / (apart[:3] ** 2).sum(axis=0), 0.0, 1.0)
+    nearest = float(np.linalg.norm(own[:3] + share * apart[:3], axis=0).min())
+    fastest = max(float(np.linalg.norm(each, axis=0).max()) for each in (own[3:], own[3:] + apart[3:]))
     return Coasting(
         times_s,
         states,
         np.moveaxis(transition[np.ix_(chosen, chosen)], -1, 0) * (units[:, None] / units),
         np.moveaxis(found[48:].reshape(6, 2, -1)[chosen][:, 3 - axes :], -1, 0)
         * (units * seconds**2 / metres)[:, None],
-        metres * min(float(np.linalg.norm(body[:3], axis=0).min()) for body in both),
-        metres / seconds * max(float(np.linalg.norm(body[3:], axis=0).max()) for body in both),
+        metres * nearest,
+        metres / seconds * fastest,
     )

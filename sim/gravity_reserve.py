@@ -12,6 +12,9 @@ from infoset.arrays import Floats
 from sim.coasting import Coasting
 from sim.scenario import Sun
 
+ROUNDING = 1e-12
+"""Part of a step by which a time may be before a step and still belong to it."""
+
 
 @dataclass(frozen=True)
 class GravityReserve:
@@ -80,13 +83,13 @@ def gravity_reserve(
     axes, arrival_s, closing = motion.axes, motion.arrival_s, motion.closing_speed_m_s
 
     def impulses_until(end_s: float) -> float:
-        return min(thruster.budget_m_s, thruster.greatest_impulse_m_s * (end_s / step_s + 1.0))
+        steps = math.floor(end_s / step_s * (1.0 + ROUNDING)) + 1
+        return min(thruster.budget_m_s, thruster.greatest_impulse_m_s * steps)
 
     if sun is None:
-        nothing = np.zeros(len(closing))
-        return GravityReserve(
-            *(0.0, 0.0, 0.0, float(closing.min()), 0.0, nothing, 0.0, 0.0, impulses_until(arrival_s), 0.0)
-        )
+        nothing, least = np.zeros(len(closing)), float(closing.min())
+        impulses = impulses_until(arrival_s + reach_m / least)
+        return GravityReserve(0.0, 0.0, 0.0, least, 0.0, nothing, 0.0, 0.0, impulses, 0.0)
     parameter, near = sun.gravitational_parameter_m3_s2, motion.nearest_m
     half, rate = (0.5 * np.linalg.norm(part, axis=0) for part in (difference[:axes], difference[axes:]))
     # The proof needs all bounds until the closest approach, some time after x = 0: gap bounds it, as is checked below.

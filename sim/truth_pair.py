@@ -204,7 +204,7 @@ class Approach:
         greatest = np.array([planar.disturbance_m_s2 for planar in self._models])
         acceleration = (side * greatest)[:, None] * np.where(by_push < 0.0, -1.0, 1.0)
         change = motion.difference(start[0], start[1], acceleration)
-        track, last = motion.states + change, self.steps - 1
+        track, last = (1.0 - MARGIN) * (motion.states + change), self.steps - 1
         far_m = float(np.hypot.reduce(track[lateral, -1]))
         reserve = self._reserve(2.0 * change, far_m)
         if reserve is None:

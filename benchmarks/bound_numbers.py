@@ -1,0 +1,60 @@
+"""Lower bounds under gravity and from a far start: the tables of docs/guarantee.md, `python -m benchmarks.bound_numbers`.
+
+Gravity: 2 km/s with the Sun at 60 million km across the approach, an image each 200 s with 5 urad and 5 m, a start
+within 10 km of the x axis, and impulses of at most 2 m/s until 2000 s before the arrival. 2 G T^2 is the change of the
+closing speed by gravity, as a share. Far start: the approach of 1997 from z = 8 to 10 km with known range and speed and
+impulses of at most 0.5 m/s.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+
+from experiments import load_scenario
+from guidance import Thruster
+from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
+from sim import Scenario, Sun
+from sim.bound import lower_bound
+
+RANGES_KM = (60e3, 140e3, 190e3, 200e3, 300e3, 400e3)
+SUN = Sun(1.324948e20, 60e9, 0.5 * math.pi)
+
+
+def slow(range_km: float) -> Scenario:
+    """Return the slow approach from a range."""
+    range_m = 1e3 * range_km
+    box = StateBox((-1e4, 1e4), (range_m - 500.0, range_m + 500.0), (-0.1, 0.1), (-2000.01, -1999.99))
+    sensor = AngleSensor(200.0, 5e-6, 5e-6, range_m, centroid_error_m=5.0)
+    model = SetModel(2e3, 200.0, box, sensor, range_threshold_m=1e5, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    thruster = Thruster(30.0, 1e-4, 2.0, last_impulse_s=2000.0)
+    return Scenario("slow", "", SUN, range_m, box, model, None, thruster)
+
+
+def far() -> Scenario:
+    """Return the approach of 1997 from a far start with a weak engine."""
+    published = load_scenario("asteroid-1997")
+    box = StateBox((8e3, 10e3), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
+    model = replace(published.set_model, bounds=box, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    thruster = replace(published.thruster, greatest_impulse_m_s=0.5)
+    return replace(published, sun=None, dispersion=box, set_model=model, thruster=thruster)
+
+
+def main() -> None:
+    """Compute and print."""
+    for range_km in RANGES_KM:
+        scenario = slow(range_km)
+        change = 2.0 * SUN.gravitational_parameter_m3_s2 / SUN.distance_m**3 * scenario.nominal_arrival_s**2
+        found, free = lower_bound(scenario), lower_bound(replace(scenario, sun=None))
+        sys.stdout.write(
+            f"{range_km:8.0f} km   2 G T^2 {change:6.2%}   bound {found.bound_m:6.2f} m   reserve "
+            f"{found.pair.reserve_m:.3f} m   without gravity {free.bound_m:6.2f} m\n"
+        )
+    found = lower_bound(far())
+    motions = "one motion" if found.pair.is_single else "two motions"
+    sys.stdout.write(f"far start: bound {found.bound_m:.1f} m, by {motions}\n")
+
+
+if __name__ == "__main__":
+    main()
