@@ -1,4 +1,4 @@
-"""Lower bounds under gravity and from a far start: the tables of docs/guarantee.md, `python -m benchmarks.bound_numbers`.
+"""Lower bounds under gravity and from a far start, for docs/guarantee.md: `python -m benchmarks.bound_numbers`.
 
 Gravity: 2 km/s with the Sun at 60 million km across the approach, an image each 200 s with 5 urad and 5 m, a start
 within 10 km of the x axis, and impulses of at most 2 m/s until 2000 s before the arrival. 2 G T^2 is the change of the

@@ -284,7 +284,7 @@ class Approach:
             if (nearest <= 0.0).any():
                 return 0.0
             q = slope + left_m / nearest
-            # Equation (24) of docs/guarantee.md, from the difference of the predicted misses to first order.
+            # Equation (26) of docs/guarantee.md, from the difference of the predicted misses to first order.
             to_go, rates = x / c, apart[axes:] + reserve.speed_m_s
             mistimed = (moved + to_go * reserve.deviation_m_s) / reserve.closing_m_s
             turned = 1.0 + (1.0 + fastest / reserve.closing_m_s) * farthest / nearest

@@ -228,11 +228,10 @@ def aimed(scenario: Scenario) -> Scenario:
         start = [np.array([np.mean(interval) for interval in part]) for part in _intervals(box)]
         motion = coasting(start[0], start[1], scenario.sun, scenario.set_model.step_s)
         moved = [
-            tuple(float(end - miss / motion.arrival_s) for end in interval)
-            for interval, miss in zip(_intervals(box)[1][:-1], motion.states[:-1, -1], strict=False)
+            (float(low - miss / motion.arrival_s), float(high - miss / motion.arrival_s))
+            for (low, high), miss in zip(_intervals(box)[1][:-1], motion.states[:-1, -1], strict=False)
         ]
-        names = [f"v{name}_m_s" for name in scenario.set_model.axes]
-        box = replace(box, **dict(zip(names, moved, strict=True)))
+        box = replace(box, vz_m_s=moved[-1], vy_m_s=moved[0] if len(moved) > 1 else None)
     return replace(scenario, set_model=replace(scenario.set_model, bounds=box), dispersion=box)
 
 
@@ -252,11 +251,10 @@ def skew() -> Scenario:
     """In space, with the Sun in no plane of the axes, a gimbal, manoeuvres, rates and ranges; 2 G T^2 = 4 %."""
     scenario = in_space(strong(6.0), convention=Convention.GIMBAL)
     model = replace(scenario.set_model, disturbance_m_s2=1e-8)
-    sun = replace(scenario.sun, direction_rad=1.0, elevation_rad=0.6)
     return replace(
         scenario,
         set_model=model,
-        sun=sun,
+        sun=Sun(6.0 * SUN, 60e9, 1.0, 0.6),
         rate_sensor=RateSensor(400.0, 2e-9),
         range_sensor=RangeSensor(600.0, 2e-4),
     )
@@ -327,7 +325,7 @@ def test_the_bound_of_pairs_changes_gradually_with_gravity() -> None:
 
 def test_transition_matrices_are_those_of_two_body_gravity() -> None:
     """Differences of two integrated motions, with a manoeuvre, along all axes; 2 G T^2 is 24 %."""
-    scenario = replace(skew(), sun=replace(skew().sun, gravitational_parameter_m3_s2=40.0 * SUN))
+    scenario = replace(skew(), sun=Sun(40.0 * SUN, 60e9, 1.0, 0.6))
     pair = pair_at(scenario, 140000.5e3, -1999.99, last_common_step=200)
     both = [TrueFlight(scenario, pair, which) for which in range(2)]
     states = [each.fly(float(pair.times_s[-2])) for each in both]
