@@ -97,7 +97,7 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
 
     The manoeuvres of a pair may differ. Under gravity the difference of the two follows the state-transition matrices
     of the motion in their middle. The bound has a reserve for the second order and for what impulses change in gravity,
-    and is zero if gravity changes the closing speed so much that the reserve is not proved, by about half of itself.
+    and is zero if gravity is too strong for the proof of the reserve.
 
     In space, each axis has a linear program, and the impulses limit the modulus. If the errors of the angles are in a
     box, the two motions of a pair differ along both axes, each by the most that its program allows: |(dy(T), dz(T))|
