@@ -1,9 +1,9 @@
-"""Misses that images of a camera leave possible: closed forms without disturbance, for a known range and speed."""
+"""Misses that images of a camera leave possible: closed forms for a known range and closing speed."""
 
 from __future__ import annotations
 
 import math
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,21 +21,58 @@ def possible_miss_m(
     first_image_s: float,
     last_image_s: FloatOrFloats,
     *,
+    disturbance_m_s2: float = 0.0,
     constant_bias: bool = False,
 ) -> FloatOrFloats:
     """Return half the greatest width of the interval of misses along one axis that images leave possible, m.
 
-    It is also the greatest miss after an impulse that centres this interval exactly. With the closing speed e, the
-    pixel error beta, the centroid error c, and the times t_f and t_c before the arrival of the first and the last
-    image, s, it is 2 beta e t_c/(1 - t_c/t_f) + c (1 + t_c/t_f)/(1 - t_c/t_f). With `constant_bias` the second term is
-    c: the interval is that of a set that knows that the centroid error is constant, which the information set does not
-    know. docs/guarantee.md contains the proof (Lemma 17).
+    It is also the greatest miss after an impulse that centres this interval exactly.
+
+    Parameters
+    ----------
+    closing_speed_m_s, pixel_error_rad, centroid_error_m : float
+        e, p and c: at the distance d the error bound of an image is p + c / d.
+    first_image_s, last_image_s : float
+        t_f and t_c, times before the arrival of the first image and of the last one before the last impulse, s.
+    disturbance_m_s2 : float
+        Bound nu of the acceleration of the target along the axis, m/s^2.
+    constant_bias : bool
+        Whether the centroid error is one constant of the flight. Then the result is that of a set that knows this,
+        which the information set does not know.
+
+    Raises
+    ------
+    ValueError
+        If the first image is not before the last one.
+
+    Notes
+    -----
+    Let 2 d be the difference of two motions with the same images, and u the time before the last image. Then |d| is at
+    most b0 + p e u, with the bound b0 = p e t_c + c of the last image, and the second derivative of d at most nu. From
+    d = b0 at the last image and a slope s/2 there, d is at most b0 - s u / 2 + nu u^2 / 2 before it, which must not be
+    below -b0 - p e u. So s is at most 4 b0 / u + 2 p e + nu u at each image. The least value of this is at
+    u = 2 sqrt(b0 / nu), or at the first image, u = t_f - t_c, if that is later; and the miss is
+    M = b0 + s t_c / 2 + nu t_c^2 / 2:
+
+        2 p e t_c + c + 2 t_c sqrt(nu b0) + nu t_c^2 / 2   if 2 sqrt(b0 / nu) <= t_f - t_c,
+        b0 + (2 b0 / u + p e + nu u / 2) t_c + nu t_c^2 / 2   with u = t_f - t_c otherwise.
+
+    A constant centroid error is the same difference c at all images: b0 is then p e t_c, and c is added to M.
+    docs/guarantee.md contains the proof (Lemma 17).
     """
-    share = last_image_s / first_image_s
-    of_pixels = 2.0 * pixel_error_rad * closing_speed_m_s * last_image_s / (1.0 - share)
-    if constant_bias:
-        return of_pixels + centroid_error_m
-    return of_pixels + centroid_error_m * (1.0 + share) / (1.0 - share)
+    arc_s = first_image_s - last_image_s
+    if np.any(arc_s <= 0.0):
+        raise ValueError(f"the first image, {first_image_s:g} s before the arrival, must be before the last image")
+    of_pixel_m_s = pixel_error_rad * closing_speed_m_s
+    bound_m = of_pixel_m_s * last_image_s + (0.0 if constant_bias else centroid_error_m)
+    slope_m_s: Any = 2.0 * of_pixel_m_s + np.where(
+        4.0 * bound_m <= disturbance_m_s2 * arc_s**2,
+        4.0 * np.sqrt(disturbance_m_s2 * bound_m),
+        4.0 * bound_m / arc_s + disturbance_m_s2 * arc_s,
+    )
+    constant_m = centroid_error_m if constant_bias else 0.0
+    miss_m: FloatOrFloats = constant_m + bound_m + 0.5 * last_image_s * (slope_m_s + disturbance_m_s2 * last_image_s)
+    return miss_m
 
 
 def _images_s(scenario: Scenario) -> list[float]:
@@ -100,13 +137,14 @@ def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) ->
     return np.asarray(bound_m[-1] - 0.5 * speed_m_s * times_s + 0.5 * disturbance * times_s**2, dtype=np.float64)
 
 
-def possible_miss_of(scenario: Scenario) -> float:
+def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> float:
     """Return `possible_miss_m` of the camera and the last impulse of a scenario, m: in space that of both axes at once.
 
-    A ValueError is raised if the angle sensor is not a camera, images can be lost, or there are fewer than two images
-    before the last impulse.
+    The disturbance is `set_model.disturbance_m_s2` of each axis. A ValueError is raised if the angle sensor is not a
+    camera, images can be lost, or there are fewer than two images before the last impulse.
     """
-    camera = scenario.set_model.angle_sensor
+    model = scenario.set_model
+    camera = model.angle_sensor
     if camera.centroid_error_m is None:
         raise ValueError("the closed form is that of a camera: set angle_sensor.pixel_error_rad and centroid_error_m")
     if camera.miss_probability > 0.0:
@@ -114,6 +152,16 @@ def possible_miss_of(scenario: Scenario) -> float:
             "the closed form is that of a camera that loses no image: set angle_sensor.miss_probability = 0"
         )
     first_s, last_s = images_s(scenario)
-    speed_m_s, axes = scenario.set_model.closing_speed_m_s, len(scenario.set_model.axes)
-    along_one = possible_miss_m(speed_m_s, camera.pixel_error_rad, camera.centroid_error_m, first_s, last_s)
-    return math.sqrt(axes) * along_one
+    along = (
+        possible_miss_m(
+            model.closing_speed_m_s,
+            camera.pixel_error_rad,
+            camera.centroid_error_m,
+            first_s,
+            last_s,
+            disturbance_m_s2=model.axis(axis).disturbance_m_s2,
+            constant_bias=constant_bias,
+        )
+        for axis in model.axes
+    )
+    return math.hypot(*along)

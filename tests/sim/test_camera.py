@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from experiments import load_scenario
 from guidance import NoiseKind, Situation, Thruster, TieRule
 from infoset import (
     AngleSensor,
@@ -30,7 +31,7 @@ from infoset.section_law import section_laws
 from infoset.section_life import slope_band
 from sim import Record, Results, Scenario, fly_one, simulate
 from sim.adversary import find_worst
-from sim.bound import lower_bound
+from sim.bound import lower_bound, pair_at
 from sim.closed_form import images_s, possible_miss_m, possible_miss_of
 from sim.draws import draw
 from sim.engagement import Engagements, Step
@@ -105,6 +106,81 @@ def test_possible_miss_is_that_of_linear_programs(last_s: float, centroid_m: flo
         bias = random.uniform(-1.0, 1.0) if constant else random.uniform(-1.0, 1.0, 40)
         errors = share * PIXEL_RAD + bias * centroid_m / (SPEED_M_S * times_s)
         assert widest_m(errors, times_s, PIXEL_RAD, centroid_m, constant) <= expected * (1.0 + 1e-6)
+
+
+def widest_with_disturbance_m(
+    times_s: Floats, pixel: float, centroid_m: float, disturbance_m_s2: float, constant: bool
+) -> float:
+    """Return the greatest miss that agrees with images of zero at these times before the arrival, by a linear program.
+
+    Variables: z and V_z at the first image, the bias, and the acceleration between neighbouring images and up to the
+    arrival, each in a unit that makes the coefficients about 1.
+    """
+    events_s = np.append(times_s, 0.0)
+    since_s, lasting_s = events_s[0] - events_s, -np.diff(events_s)
+    middle_s = since_s[:-1] + 0.5 * lasting_s
+    ahead_s = np.maximum(since_s[:, None] - middle_s, 0.0)  # constant over a step: the impulse acts from its middle
+    steps = np.tril(ahead_s * lasting_s, -1) / since_s[-1] ** 2
+    of_bias = np.append(np.full(times_s.size, float(constant)), 0.0)
+    z = np.column_stack([np.ones_like(since_s), since_s / since_s[-1], of_bias, steps])
+    bound = pixel * SPEED_M_S * times_s + (0.0 if constant else centroid_m)
+    most = disturbance_m_s2 * since_s[-1] ** 2
+    limits = [(None, None), (None, None), (-centroid_m, centroid_m), *[(-most, most)] * lasting_s.size]
+    images = np.concatenate([z[:-1], -z[:-1]])
+    solved = linprog(-z[-1], A_ub=images, b_ub=np.concatenate([bound, bound]), bounds=limits)
+    assert solved.status == 0, solved.message
+    return float(-solved.fun)
+
+
+@pytest.mark.parametrize("constant", [False, True])
+@pytest.mark.parametrize(
+    ("disturbance_m_s2", "last_s", "centroid_m", "pixel"),
+    [
+        (0.0, 300.0, 12.0, PIXEL_RAD),
+        (1e-7, 300.0, 12.0, PIXEL_RAD),  # the arc is shorter than the best one
+        (2.7e-5, 3000.0, 12.0, PIXEL_RAD),
+        (1e-3, 3300.0, 3.0, PIXEL_RAD),
+        (2.7e-5, 150.0, 12.0, PIXEL_RAD),
+        (2.7e-5, 900.0, 12.0, PIXEL_RAD),
+        (1e-3, 900.0, 0.0, PIXEL_RAD),
+        (2.7e-5, 900.0, 12.0, 1e-6),
+    ],
+)
+def test_possible_miss_with_a_disturbance_is_that_of_a_linear_program(
+    disturbance_m_s2: float, last_s: float, centroid_m: float, pixel: float, constant: bool
+) -> None:
+    """400 images in place of a continuous arc leave at most 0.3 % more."""
+    times_s = np.linspace(FIRST_S, last_s, 400)
+    found = widest_with_disturbance_m(times_s, pixel, centroid_m, disturbance_m_s2, constant)
+    expected = possible_miss_m(
+        *(SPEED_M_S, pixel, centroid_m, FIRST_S, last_s),
+        disturbance_m_s2=disturbance_m_s2,
+        constant_bias=constant,
+    )
+    assert expected * (1.0 - 3e-3) <= found <= expected * (1.0 + 3e-3)
+
+
+def test_both_cases_of_the_possible_miss_agree_where_they_meet_and_none_is_for_one_image() -> None:
+    meet_m_s2 = 4.0 * (PIXEL_RAD * SPEED_M_S * LAST_S + CENTROID_M) / (FIRST_S - LAST_S) ** 2
+    less, more = (
+        possible_miss_m(SPEED_M_S, PIXEL_RAD, CENTROID_M, FIRST_S, LAST_S, disturbance_m_s2=meet_m_s2 * factor)
+        for factor in (1.0 - 1e-9, 1.0 + 1e-9)
+    )
+    assert less == pytest.approx(more, rel=1e-8)
+    assert possible_miss_m(SPEED_M_S, 0.0, 0.0, FIRST_S, LAST_S) == 0.0
+    for first_s in (LAST_S, 0.5 * LAST_S):
+        with pytest.raises(ValueError, match="before the last image"):
+            possible_miss_m(SPEED_M_S, PIXEL_RAD, CENTROID_M, first_s, LAST_S)
+
+
+@pytest.mark.parametrize(("cut_off_s", "changing_m", "constant_m"), [(150, 37.2, 33.6), (900, 197.5, 186.3)])
+def test_possible_misses_of_dart_are_those_of_pairs(cut_off_s: float, changing_m: float, constant_m: float) -> None:
+    """The program of the pair at the nominal range is another way to the same number."""
+    scenario = load_scenario("dart-2022", [f"thruster.last_impulse_s={cut_off_s}"])
+    assert possible_miss_of(scenario) == pytest.approx(changing_m, abs=0.05)
+    assert possible_miss_of(scenario, constant_bias=True) == pytest.approx(constant_m, abs=0.05)
+    pair = pair_at(scenario, scenario.nominal_range_m, -scenario.set_model.closing_speed_m_s)
+    assert possible_miss_of(scenario) == pytest.approx(pair.bound_m, rel=1e-4)
 
 
 def test_centroid_error_adds_itself_for_a_long_arc_and_less_than_twice_itself_above_three_cut_offs() -> None:
