@@ -214,6 +214,9 @@ class Verdict:
         the same; None if it is over `MOST_RUNS_NEEDED`, because the estimate is at the bound.
     known : int
         Runs with a value of the quantity; the others do not satisfy the bound.
+    quantile, bound : float or None
+        The required quantile and its bound, in the same unit. For hits, the quantile of the miss at the required share,
+        and the radius of the body; `judge` knows neither. The quantile is None if the sample does not show it.
     """
 
     decision: Decision
@@ -223,6 +226,8 @@ class Verdict:
     upper: float | None
     runs_needed: int | None
     known: int
+    quantile: float | None = None
+    bound: float | None = None
 
 
 def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verdict:
@@ -266,9 +271,11 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     value: float | None
     lower: float | None
     upper: float | None
+    compared: tuple[float | None, float | None] = None, None
     if isinstance(requirement, Requirement):
         with np.errstate(invalid="ignore"):  # infinite values
             value = _finite(np.quantile(values, share)) if shows(size, share) else None
+        compared = value, requirement.bound
         lower, upper = _quantile_interval(values, int(fewest_met[-1]), int(most_missed[-1]))
     else:
         estimate = estimate_hits(int(holding[-1]), size, CONFIDENCE)
@@ -281,14 +288,14 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     decided = np.flatnonzero(met | missed)
     if not decided.size:
         needed = runs_needed(int(holding[-1]), size, share)
-        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed, known)
+        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed, known, *compared)
     decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
     # A decision at an earlier run stays valid, although the last interval may contain the bound again.
     if (decision is Decision.MET) == isinstance(requirement, Requirement):
         upper = requirement.bound if upper is None else min(upper, requirement.bound)
     else:
         lower = requirement.bound if lower is None else max(lower, requirement.bound)
-    return Verdict(decision, size, value, lower, upper, size, known)
+    return Verdict(decision, size, value, lower, upper, size, known, *compared)
 
 
 def _quantile_interval(values: Floats, fewest_met: int, most_missed: int) -> tuple[float | None, float | None]:

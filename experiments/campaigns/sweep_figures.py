@@ -25,6 +25,7 @@ from experiments.campaigns.sweep_table import (
     QUANTITY_NAMES,
     Limit,
     SweepTable,
+    above_bound,
     answers,
     interpolated_text,
     limits,
@@ -274,8 +275,8 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
     ]
     drawn = {line.get_color() for line in first.lines}
     names = (
-        (_LINE, "limit by interpolation of the estimates"),
-        (_CLOSED_FORM, "closed form: worst errors, no disturbance, no later images"),
+        (_LINE, "limit by interpolation of the quantiles"),
+        (_CLOSED_FORM, "closed form: worst errors, no later images"),
     )
     handles += [Line2D([], [], label=name, **look) for look, name in names if look["color"] in drawn]
     figure.legend(
@@ -320,22 +321,23 @@ def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
     axes.grid(visible=False)
     for row, height in enumerate(_heights(up, _BAR_AT)):
         cells = [verdicts[column * shape[1] + row] for column in range(shape[0])]
-        for limit in limits(across, cells, table.required):
+        for limit in limits(across, cells):
             ends = [limit.lower, limit.upper]
             axes.plot(ends, [height, height], color="white", linewidth=3.2, solid_capstyle="butt", zorder=4.0)
             axes.plot(ends, [height, height], color=IMPULSE, linewidth=1.5, solid_capstyle="butt", zorder=4.5)
-    values = np.ma.MaskedArray(
-        [0.0 if verdict is None else verdict.value or 0.0 for verdict in verdicts],
-        mask=[verdict is None or verdict.value is None for verdict in verdicts],
-    ).reshape(shape)
-    closed = [math.nan if value is None else value for value in table.closed_form_m] or np.full(shape, math.nan)
-    grids = [(np.ma.masked_invalid(np.reshape(closed, shape)), _CLOSED_FORM)]
-    if {Decision.MET, Decision.NOT_MET} <= {verdict.decision for verdict in verdicts if verdict is not None}:
-        grids.append((values, _LINE))
+    values = _masked([None if verdict is None else verdict.value for verdict in verdicts], shape)
+    compared = [(None, None) if verdict is None else (verdict.quantile, verdict.bound) for verdict in verdicts]
+    log_values = spans_decades([quantile for quantile, _ in compared if quantile is not None])
     halo = [Stroke(linewidth=2.6, foreground="white"), Normal()]
-    for grid, look in grids:
-        for line in bound_lines(across, up, grid, table.required, spans_decades(values.compressed().tolist())):
+
+    def draw(pairs: Sequence[tuple[float | None, float | None]], look: dict[str, Any]) -> None:
+        for line in zero_lines(across, up, _masked([above_bound(*pair, log_values) for pair in pairs], shape)):
             axes.plot(*line.T, zorder=3.5, path_effects=halo, **look)
+
+    if table.closed_form_m:
+        draw([(value, table.required.bound) for value in table.closed_form_m], _CLOSED_FORM)
+    if {Decision.MET, Decision.NOT_MET} <= {verdict.decision for verdict in verdicts if verdict is not None}:
+        draw(compared, _LINE)
     _write_numbers(axes, across, up, values.T, lambda row, column: shown[column, row] == 0, _clear_heights(axes, table))
     for text, decision in zip(axes.texts, shown.T.flat, strict=False):  # readable on the lines
         ground = "white" if decision is np.ma.masked else DECISION_COLOURS[decisions[int(decision)]]
@@ -363,22 +365,20 @@ def _clear_heights(axes: Axes, table: SweepTable) -> Floats:
     return np.asarray(heights[best, np.arange(len(up.values))[:, None]])
 
 
-def bound_lines(across: Axis, up: Axis, values: Grid, required: AnyRequirement, log_values: bool) -> list[Floats]:
-    """Return the lines on which interpolated values of a map, shape (columns, rows), equal the requirement's bound.
+def _masked(values: Sequence[float | None], shape: tuple[int, ...]) -> Grid:
+    """Return values as an array that is masked where they are None."""
+    return np.ma.masked_invalid([math.nan if value is None else value for value in values]).reshape(shape)
 
-    The interpolation is linear on the scales of both axes, and with `log_values` that of the logarithms of the values,
-    as in `sweep_table.limits`.
+
+def zero_lines(across: Axis, up: Axis, values: Grid) -> list[Floats]:
+    """Return the lines on which values of a map, shape (columns, rows), are zero.
+
+    They are interpolated linearly on the scales of both axes, as in `sweep_table.limits`.
     """
     x, y = (np.log(axis.values) if axis.scale == "log" else np.array(axis.values) for axis in (across, up))
-    logarithmic = log_values and isinstance(required, Requirement)
-    heights, bound = (np.ma.log(values), math.log(required.bound)) if logarithmic else (values, required.bound)
-    lines = map(np.asarray, contour_generator(x=x, y=y, z=np.ma.MaskedArray(heights).T).lines(bound))
-    return [
-        np.stack(
-            [np.exp(line[:, k]) if axis.scale == "log" else line[:, k] for k, axis in enumerate((across, up))], axis=1
-        )
-        for line in lines
-    ]
+    is_log = [axis.scale == "log" for axis in (across, up)]
+    lines = map(np.asarray, contour_generator(x=x, y=y, z=values.T).lines(0.0))
+    return [np.exp(line, out=line.copy(), where=is_log) for line in lines]
 
 
 def _map_panel(figure: Figure, axes: Axes, table: SweepTable, noise: str, quantile: QuantileName) -> None:

@@ -13,11 +13,10 @@ import numpy as np
 
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples, shown_value
 from experiments.campaigns.sweep_axes import sweep_cells, tied_keys, unit_of
-from infoset.arrays import Floats
 from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement, Scenario
 from sim.closed_form import possible_miss_of
-from sim.requirement import AnyRequirement, Decision, Verdict, judge
-from sim.statistics import level_name
+from sim.requirement import AnyRequirement, Decision, HitRequirement, Verdict, judge
+from sim.statistics import level_name, shows
 from sim.stopping_rule import QUANTITIES
 from sim.storage import Axis, CampaignFolder
 
@@ -144,19 +143,27 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Seq
     noises, numbers = tuple(noises_of(folder)), range(folder.manifest.cells)
     cells = tuple(tuple(samples(folder, cell, levels)) for cell in numbers)
     read = partial(folder.sample, required.quantity, unknown=required.unknown)
-    by_noise = [{noise: read(noise, cell) for noise in noises} for cell in numbers]
-
-    def judged(values: Floats) -> Verdict:
-        """Return a verdict whose runs are those of all noises, like --runs and --most-runs."""
-        verdict = judge(values, required, watched=folder.manifest.is_watched)
-        return replace(verdict, runs_needed=verdict.runs_needed and len(noises) * verdict.runs_needed)
-
-    verdicts = tuple({noise: judged(values) for noise, values in one.items() if values.size} for one in by_noise)
-    estimates = [[sample.hits for sample in samples if sample.hits is not None] for samples in cells]
-    hits = tuple(min(group, key=lambda hits: hits.probability, default=None) for group in estimates)
     axes, body = folder.manifest.axes, folder.manifest.scenario.body
     is_varied = any("body.radius_m" in tied_keys(axis.key) for axis in axes)
     radius_m = None if body is None or is_varied else body.radius_m
+    radii_m = [cell.radius_m for cell in sweep_cells(folder.manifest.scenario, axes)] if is_varied else None
+
+    def judged(noise: str, cell: int) -> Verdict | None:
+        """Return a verdict whose runs are those of all noises, like --runs and --most-runs; None without runs."""
+        values = read(noise, cell)
+        if not values.size:
+            return None
+        verdict = judge(values, required, watched=folder.manifest.is_watched)
+        if isinstance(required, HitRequirement):
+            misses_m = folder.sample("miss_m", noise, cell)
+            quantile_m = float(np.quantile(misses_m, required.share)) if shows(misses_m.size, required.share) else None
+            verdict = replace(verdict, quantile=quantile_m, bound=radii_m[cell] if radii_m else radius_m)
+        return replace(verdict, runs_needed=verdict.runs_needed and len(noises) * verdict.runs_needed)
+
+    by_noise = [{noise: judged(noise, cell) for noise in noises} for cell in numbers]
+    verdicts = tuple({noise: one for noise, one in cell.items() if one is not None} for cell in by_noise)
+    estimates = [[sample.hits for sample in samples if sample.hits is not None] for samples in cells]
+    hits = tuple(min(group, key=lambda hits: hits.probability, default=None) for group in estimates)
     form = _closed_forms(folder.manifest.scenario, axes) if required.quantity == "guaranteed_miss_m" else ()
     return SweepTable(axes, noises, levels, cells, required, verdicts, hits, radius_m, form)
 
@@ -179,8 +186,9 @@ class Limit:
     """The end of the values of an axis that meet a requirement.
 
     It lies between the values `lower` and `upper` of two decided cells, one of which meets the requirement. `value` is
-    an interpolation between the estimates of two neighbouring cells, without a confidence. It is None if undecided
-    cells lie between them, or an estimate is not known or is on the other side of the bound than the decision.
+    an interpolation between the quantiles of two neighbouring cells, without a confidence: for hits, the quantiles of
+    the miss at the required share. It is None if undecided cells lie between them, or a quantile is not known or is on
+    the other side of the bound than the decision.
     """
 
     value: float | None
@@ -188,41 +196,42 @@ class Limit:
     upper: float
 
 
-def limits(axis: Axis, verdicts: Sequence[Verdict | None], required: AnyRequirement) -> list[Limit]:
+def limits(axis: Axis, verdicts: Sequence[Verdict | None]) -> list[Limit]:
     """Return the limits along an axis, each between a cell that meets the requirement and one that does not.
 
-    Cells without runs are treated as undecided. The interpolation has the scale of the axis; the logarithms of the
-    estimates are interpolated if `spans_decades`.
+    Cells without runs are treated as undecided. The quantiles are interpolated on the scale of the axis; their
+    logarithms are if `spans_decades`. A probability of hits is not interpolated: between two cells it can be a step.
     """
     decided = [
         (index, verdict)
         for index, verdict in enumerate(verdicts)
         if verdict is not None and verdict.decision is not Decision.UNDECIDED
     ]
-    values = [verdict.value for verdict in verdicts if verdict is not None and verdict.value is not None]
-    log_values = isinstance(required, Requirement) and spans_decades(values)
+    log_values = spans_decades([one.quantile for one in verdicts if one is not None and one.quantile is not None])
     ends = []
     for (left, first), (right, last) in itertools.pairwise(decided):
         if first.decision is not last.decision:
             near, far = axis.values[left], axis.values[right]
+            begin, end = (_agreeing(verdict, log_values) for verdict in (first, last))
             value = None
-            if right == left + 1 and _agrees(first, required) and _agrees(last, required):
-                begin, bound, end = (
-                    math.log(number) if log_values else number
-                    for number in (first.value or 0.0, required.bound, last.value or 0.0)
-                )
-                share = (bound - begin) / (end - begin)
+            if right == left + 1 and begin is not None and end is not None:
+                share = begin / (begin - end)
                 value = near * (far / near) ** share if axis.scale == "log" else near + share * (far - near)
             ends.append(Limit(value, near, far))
     return ends
 
 
-def _agrees(verdict: Verdict, required: AnyRequirement) -> bool:
-    """Whether the estimate is known and on the same side of the bound as the decision; added runs can change it."""
-    if verdict.value is None:
-        return False
-    is_below = isinstance(required, Requirement) == (verdict.decision is Decision.MET)
-    return (verdict.value < required.bound) == is_below
+def _agreeing(verdict: Verdict, log_values: bool) -> float | None:
+    """Return `above_bound`; None on the other side of the bound than the decision, which added runs can cause."""
+    above = above_bound(verdict.quantile, verdict.bound, log_values)
+    return above if above is not None and (above < 0.0) == (verdict.decision is Decision.MET) else None
+
+
+def above_bound(quantile: float | None, bound: float | None, log_values: bool) -> float | None:
+    """Return how far a quantile is above its bound, or the difference of their logarithms; None if it is not known."""
+    if quantile is None or bound is None:
+        return None
+    return math.log(quantile / bound) if log_values else quantile - bound
 
 
 def spans_decades(values: Sequence[float]) -> bool:
@@ -264,11 +273,11 @@ class Answer:
     limits: Sequence[Limit]
 
 
-def answer(axis: Axis, verdicts: Sequence[Verdict | None], required: AnyRequirement, at: str = "") -> Answer:
+def answer(axis: Axis, verdicts: Sequence[Verdict | None], at: str = "") -> Answer:
     """Return the decisions and limits along an axis."""
     unit = unit_of(axis.key)
     words = ["not simulated" if verdict is None else str(verdict.decision) for verdict in verdicts]
-    ends = limits(axis, verdicts, required)
+    ends = limits(axis, verdicts)
     if len(set(words)) == 1:
         return Answer(at, f"{words[0]} at all {len(words)} values", ends)
     pieces = []
@@ -298,7 +307,6 @@ def answers(table: SweepTable, noise: str) -> list[Answer]:
         answer(
             first,
             [table.verdict(cell, noise) for cell in cells[(slice(None), *indices)].tolist()],
-            table.required,
             values_text(others, indices),
         )
         for indices in np.ndindex(*shape[1:])
