@@ -25,7 +25,7 @@ from experiments.campaigns.sweep_table import (
 from experiments.common.errors import InputError, input_errors
 from experiments.common.output import Output, hit_key
 from experiments.common.screen import Part, number, number_table, some_runs
-from experiments.interception.study import SetCounts, set_warnings, study_title
+from experiments.interception.study import SetCounts, random_note, set_warnings, study_title
 from guidance import NoiseKind
 from sim import QuantileName, Requirement
 from sim.requirement import CONFIDENCE, AnyRequirement, Decision, Verdict, parse_requirement
@@ -111,8 +111,8 @@ class SweepReport:
         yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
         yield f"{len(table.cells)} cells, {some_runs(folder.finished_runs)}"
         yield (
-            f"the decision in each cell has a confidence of at least 95 %{watched}; "
-            "this holds for each cell, not for all cells together"
+            f"the decision in each cell has a confidence of at least 95 %{watched}; this holds for each cell, and for "
+            "all cells along a key together only if the outcome of every run is monotone in it"
         )
         for noise in table.noises:
             verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
@@ -132,7 +132,7 @@ class SweepReport:
         yield from set_warnings(manifest.scenario.set_model.kind, sets)
 
     def _notes(self) -> list[str]:
-        """Return lines about keys without an effect, and about game noise."""
+        """Return lines about keys without an effect, and about what results with random noise and game noise are."""
         lines = []
         shape = [len(axis.values) for axis in self.table.axes]
         digests = np.array([_digest(self.folder, cell) for cell in range(len(self.table.cells))]).reshape(shape)
@@ -141,6 +141,8 @@ class SweepReport:
             if len(axis.values) > 1 and (digests == first).all():
                 which = f"all {len(axis.values)} cells" if len(shape) == 1 else "all cells that differ only in it"
                 lines.append(f"{axis.key} has no effect: {which} have the same results")
+        if NoiseKind.RANDOM.value in self.table.noises:
+            lines.append(random_note(self.folder.manifest.scenario))
         return lines + game_notes(self.folder)
 
     def _undecided_notes(self, noise: str) -> list[str]:

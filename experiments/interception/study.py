@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.common.screen import some_runs
-from infoset import Model
+from infoset import Bias, Model
 from infoset.arrays import Flags
 from sim import HitEstimate, Results, Scenario
 
@@ -78,6 +78,15 @@ def game_note(scenario: Scenario, rule: str | None = None) -> str:
     return (
         f"game noise ({rule or f'tie rule {scenario.tie.value}'}) is one adversary, not the worst case: infoset bound "
         f"--budget 0 prints a miss, from the worst start, that no strategy can prevent{bound}"
+    )
+
+
+def random_note(scenario: Scenario) -> str:
+    """Return a line about what a result with random noise is."""
+    constant = scenario.set_model.angle_sensor.bias is Bias.CONSTANT
+    return (
+        "random noise (uniform errors within the bounds, independent from one measurement to the next"
+        f"{', with a constant centroid error' if constant else ''}) is one model of many: a decision holds for it only"
     )
 
 

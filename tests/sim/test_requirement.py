@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from infoset.arrays import Flags, Floats
 from sim import QuantileName, Requirement, estimate_hits, estimate_quantiles
 from sim.requirement import (
     Decision,
@@ -184,3 +185,25 @@ def test_runs_needed_by_hand() -> None:
         assert needed is not None
         first = next(size for size in range(runs + 1, 2 * needed) if is_decided(size, count / runs, share))
         assert first == pytest.approx(needed, rel=0.15)
+
+
+@pytest.mark.parametrize("watched", [False, True])
+def test_a_wrong_decision_in_a_monotone_row_is_one_in_its_first_wrong_cell(watched: bool) -> None:
+    """So a row is right with the confidence of one cell; independent runs give each cell an error of its own.
+
+    A run satisfies the bound in the cells whose share exceeds its number: its outcome is monotone along the row.
+    """
+    rows, runs, required, random = 2000, 120, 0.9, np.random.default_rng(4)
+    shares = np.linspace(0.9, 0.88, 8)[:, None]  # no cell meets the requirement
+    fewest_met, _ = critical_counts(runs, required, watched=watched)
+
+    def wrong(numbers: Floats) -> Flags:
+        """Return which cells are met, shape (rows, cells)."""
+        counts = np.cumsum(numbers < shares, axis=2)
+        return np.asarray(((counts if watched else counts[:, :, -1:]) >= fewest_met).any(axis=2))
+
+    common = wrong(random.uniform(size=(rows, 1, runs)))
+    assert (common.any(axis=1) == common[:, 0]).all()
+    assert common.any(axis=1).mean() <= 0.025 + 3.0 * math.sqrt(0.025 / rows)
+    independent = wrong(random.uniform(size=(rows, len(shares), runs)))
+    assert independent.any(axis=1).mean() > 2.0 * common.any(axis=1).mean() > 0.0
