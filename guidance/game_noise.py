@@ -29,6 +29,9 @@ class GameNoise:
         Shift of the measured position across x in each step with `TieRule.UPPER`, m, limited by the error bound; the
         last one holds for later steps. With `TieRule.LOWER` it has the other sign. These two rules then do not choose
         the angle by the set. None is no shift.
+    target_side : ndarray, shape (B,), or (2, B) in space, or None
+        Sign of the acceleration of each target, 1 or -1, if it is constant. The shift of these two rules then has the
+        other sign along each axis, which is worse: errors and target move the true state to the same side.
 
     Raises
     ------
@@ -54,6 +57,7 @@ class GameNoise:
     tie: TieRule | tuple[TieRule, TieRule]
     tie_draws: Floats
     shift_m: Floats | None = None
+    target_side: Floats | None = None
 
     def __post_init__(self) -> None:
         rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
@@ -78,16 +82,23 @@ class GameNoise:
             measured[name] = np.where(miss.exists, chosen, true)
         return measured
 
+    @property
+    def truth_side(self) -> Floats:
+        """Side to which the shift moves the true state, shape (), (B,), (2, 1) or (2, B): 1 or -1, 0 for no shift."""
+        sides = {} if self.shift_m is None else {TieRule.UPPER: -1.0, TieRule.LOWER: 1.0}
+        rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
+        of_rules = [[sides.get(rule, 0.0)] for rule in rules]
+        side = np.array(of_rules if len(rules) > 1 else of_rules[0][0])
+        return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
+
     def _shifted(self, sensor: AngleSensor, sight: LineOfSight, chosen: Floats) -> Floats:
         """Return the measured angles with the shift of this step where there is one, and the chosen ones elsewhere."""
         if self.shift_m is None:
             return chosen
-        signs = {TieRule.UPPER: 1.0, TieRule.LOWER: -1.0}
-        rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
-        sign = np.array([[signs.get(rule, 0.0)] for rule in rules]) if len(rules) > 1 else signs.get(rules[0], 0.0)
+        side = self.truth_side
         shift_m = self.shift_m[..., min(sight.step, self.shift_m.shape[-1] - 1), None]
-        shifted = sensor.nearest(sight, sight.alpha_rad + sign * shift_m / sight.range_m)
-        joined = np.where(sign == 0.0, chosen, shifted)
+        shifted = sensor.nearest(sight, sight.alpha_rad - side * shift_m / sight.range_m)
+        joined = np.where(side == 0.0, chosen, shifted)
         # Components of two points of a disc can be outside the disc.
         return sensor.measured(sight, sensor.limited(sensor.error(sight, joined))) if sensor.is_disc else joined
 

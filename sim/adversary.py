@@ -23,6 +23,7 @@ from sim.planned_flights import ANGLE, ROWS, Flown, PlannedNoise, Plans, by_axis
 from sim.record import Record, fly_one
 from sim.results import Outcome
 from sim.scenario import Scenario, with_strategy
+from sim.target import constant_side
 
 WORST_FOUND = "worst-found"
 """Name of the noise with the errors that a search found, in records."""
@@ -263,15 +264,13 @@ class _Search:
         )
         tie_draws = np.repeat(self._draws.tie, size, axis=-2)
         draws = Draws(position_m, velocity_m_s, {}, tie_draws, execution, target, pointing, images=images)
-        noise = PlannedNoise(plans, tie, self._names, self._shift_m)
+        noise = PlannedNoise(plans, tie, self._names, self._shift_m, constant_side(self.scenario.target, target))
         flight = Engagements(self.scenario, draws, self._strategy, noise=noise, guarantee=False)
         while flight.flying:
             flight.advance()
         results = flight.results(np.arange(size))
         outcomes = np.array(results.outcomes, dtype=object)
-        counts = np.isfinite(results.miss_m)
-        if self._keep_set:
-            counts &= ~results.set_emptied
+        counts = np.isfinite(results.miss_m) & ~(self._keep_set & results.set_emptied)
         if tie is not None:  # the errors of the game become the plan
             plans.sequence[:], plans.prescribed[:] = noise.errors, True
         value = np.where(counts, results.miss_m, -np.inf)

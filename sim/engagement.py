@@ -30,7 +30,7 @@ from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
-from sim.target import acceleration_m_s2
+from sim.target import acceleration_m_s2, constant_side
 from sim.truth_section import TruthSection
 
 Floats = NDArray[np.float64]
@@ -261,6 +261,9 @@ class Engagements:
         step_s = self.scenario.set_model.step_s
         left = np.maximum(self._arrival_s - self.step * step_s, 0.0)
         predicted = (sight.omega_rad_s * sight.range_m - self._impulse) * left
+        if isinstance(self._noise, GameNoise):
+            side = self._noise.truth_side
+            predicted = np.where(side == 0.0, predicted, side)
         return acceleration_m_s2(target, self._draws.target, self.step, step_s, predicted)
 
     def _pending(self) -> Pending:
@@ -365,5 +368,6 @@ def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
 
 def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
     if scenario.noise is NoiseKind.GAME:
-        return GameNoise(scenario.tie, draws.tie, worst_shift_m(scenario))
+        side = constant_side(scenario.target, draws.target)
+        return GameNoise(scenario.tie, draws.tie, worst_shift_m(scenario), side)
     return RandomNoise(draws.errors, draws.bias)

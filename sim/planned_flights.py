@@ -66,8 +66,8 @@ class PlannedNoise:
         Sensors of the rows of a sequence.
     tie : TieRule or None
         Tie rule of game noise; None keeps the extreme that the plan prescribes for each step (`SwitchingNoise`).
-    shift_m : ndarray or None
-        Shift of game noise in each step, m.
+    shift_m, target_side : ndarray or None
+        Shift of game noise in each step, m, and the sign of a constant acceleration of the target (`GameNoise`).
 
     Attributes
     ----------
@@ -79,6 +79,7 @@ class PlannedNoise:
     tie: TieRule | None
     names: Sequence[str]
     shift_m: Floats | None = None
+    target_side: Floats | None = None
     errors: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -86,7 +87,9 @@ class PlannedNoise:
         self.errors = np.zeros_like(sequence)
         draws = by_axis(sequence[:, ANGLE])
         self._keeping = (
-            SwitchingNoise(TieRule.RANDOM, draws) if self.tie is None else GameNoise(self.tie, draws, self.shift_m)
+            SwitchingNoise(TieRule.RANDOM, draws)
+            if self.tie is None
+            else GameNoise(self.tie, draws, self.shift_m, self.target_side)
         )
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:

@@ -18,7 +18,7 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
     `draws`, shape (B, steps), or (2, B, steps) in space, are uniform in [-1, 1]. `predicted_miss_m` is the signed
     predicted miss z + V_z (time to go) of the true state, and that along y.
     """
-    first = np.where(draws[..., 0] >= 0.0, 1.0, -1.0)
+    first = _first_side(draws)
     if target.manoeuvre is Manoeuvre.NONE:
         side = np.zeros_like(first)
     elif target.manoeuvre is Manoeuvre.CONSTANT:
@@ -37,3 +37,14 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
     if draws.ndim == 2:
         return np.asarray(along_z * side)
     return np.array([[along_z if along_y is None else along_y], [along_z]]) * side
+
+
+def constant_side(target: Target | None, draws: Floats | None) -> Floats | None:
+    """Return the sign of the acceleration of targets that keep it, shape (B,), or (2, B) in space; None for others."""
+    if target is None or draws is None or target.manoeuvre is not Manoeuvre.CONSTANT:
+        return None
+    return _first_side(draws)
+
+
+def _first_side(draws: Floats) -> Floats:
+    return np.where(draws[..., 0] >= 0.0, 1.0, -1.0)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from experiments import load_scenario
-from guidance import NoiseKind, TieRule
+from guidance import GameNoise, NoiseKind, TieRule
 from sim import Scenario, simulate
 from sim.bound import lower_bound, pair_at
-from sim.closed_form import possible_miss_m, worst_shift_m
+from sim.closed_form import possible_miss_m, possible_miss_of, worst_shift_m
 from sim.truth_pair import TruthPair
 
 RUNS = 10
@@ -41,6 +41,27 @@ def test_game_noise_is_worse_than_random_noise_and_near_the_bound(name: str, set
     assert (game.miss_m <= game.guaranteed_miss_m).all()
     assert game.truth_kept.all()
     assert game.miss_m.max() > 0.85 * latest_pair(scenario).bound_m
+
+
+@pytest.mark.parametrize("manoeuvre", ["constant", "worst-case"])
+def test_a_target_at_the_bound_of_the_model_brings_every_run_to_the_closed_form(manoeuvre: str) -> None:
+    """With one sign of the errors for both axes the median was 146 m: the target accelerated with it along an axis."""
+    target = [f"target.manoeuvre={manoeuvre}", "target.acceleration_m_s2=2.7e-5"]
+    scenario = load_scenario("dart-2022", [*target, "thruster.last_impulse_s=900"])
+    results = simulate(replace(scenario, noise=NoiseKind.GAME), runs=RUNS)
+    assert results.miss_m.min() > 0.98 * possible_miss_of(scenario)
+    assert results.truth_kept.all()
+    assert results.phi_held.all()
+
+
+def test_the_shift_moves_the_truth_to_the_side_of_its_target_along_each_axis() -> None:
+    shift_m, draws, side = np.ones((2, 3)), np.zeros((2, 2, 3)), np.array([[1.0, -1.0], [-1.0, -1.0]])
+    assert GameNoise(TieRule.UPPER, draws).truth_side == 0.0
+    assert GameNoise(TieRule.UPPER, draws, shift_m).truth_side == -1.0
+    for tie in (TieRule.UPPER, TieRule.LOWER):
+        assert (GameNoise(tie, draws, shift_m, side).truth_side == side).all()
+    mixed = GameNoise((TieRule.LOWER, TieRule.ALTERNATE), draws, shift_m, side)
+    assert mixed.truth_side.tolist() == [[1.0, -1.0], [0.0, 0.0]]
 
 
 def test_the_greatest_bound_is_that_of_the_latest_arrival() -> None:
