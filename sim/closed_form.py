@@ -140,8 +140,13 @@ def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) ->
 def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> float:
     """Return `possible_miss_m` of the camera and the last impulse of a scenario, m: in space that of both axes at once.
 
-    The disturbance is `set_model.disturbance_m_s2` of each axis. A ValueError is raised if the angle sensor is not a
-    camera, images can be lost, or there are fewer than two images before the last impulse.
+    The disturbance is `set_model.disturbance_m_s2` of each axis, and `constant_bias` that of `possible_miss_m`.
+
+    Raises
+    ------
+    ValueError
+        If the angle sensor is not a camera, images can be lost, or there are fewer than two images before the last
+        impulse.
     """
     model = scenario.set_model
     camera = model.angle_sensor
