@@ -4,7 +4,7 @@ from sim.adversary import NothingCountsError, WorstEngagement, find_worst
 from sim.bound import LowerBound, lower_bound
 from sim.campaign import Campaign, CampaignResult, Sweep
 from sim.chunk import CampaignNoise
-from sim.closed_form import possible_miss_m, possible_miss_of
+from sim.closed_form import possible_miss_of
 from sim.farthest_pair import BoundError
 from sim.record import AxisStep, Inconsistency, Record, StepRecord, fly_one
 from sim.requirement import HitRequirement, Requirement
@@ -59,7 +59,6 @@ __all__ = [
     "find_worst",
     "fly_one",
     "lower_bound",
-    "possible_miss_m",
     "possible_miss_of",
     "quantiles",
     "simulate",
