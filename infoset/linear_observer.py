@@ -59,7 +59,7 @@ class Estimate:
 
     @property
     def polygons(self) -> ConvexPolygons:
-        """The sets of two states.
+        """The sets of two states; rows of `vertices` after the `counts` of a run, which only a batch has, are NaN.
 
         Raises
         ------
@@ -68,7 +68,10 @@ class Estimate:
         """
         if not isinstance(self.sets, Polygons):
             raise ValueError(f"the set has {self.states} states, not two: use .polytopes")
-        polygons = ConvexPolygons.unchecked(self.sets.vertices, self.sets.counts)
+        counts = self.sets.counts
+        used = np.arange(counts.max(initial=0)) < counts[:, None]
+        vertices = np.where(used[..., None], self.sets.vertices[:, : used.shape[1]], np.nan)
+        polygons = ConvexPolygons.unchecked(vertices, counts)
         return polygons[0] if self.single else polygons
 
     @property

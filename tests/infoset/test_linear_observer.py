@@ -52,6 +52,26 @@ def measurements() -> Floats:
     return np.array(PUBLISHED["y"]).T
 
 
+def test_vertices_of_an_estimate_have_no_rows_of_uninitialised_memory() -> None:
+    one, batch = published(), published(runs=3)
+    for observer, y in ((one, measurements()[0]), (batch, [measurements()[0]] * 3)):
+        observer.update(y)
+        observer.predict()
+    polygon = one.estimate().polygons
+    assert polygon.vertices.shape == (polygon.counts, 2)
+    assert np.isfinite(polygon.vertices).all()
+    # One run becomes empty, one is cut again: their rows after the vertices that are left are NaN.
+    again = np.stack([measurements()[1], measurements()[1] + 1e3, np.full(measurements()[1].shape, np.nan)])
+    batch.update(again)
+    polygons = batch.estimate().polygons
+    assert len(set(polygons.counts.tolist())) == 3
+    assert polygons.counts[1] == 0
+    used = np.arange(polygons.vertices.shape[1]) < polygons.counts[:, None]
+    assert used.any(axis=0).all()
+    assert (np.isfinite(polygons.vertices).all(axis=-1) == used).all()
+    assert np.isnan(polygons.vertices[~used]).all()
+
+
 # Exact rational sets --------------------------------------------------------------------------------------------
 
 
