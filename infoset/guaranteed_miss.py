@@ -39,8 +39,9 @@ GROUPS = 3000
 """Labels that leave within this part of a flight are bounded together, if they need several steps."""
 LEAST, GREATEST, NEAREST, FARTHEST = range(4)
 """Columns of a piece: bounds of its predicted miss, and the labels of its ends, m."""
-RESOLUTION = 1e-10
 SLACK = 1e-9
+ROUNDING = 4.0 * chains.EPSILON
+"""Rounding error of a miss, relative to the greatest label: of x at the closest approach, also if z is exactly zero."""
 
 
 @allocation_free
@@ -132,7 +133,7 @@ def bound_leaving(
     if errors is not None:
         # The living labels need not form an interval, so that the window must be searched.
         first_label = known if known >= lower else 0.5 * (lower + upper)
-        if not search_window(lower, upper, first_label, LABEL_RESOLUTION * upper, tape, errors, laws, room):
+        if not search_window(lower, upper, first_label, tape, errors, laws, room):
             return 0
         living = limits[1].label
     lower_lives = probe(limits, FIRST, lower, tape, errors, laws, replays)
@@ -148,7 +149,7 @@ def bound_leaving(
     if living < lower:
         # The living labels form an interval, and both limits are dead: no label between them lives.
         return 0
-    resolution = RESOLUTION * upper
+    resolution = LABEL_RESOLUTION * upper
     first_dead, last_dead = lower, upper
     first, last = lower, upper
     if not lower_lives:
@@ -408,5 +409,6 @@ class GuaranteedMiss:
         worst = np.zeros_like(self._settled)
         for pieces, real in parts:
             modulus = np.hypot.reduce(np.maximum(pieces[..., GREATEST], -pieces[..., LEAST]), axis=0)
+            modulus += ROUNDING * self._law.label_greatest
             worst = np.maximum(worst, np.where(real, modulus, 0.0).max(axis=1))
         return worst * ((1.0 + self._speed_error) * (1.0 + SLACK))

@@ -39,6 +39,10 @@ from infoset.section_passes import Sections, row_of
 FIRST, _, LAST = constants(3)
 """Indices of the ends of a bracket of three labels."""
 LABEL_RESOLUTION = 1e-13
+"""Accuracy of the ends of the living labels, relative to the labels."""
+NARROWEST = 1e-15
+"""Width of an interval of living labels that the search may miss, relative to the labels: 5 to 9 ulp. The slack of the
+cuts makes the labels next to that of a true state live over a wider interval."""
 MOST_PROBES = 200
 
 
@@ -108,16 +112,16 @@ def locate_end(
 
 
 @allocation_free
-def search_living(resolution: float, tape: Tape, errors: Floats | None, laws: Laws, room: Workspace) -> bool:
+def search_living(tape: Tape, errors: Floats | None, laws: Laws, room: Workspace) -> bool:
     """Search for a living label between the first three known ones, which are dead; the middle one outlives the others.
 
     Return whether the middle label now lives; if not, there is no living label in the bracket. The pair (event,
     overlap) is a unimodal function of the label: the larger half of the bracket is probed at its middle. The search
-    ends if the bracket is narrower than the resolution, or if no label in it can live.
+    ends if the bracket is as narrow as `NARROWEST`, or if no label in it can live.
     """
     known, four = room.known, room.four
     for _ in range(MOST_PROBES):
-        if known[2].label - known[0].label <= resolution:
+        if known[2].label - known[0].label <= NARROWEST * known[2].label:
             return False
         lower_half = known[1].label - known[0].label > known[2].label - known[1].label
         outer, at = (0, 1) if lower_half else (2, 2)
@@ -140,7 +144,6 @@ def search_window(
     lower: float,
     upper: float,
     first: float,
-    resolution: float,
     tape: Tape,
     errors: Floats | None,
     laws: Laws,
@@ -160,14 +163,13 @@ def search_window(
             known[2 - end] = known[1]
             known[1] = known[end]
             break
-    return search_living(resolution, tape, errors, laws, room)
+    return search_living(tape, errors, laws, room)
 
 
 @allocation_free
 def search_everywhere(
     lower: float,
     upper: float,
-    resolution: float,
     tape: Tape,
     errors: Floats | None,
     laws: Laws,
@@ -176,7 +178,7 @@ def search_everywhere(
     """Find a living label within limits if the living labels need not form an interval, or prove that none lives.
 
     A window without living labels under the bands that are convex on it is discarded. The others are halved until they
-    are narrower than the resolution, beginning with the one in which a probed label lived longest with its own bands.
+    are as narrow as `NARROWEST`, beginning with the one in which a probed label lived longest with its own bands.
     """
     windows, probed = room.windows, room.four
     windows[0].near, windows[0].far, windows[0].died, windows[0].overlap = lower, upper, ALIVE, 0.0
@@ -194,7 +196,7 @@ def search_everywhere(
         windows[best] = windows[count]
         for p, q in ((near, middle), (middle, far)):
             window = Tape(tape.kinds, tape.values, tape.applies, tape.events, p, q)
-            if not search_window(p, q, 0.5 * (p + q), resolution, window, errors, laws, room):
+            if not search_window(p, q, 0.5 * (p + q), window, errors, laws, room):
                 continue
             new = windows[count]
             new.near, new.far, new.died, new.overlap = p, q, -1, -np.inf
@@ -203,7 +205,7 @@ def search_everywhere(
                     return True, label
                 if outlives(probed[0], new):
                     new.died, new.overlap = probed[0].died, probed[0].overlap
-            count += q - p > resolution
+            count += q - p > NARROWEST * q
     return False, lower
 
 
@@ -230,9 +232,11 @@ def locate_living(
     slots, stored, known = sections.slots, sections.used[b], room.known
     end = 1
     first = last = 0
+    known[0].label = limit_below
     for s in range(stored):
         slot = slots[b, s]
-        if limit_below < slot.label < limit_above:
+        # Labels of a grid over a very short interval may be equal. A bracket needs different ones.
+        if known[end - 1].label < slot.label < limit_above:
             new = known[end]
             new.label, new.overlap, new.emptied = slot.label, slot.overlap, slot.emptied
             new.died = ALIVE if slot.living else slot.died
@@ -240,7 +244,7 @@ def locate_living(
                 first = first if last > 0 else end
                 last = end
             end += 1
-    known[0].label, known[end].label = limit_below, limit_above
+    known[end].label = limit_above
     some_live = last > 0
     # A limit must be replayed only if no dead label separates it from the living ones.
     if (not some_live or first == 1) and probe(known, FIRST, limit_below, tape, errors, laws, room.replays):
@@ -260,10 +264,10 @@ def locate_living(
         known[0], known[2] = known[max(best - 1, 0)], known[min(best + 1, end)]
         known[1] = room.four[0]
         first, last, end = 1, 1, 2
-        if not search_living(resolution, tape, errors, laws, room):
+        if not search_living(tape, errors, laws, room):
             if errors is None:
                 return none_lives
-            alive_now, label = search_everywhere(limit_below, limit_above, resolution, tape, errors, laws, room)
+            alive_now, label = search_everywhere(limit_below, limit_above, tape, errors, laws, room)
             if not alive_now:
                 return none_lives
             below, above = limit_below, limit_above

@@ -246,17 +246,20 @@ def outlives(one: Record, other: Record) -> bool:
     return bool(one.died > other.died or (one.died == other.died and one.overlap > other.overlap))
 
 
-def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, laws: Laws) -> Floats:
+def margins_along(
+    labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, laws: Laws
+) -> tuple[Floats, Floats]:
     """Return the signed distances, m, of states (V, z) to the boundaries of sections during an engagement, (C, L, B).
 
-    They are positive inside; for an empty section the overlap with the band that made it empty. `labels` has the shape
-    (B,), and `looks`, shape (L,), the number of events before each state. The states `v` and `z`, shape (C, L, B), are
-    along each axis, m/s and m.
+    They are positive inside; for an empty section the overlap with the band that made it empty. Also return the bounds
+    of |V| in the sections, m/s, (C, L, B), to which rounding errors are relative. `labels` has the shape (B,), and
+    `looks`, shape (L,), the number of events before each state. The states `v` and `z`, shape (C, L, B), are along each
+    axis, m/s and m.
     """
-    margins = np.empty(v.shape)
+    margins, reaches = np.empty(v.shape), np.empty(v.shape)
     room = replay_room(len(laws), history.events)
-    margins_all(labels, looks, v, z, history.tapes, history.errors_if_any, laws, room, margins)
-    return margins
+    margins_all(labels, looks, v, z, history.tapes, history.errors_if_any, laws, room, margins, reaches)
+    return margins, reaches
 
 
 @entry
@@ -270,6 +273,7 @@ def margins_all(
     laws: Laws,
     room: ReplayRoom,
     margins: Floats,
+    reaches: Floats,
 ) -> None:
     """Write the results of `margins_along`."""
     for b in range(labels.shape[0]):
@@ -288,6 +292,7 @@ def margins_all(
                     margins[channel, look, b] = chains.margin_in(right, left, room.rings, tau, *state)
                 else:
                     margins[channel, look, b] = room.overlaps[channel, died]
+                reaches[channel, look, b] = right.reach
 
 
 @entry

@@ -22,7 +22,8 @@ from sim.kepler import Sight
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+"""Rounding error of a margin, relative to the terms of z: a quarter of that for which each cut widens the set."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,8 @@ class TruthSection:
     def margins_m(self, arrival_s: Floats) -> list[MaskedFloats]:
         """Return the signed margins (m) of the true states in their sections, one array of shape (B,) per step.
 
-        A margin is that of the last measurement; it is masked before the first one. `arrival_s` are the times from the
-        start to x = 0.
+        A margin is that of the last measurement; it is masked before the first one. It includes an allowance for
+        rounding. `arrival_s` are the times from the start to x = 0.
         """
         latest, margins = np.full(len(arrival_s), np.inf), []
         measured: dict[int, Floats] = {}
@@ -120,9 +121,10 @@ class TruthSection:
         rate = np.reshape([look.slope_rate_per_s for look in looks], each).swapaxes(0, 1)
         ends = np.array([look.events for look in looks], dtype=np.int64)
         v, z = np.ascontiguousarray(rate * ranges - law.closing_speed * slope), np.ascontiguousarray(slope * ranges)
-        margins = margins_along(labels, ends, v, z, history, self._laws)
-        # The label of the true state has an error of half an ulp, and so have its z and V.
-        margins = margins + LABEL_ROUNDING * labels * np.abs(slope)
+        margins, reaches = margins_along(labels, ends, v, z, history, self._laws)
+        # The label and z = label |slope| of the true state are rounded, and so is z = m - V (label/e) of a vertex: the
+        # sections of an exactly known z are thinner than that.
+        margins += ROUNDING * labels * (np.abs(slope) + reaches / law.closing_speed)
         return np.where(where, margins.min(axis=0), np.inf)
 
 
