@@ -151,10 +151,11 @@ def _deviation(first: Floats, disturbance_m_s2: Floats, nominal: _Motion, times_
         new_place, new_speed = place.copy(), speed.copy()
         new_speed[..., 1:] = first[1, ..., None] + step_s * np.cumsum(greater_of_neighbours(growth), axis=-1)
         new_place[..., 1:] = first[0, ..., None] + step_s * np.cumsum(new_speed[..., 1:], axis=-1)
-        if (new_place <= place).all() and (new_speed <= speed).all():
+        grows = ((new_place > place) | (new_speed > speed)).any(axis=(0, 1))
+        if not grows.any():
             return _Motion(new_place, new_speed)
         place, speed = INFLATION * new_place, INFLATION * new_speed
-    raise no_bound(TOO_NEAR, nominal.range_m[-1])
+    raise no_bound(TOO_NEAR, nominal.range_m[grows.argmax()])
 
 
 def greater_of_neighbours(values: Floats) -> Floats:
