@@ -70,6 +70,7 @@ def _number(number: PublishedNumber) -> dict[str, object]:
         "printed": number.printed,
         "corrected": number.corrected,
         "ours": number.ours if finite else None,
+        "other_model": number.other,
         "agrees_from": number.band.lowest,
         "agrees_to": number.band.highest,
         "agrees_by": "ours" if number.spread is None else "printed",
@@ -106,12 +107,15 @@ def _block(numbers: Sequence[PublishedNumber], notes: Sequence[str], width: int)
     """Yield the lines of numbers of one origin; if `width` is too small for a line, the name stands above the rest."""
     theirs, tolerance = TITLES[numbers[0].origin] if numbers[0].spread is None else ONE_RUN
     ours = "ours" if numbers[0].spread is None else "our median"
-    rows = [("", theirs, ours, tolerance, "verdict")]
+    rows: list[tuple[str, ...]] = [("", theirs, ours, "other model", tolerance, "verdict")]
     for number in numbers:
         note = f" ({notes.index(number.note) + 1})" if number.note else ""
         right = f", right: {number.corrected}" if number.corrected not in {None, number.printed} else ""
         verdict = f"{number.verdict.value}{right}{note}"
-        rows.append((number.name, number.printed, _digits(number), _tolerance(number), verdict))
+        other = "" if number.other is None else _digits(number, number.other)
+        rows.append((number.name, number.printed, _digits(number, number.ours), other, _tolerance(number), verdict))
+    if all(number.other is None for number in numbers):
+        rows = [(*row[:3], *row[4:]) for row in rows]
     sizes = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     above = sum(sizes) + 2 * len(sizes) > width
     sources = ["", *(number.source for number in numbers)]
@@ -124,16 +128,16 @@ def _block(numbers: Sequence[PublishedNumber], notes: Sequence[str], width: int)
         yield "  ".join([first, *(f"{cell:>{size}}" for cell, size in zip(cells, sizes[1:], strict=False)), verdict])
 
 
-def _digits(number: PublishedNumber) -> str:
-    """Return our number with one or two digits more than the printed one."""
-    if number.ours is None:
+def _digits(number: PublishedNumber, value: float | None) -> str:
+    """Return a computed number with one or two digits more than the printed one."""
+    if value is None:
         return "none"
     known = Decimal(number.corrected or number.printed).as_tuple()
     assert isinstance(known.exponent, int)
-    if "e" in number.printed and number.ours:
-        text = f"{number.ours:.{len(known.digits)}e}"
+    if "e" in number.printed and value:
+        text = f"{value:.{len(known.digits)}e}"
     else:
-        text = f"{number.ours:.{max(0, -known.exponent) + 2}f}"
+        text = f"{value:.{max(0, -known.exponent) + 2}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 

@@ -36,7 +36,9 @@ class Verdict(Enum):
     AGREED = "agreed"
     """Ours is the printed number, to the last digit."""
     MISPRINT = "misprint"
-    """The correct number is known, and it is ours."""
+    """The correct number is known, and it is ours, or that of the other model if there is one."""
+    EXPLAINED = "explained by another model"
+    """The numbers differ, and a model other than that of the paper's equations gives the printed number."""
     NOT_EXPLAINED = "not explained"
     """The numbers differ for an unknown reason."""
     DISAGREED = "disagreed"
@@ -79,8 +81,10 @@ class PublishedNumber:
         None if the computation has no result.
     band : Band
         Interval in which ours agrees with the printed number.
+    other : float or None
+        The number of the other model with which the paper's number was probably computed, if one is known.
     right : Band or None
-        Interval in which ours must lie although the printed number is a different one.
+        Interval in which ours, or `other` if it is given, must lie although the printed number is a different one.
     corrected : str or None
         The correct number, if known.
     unexplained : bool
@@ -98,6 +102,7 @@ class PublishedNumber:
     printed: str
     ours: float | None
     band: Band
+    other: float | None = None
     right: Band | None = None
     corrected: str | None = None
     unexplained: bool = False
@@ -110,11 +115,13 @@ class PublishedNumber:
         """Return the result of the comparison."""
         if self.ours is None or not abs(self.ours) < float("inf"):
             return Verdict.DISAGREED
-        known = Verdict.NOT_EXPLAINED if self.unexplained else Verdict.MISPRINT
         if self.right is not None:
-            return known if self.ours in self.right else Verdict.DISAGREED
+            known = Verdict.NOT_EXPLAINED if self.unexplained else Verdict.MISPRINT
+            return known if (self.ours if self.other is None else self.other) in self.right else Verdict.DISAGREED
         if float(self.printed) in self.spread if self.spread is not None else self.ours in self.band:
             return Verdict.AGREED
+        if self.other is not None and self.other in self.band:
+            return Verdict.EXPLAINED
         return Verdict.NOT_EXPLAINED if self.unexplained else Verdict.DISAGREED
 
 

@@ -55,7 +55,12 @@ TABLES = (
             "-2.80 -4.06 -4.58; 0 0 0 0 0 0"
         ),
         73.19,
-        (("linear x", 3, 5, 4.06), ("linear x", 1, 6, -3.06)),
+        (
+            ("linear x", 3, 5, 4.06),
+            ("linear x", 1, 6, -3.06),
+            ("nonlinear x", 2, 1, 920.6),
+            ("nonlinear x", 3, 1, 200.9),
+        ),
     ),
     PrintedTable(
         2,
@@ -90,6 +95,8 @@ TABLES = (
             ("linear x", 3, 4, -3.01),
             ("linear x", 3, 5, 4.12),
             ("linear x", 3, 6, -5.15),
+            ("linear x", 2, 3, 1590.0),
+            ("nonlinear x", 4, 6, -0.08),
         ),
     ),
 )
@@ -137,7 +144,7 @@ def is_published(rendezvous: Rendezvous) -> bool:
 
 def compare_published(rendezvous: Rendezvous, solution: Solution) -> tuple[Comparison, ...]:
     """Compare the tables of the paper with optimal controls of the published problem."""
-    printed = [corrected(table) for table in TABLES]
+    printed = [from_paper(corrected(table, "u")) for table in TABLES]
     ours = [_ours(table, solution.optimal, control) for table, control in zip(TABLES, printed, strict=True)]
     names = [f"table {table.number}" for table in TABLES]
     members = fly_members(rendezvous, [*names, *names], np.array([*ours, *printed]))
@@ -146,13 +153,16 @@ def compare_published(rendezvous: Rendezvous, solution: Solution) -> tuple[Compa
     )
 
 
-def corrected(table: PrintedTable) -> Floats:
-    """Return the printed controls with the misprints corrected, in Hill's axes, shape (4, 3)."""
-    controls = np.array(table.controls)
-    for quantity, t, component, value in table.misprints:
-        if quantity == "u":
-            controls[t, component - 1] = value
-    return from_paper(controls)
+def corrected(table: PrintedTable, quantity: str) -> Floats:
+    """Return the printed "u", "linear x" or "nonlinear x" with the misprints corrected, in the paper's axes."""
+    first, printed = {"u": (0, table.controls), "linear x": (1, table.linear), "nonlinear x": (1, table.nonlinear)}[
+        quantity
+    ]
+    numbers = np.array(printed)
+    for misprinted, t, component, value in table.misprints:
+        if misprinted == quantity:
+            numbers[t - first, component - 1] = value
+    return numbers
 
 
 def _ours(table: PrintedTable, optimal: OptimalControls, printed: Floats) -> Floats:

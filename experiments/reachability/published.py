@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal
 from itertools import pairwise
@@ -10,11 +11,12 @@ import numpy as np
 
 from experiments.common.hill_axes import from_paper, to_paper
 from experiments.common.published_number import Progress, PublishedNumber, Reference, Reproduction
-from experiments.reachability.file import Rendezvous, load_rendezvous
-from experiments.reachability.printed_tables import PROBLEM, Comparison, Row, compare_published, corrected
+from experiments.reachability.file import load_rendezvous
+from experiments.reachability.printed_tables import PROBLEM, Comparison, PrintedTable, Row, compare_published, corrected
 from experiments.reachability.report import fly_members
 from infoset.arrays import Floats
-from rendezvous.reachability import ReachabilityProblem, solve
+from rendezvous.reachability import NonlinearMotion, ReachabilityProblem, solve
+from rendezvous.relative_motion import EllipticOrbit
 
 PAPER = "reachability"
 TITLE = "Shorikov and Goranov (2021), rendezvous through reachable sets"
@@ -25,16 +27,24 @@ REMARKS = (
     "Table 2 is near the least sum of absolute values but differs from it.",
     "Linear states of tables 2 and 3 are those of the printed controls, with misprints corrected (the four of table 2 "
     "by the values that its states imply); their tolerance includes the rounding of these controls.",
+    "The nonlinear columns are those of another model: (1) about a circular orbit of radius 90 km, where the orbit of "
+    "the linear columns has 9000 km at perigee, with the same rate. Ours are those of the same controls on the orbit "
+    "of the linear columns. No verdict contains a fitted number.",
 )
+PUBLISHED_RADIUS_M = 90e3
+"""Radius of the orbit of the nonlinear columns: 9000 km, the radius at perigee, with two digits lost."""
 _REFERENCE = Reference(PAPER)
 _CONTROL_ROUNDING = 0.5e-4
 _STATE_ROUNDING = np.array([0.05, 0.05, 0.05, 0.005, 0.005, 0.005])
-_NONLINEAR_MISS = "1.668028"
-"""The miss of table 1, from an independent integration of (1)."""
-_OFF = ((3, 2, 3),)
-"""(table, t, component) of linear states that do not follow from the controls."""
 _CONTRADICTED = ((1, 1), (1, 2), (2, 1), (2, 2))
 """(t, component) of the controls of table 2 that its states contradict."""
+_PROVED = (
+    (1, "nonlinear x1", 2),
+    (1, "nonlinear x1", 3),
+    (3, "linear x3", 2),
+    (3, "nonlinear x6", 4),
+)
+"""(table, quantity, t) of misprints that follow from all other positions of the table."""
 _NOTES = {
     "misprint": "the states of the table follow from the other value",
     "contradicted": (
@@ -42,12 +52,16 @@ _NOTES = {
         "A tenth of them fits worse than zero"
     ),
     "nonlinear": (
-        "does not follow from (1). Tried: (1) integrated to 1e-12 on the orbit of the linear columns, from the printed "
-        "and from exact controls; the difference exists already after the first period, 4.6 m where 0.1 m is right"
+        "does not follow from (1) on the orbit of the linear columns: the difference exists already after the first "
+        "period, 4.6 m where 0.1 m is right. Other model: (1) about a circular orbit of radius 90 km, not 9000 km"
     ),
-    "off": (
-        "the state of the printed controls differs by more than their rounding. Tried: the controls as printed, the "
-        "corrected ones, and the nearest optimal control"
+    "norm": (
+        "not the norm of the printed x(4), which is 73.78, 75.59 and 75.23 in tables 1 to 3. Tried: the other model, "
+        "with exact and with printed controls (table 1: 73.74 and 73.21), and the positions alone"
+    ),
+    "proved": (
+        "every control within the rounding of the printed one that leads to the other printed positions of the table "
+        "leads to the right value, in the other model if the number is nonlinear"
     ),
 }
 
@@ -55,59 +69,73 @@ _NOTES = {
 def reproduce(progress: Progress) -> Reproduction:
     """Compute the numbers."""
     rendezvous = load_rendezvous(PROBLEM)
-    solution = solve(rendezvous.problem)
+    as_published = replace(rendezvous, truth=published_motion(rendezvous.truth.orbit))
+    problem = rendezvous.problem
+    solution = solve(problem)
     progress(0.5)
-    first, second, third = compare_published(rendezvous, solution)
-    # Table 1 is compared with an independent computation, the others with the states of their controls.
-    compared = (
-        first,
-        _implied(rendezvous, second),
-        replace(third, ours=replace(third.printed, controls=third.ours.controls)),
-    )
-    numbers = [_number(row, comparison, rendezvous.problem) for comparison in compared for row in comparison.rows]
+    comparisons = compare_published(rendezvous, solution)
+    first, second, third = comparisons
+    shown = (first.ours.controls, _implied(problem, second.table), third.ours.controls)
+    flown, names = flown_controls(problem, comparisons), [each.table.ours for each in comparisons]
+    own, other = (fly_members(each, names, flown) for each in (rendezvous, as_published))
+    numbers = []
+    for comparison, controls, *models in zip(comparisons, shown, own, other, strict=True):
+        ours, published = (replace(comparison, ours=replace(member, controls=controls)).rows for member in models)
+        numbers += [_number(row, value, problem) for row, (*_, value) in zip(ours, published, strict=True)]
     progress(1.0)
     return Reproduction(PAPER, TITLE, ((rendezvous.name, rendezvous.hash),), tuple(numbers), REMARKS)
 
 
-def _implied(rendezvous: Rendezvous, comparison: Comparison) -> Comparison:
-    """Return table 2 with the controls that its states imply, and the states of its corrected controls."""
-    problem, table = rendezvous.problem, comparison.table
-    states = np.vstack([to_paper(problem.initial), table.linear])
-    for quantity, t, component, value in table.misprints:
-        if quantity == "linear x":
-            states[t, component - 1] = value
-    pairs = pairwise(from_paper(states))
-    implied = to_paper([_inverse(problem) @ (after - problem.transition[0] @ before) for before, after in pairs])
-    controls = to_paper(corrected(table))
+def published_motion(orbit: EllipticOrbit, radius_m: float = PUBLISHED_RADIUS_M) -> NonlinearMotion:
+    """Return the motion of the nonlinear columns: about a circle of `radius_m`, with the rate of `orbit` at t = 0.
+
+    Equation (1) with e = 0 and w^2 radius^3 in place of the gravitational parameter.
+    """
+    rate_rad_s = orbit.semi_latus_rate_rad_s * (1.0 + orbit.eccentricity * np.cos(orbit.true_anomaly_rad)) ** 2
+    return NonlinearMotion(EllipticOrbit(float(rate_rad_s)), radius_m)
+
+
+def flown_controls(problem: ReachabilityProblem, comparisons: Sequence[Comparison]) -> Floats:
+    """Return the controls to which the states of tables 1 to 3 belong, in Hill's axes, shape (3, 4, 3).
+
+    Table 1: the control of least energy, which is an independent computation. Tables 2 and 3: the printed controls with
+    corrections; controls of table 2 that its states contradict are those that the states imply.
+    """
+    first, second, third = comparisons
+    controls, implied = to_paper(second.printed.controls), to_paper(_implied(problem, second.table))
     for t, component in _CONTRADICTED:
-        controls[t, component - 1] = implied[t][component - 1]
-    (member,) = fly_members(rendezvous, [comparison.ours.name], from_paper(controls)[None])
-    return replace(comparison, ours=replace(member, controls=from_paper(implied)))
+        controls[t, component - 1] = implied[t, component - 1]
+    return np.array([first.ours.controls, from_paper(controls), third.printed.controls])
+
+
+def _implied(problem: ReachabilityProblem, table: PrintedTable) -> Floats:
+    """Return the controls that the linear states of a table imply, in Hill's axes, shape (4, 3)."""
+    states = np.vstack([to_paper(problem.initial), corrected(table, "linear x")])
+    pairs = pairwise(from_paper(states))
+    return np.array([_inverse(problem) @ (after - problem.transition[0] @ before) for before, after in pairs])
 
 
 def _inverse(problem: ReachabilityProblem) -> Floats:
     return np.asarray(np.linalg.pinv(problem.control[0] / problem.state_bounds[:, None]) / problem.state_bounds)
 
 
-def _number(row: Row, comparison: Comparison, problem: ReachabilityProblem) -> PublishedNumber:
+def _number(row: Row, published: float, problem: ReachabilityProblem) -> PublishedNumber:
+    """Return a number of a row of ours; `published` is that of the motion as published."""
     table, _, quantity, t, printed, correction, ours = row
     component = int(quantity[-1]) if quantity[-1].isdigit() else 0
     text = _digits(printed, quantity, component)
     right = None if correction is None else _digits(correction, quantity, component)
-    note = "" if right is None else _NOTES["misprint"]
-    beyond, unexplained = 0.0, False
+    note = "" if right is None else _NOTES["proved" if (table, quantity, t) in _PROVED else "misprint"]
+    beyond, other = 0.0, None
     if quantity.startswith("u") and table == 2:
         beyond = _implied_rounding(problem, t, component)
         if (t, component) in _CONTRADICTED:
             right, note = _digits(0.0, quantity, component), _NOTES["contradicted"]
-    elif quantity.startswith("linear") and table != 1:
+    elif component and quantity[0] != "u" and table != 1:
         beyond = _state_rounding(problem, t, component)
-        if (table, t, component) in _OFF:
-            unexplained, note = True, _NOTES["off"]
-    elif quantity.startswith("nonlinear"):
-        unexplained, note = True, _NOTES["nonlinear"]
-        if table == 1 and component == 0:
-            right = _NONLINEAR_MISS
+    if quantity.startswith("nonlinear"):
+        other = published
+        note = note or _NOTES["nonlinear" if component else "norm"]
     unit = "" if quantity.startswith("u") or component == 0 else " (m)" if component <= 3 else " (m/s)"
     name = f"{quantity}({t})" if component else f"nonlinear, norm of x({t})"
     return _REFERENCE.number(
@@ -115,8 +143,9 @@ def _number(row: Row, comparison: Comparison, problem: ReachabilityProblem) -> P
         f"{name}{unit}",
         text,
         ours + 0.0,
+        other=other,
         corrected=right,
-        unexplained=unexplained,
+        unexplained=component == 0,
         beyond=beyond,
         note=note,
     )
