@@ -29,7 +29,7 @@ REMARKS = (
     "by the values that its states imply); their tolerance includes the rounding of these controls.",
     "The nonlinear columns are those of another model: (1) about a circular orbit of radius 90 km, where the orbit of "
     "the linear columns has 9000 km at perigee, with the same rate. Ours are those of the same controls on the orbit "
-    "of the linear columns. No verdict contains a fitted number.",
+    "of the linear columns. The verdicts contain 90 km exactly, not a fitted radius.",
 )
 PUBLISHED_RADIUS_M = 90e3
 """Radius of the orbit of the nonlinear columns: 9000 km, the radius at perigee, with two digits lost."""
