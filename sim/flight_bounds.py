@@ -21,6 +21,8 @@ NEAREST_SHARE = 0.1
 INFLATION = 1.001
 """Factor between a trial and the deviations that follow from the one before."""
 TRIALS = 100
+MODULUS = 0
+"""Row of a deviation."""
 TOO_NEAR = "the motions may come too near the attracting body"
 TOO_SLOW = "gravity may take away the closing speed"
 
@@ -37,6 +39,8 @@ class FlightBounds:
         Least distance of the segment between spacecraft and object from the attracting body, within half a step.
     fastest_m_s : ndarray, shape (N,)
         Greatest speed of a point of the segment relative to the attracting body.
+    distance_m, speed_m_s : ndarray, shape (N,)
+        Greatest modulus of the relative position and velocity.
     offset_m, velocity_m_s : ndarray, shape (axes, N)
         Greatest modulus of each component of the relative position and velocity, x last.
     closing_speed_m_s : float
@@ -46,6 +50,8 @@ class FlightBounds:
     times_s: Floats
     nearest_m: Floats
     fastest_m_s: Floats
+    distance_m: Floats
+    speed_m_s: Floats
     offset_m: Floats
     velocity_m_s: Floats
     closing_speed_m_s: float
@@ -61,7 +67,11 @@ def no_bound(cause: str, range_m: float) -> ValueError:
 
 @dataclass(frozen=True)
 class _Motion:
-    """Positions and velocities of spacecraft and object, in this order, or their deviations: shape (2, axes, N)."""
+    """Positions and velocities of spacecraft and object, in this order, shape (2, axes, N).
+
+    Those of deviations have the shape (2, 1 + axes, N), with the modulus first: the impulses along two axes have a
+    common bound.
+    """
 
     place_m: Floats
     speed_m_s: Floats
@@ -104,10 +114,11 @@ def flight_bounds(
     boxes = [bounds.axis(name) for name in bounds.axes]
     start = np.array([[*(box.z_m for box in boxes), bounds.x_m], [*(box.vz_m_s for box in boxes), bounds.vx_m_s]])
     middle, half = start.mean(axis=2), 0.5 * np.ptp(start, axis=2)
+    half = np.concatenate([np.linalg.norm(half, axis=1, keepdims=True), half], axis=1)
     # All impulses at once, along each axis: the deviations are greatest then.
-    impulses = np.array([*(impulses_m_s for _ in boxes), 0.0])
+    impulses = np.array([impulses_m_s, *(impulses_m_s for _ in boxes), 0.0])
     first = np.array([[np.zeros_like(half[0]), half[0]], [impulses, half[1]]])
-    disturbance = np.array([np.zeros_like(half[0]), [*disturbances_m_s2, 0.0]])
+    disturbance = np.array([np.zeros_like(half[0]), [np.linalg.norm(disturbances_m_s2), *disturbances_m_s2, 0.0]])
     for stretch in STRETCHES:
         times_s = np.linspace(0.0, stretch * bounds.x_m[1] / -bounds.vx_m_s[1], INSTANTS)
         nominal = _nominal(middle, sun, times_s)
@@ -133,29 +144,34 @@ def _deviation(first: Floats, disturbance_m_s2: Floats, nominal: _Motion, times_
     """Return bounds of all deviations from the nominal motion.
 
     A deviation d satisfies |d_i''| <= (K/R^3) (1.5 |d| + 0.5 |d_i|) + disturbance along axis i, with the least distance
-    R from the attracting body that the deviation allows for. The right side increases with |d_i|. A function that is
-    not less than the double integral of the right side for it is therefore a bound of all deviations.
+    R from the attracting body that the deviation allows for, and its modulus the same with |d| in place of |d_i|. The
+    right side increases with both. A function that is not less than the double integral of the right side for it is
+    therefore a bound of all deviations.
     """
     step_s, far_m = times_s[1], np.linalg.norm(nominal.place_m, axis=1)
     fast_m_s = np.linalg.norm(nominal.speed_m_s, axis=1)
     place = np.repeat(first[0, ..., None], INSTANTS, axis=2)
     speed = np.repeat(first[1, ..., None], INSTANTS, axis=2)
     for _ in range(TRIALS):
-        size_m, size_m_s = np.linalg.norm(place, axis=1), np.linalg.norm(speed, axis=1)
+        size_m, size_m_s = place[:, MODULUS], speed[:, MODULUS]
         nearest_m = far_m - size_m - 0.5 * step_s * (fast_m_s + size_m_s)
         too_near = (nearest_m < NEAREST_SHARE * far_m).any(axis=0)
         if too_near.any():
             raise no_bound(TOO_NEAR, nominal.range_m[too_near.argmax()])
         gradient = (sun.gravitational_parameter_m3_s2 / nearest_m**3)[:, None]
         growth = gradient * (1.5 * size_m[:, None] + 0.5 * place) + disturbance_m_s2[..., None]
-        new_place, new_speed = place.copy(), speed.copy()
-        new_speed[..., 1:] = first[1, ..., None] + step_s * np.cumsum(greater_of_neighbours(growth), axis=-1)
-        new_place[..., 1:] = first[0, ..., None] + step_s * np.cumsum(new_speed[..., 1:], axis=-1)
+        new_speed = first[1, ..., None] + step_s * _sums(greater_of_neighbours(growth))
+        new_place = first[0, ..., None] + step_s * _sums(new_speed[..., 1:])
         grows = ((new_place > place) | (new_speed > speed)).any(axis=(0, 1))
         if not grows.any():
             return _Motion(new_place, new_speed)
         place, speed = INFLATION * new_place, INFLATION * new_speed
     raise no_bound(TOO_NEAR, nominal.range_m[grows.argmax()])
+
+
+def _sums(values: Floats) -> Floats:
+    """Return the sums of the first values along the last axis, from none to all."""
+    return np.concatenate([np.zeros((*values.shape[:-1], 1)), np.cumsum(values, axis=-1)], axis=-1)
 
 
 def greater_of_neighbours(values: Floats) -> Floats:
@@ -167,11 +183,12 @@ def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int
     """Return the bounds of a flight until its last arrival."""
     place, speed = nominal.relative
     place_error, speed_error = deviation.place_m.sum(axis=0), deviation.speed_m_s.sum(axis=0)
-    low, high = place - place_error, place + place_error
+    offset = np.abs(place) + place_error[1:]
     # Flights end at x = 0.
-    low[X], high[X] = np.maximum(low[X], 0.0), np.maximum(high[X], 0.0)
-    fastest = np.linalg.norm(nominal.speed_m_s, axis=1) + np.linalg.norm(deviation.speed_m_s, axis=1)
-    fastest_m_s = fastest.max(axis=0)
+    offset[X] = np.maximum(place[X] + place_error[X], 0.0)
+    across = np.linalg.norm(place[:X], axis=0) + place_error[MODULUS]
+    distance = np.minimum(nominal.range_m + place_error[MODULUS], np.hypot(offset[X], across))
+    fastest_m_s = (np.linalg.norm(nominal.speed_m_s, axis=1) + deviation.speed_m_s[:, MODULUS]).max(axis=0)
     closest_m, nearest_m = _distances_of_segment(nominal, deviation)
     nearest_m -= 0.5 * times_s[1] * fastest_m_s
     closing_m_s = -speed[X] - speed_error[X]
@@ -185,8 +202,10 @@ def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int
         times_s=times_s[:instants],
         nearest_m=nearest_m[:instants],
         fastest_m_s=fastest_m_s[:instants],
-        offset_m=np.maximum(np.abs(low), np.abs(high))[:, :instants],
-        velocity_m_s=(np.abs(speed) + speed_error)[:, :instants],
+        distance_m=distance[:instants],
+        speed_m_s=(np.linalg.norm(speed, axis=0) + speed_error[MODULUS])[:instants],
+        offset_m=offset[:, :instants],
+        velocity_m_s=(np.abs(speed) + speed_error[1:])[:, :instants],
         closing_speed_m_s=float(closing_m_s[:instants].min()),
     )
 
@@ -206,5 +225,5 @@ def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats,
         at = np.clip(foot + height * slope / np.sqrt(1.0 - slope**2), 0.0, length)
         return np.asarray(np.hypot(height, at - foot) - of_craft - (of_object - of_craft) * (at / length))
 
-    sizes = np.linalg.norm(deviation.place_m, axis=1)
+    sizes = deviation.place_m[:, MODULUS]
     return least(*np.zeros_like(sizes)), least(*sizes)

@@ -70,9 +70,8 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     disturbances = tuple(model.axis(name).disturbance_m_s2 for name in model.axes)
     flight = flight_bounds(model.bounds, disturbances, sun, impulses_m_s)
     gradient = sun.gravitational_parameter_m3_s2 / flight.nearest_m**3
-    distance, speed = np.linalg.norm(flight.offset_m, axis=0), np.linalg.norm(flight.velocity_m_s, axis=0)
-    pull = 2.0 * gradient * distance
-    jerk = 2.0 * gradient * (speed + 3.0 * distance * flight.fastest_m_s / flight.nearest_m)
+    distance, pull = flight.distance_m, 2.0 * gradient * flight.distance_m
+    jerk = 2.0 * gradient * (flight.speed_m_s + 3.0 * distance * flight.fastest_m_s / flight.nearest_m)
     m, later_pull, later_jerk = flight.closing_speed_m_s, _greatest_later(pull), _greatest_later(jerk)
     offset, velocity = flight.offset_m[:-1], flight.velocity_m_s[:-1]
     tide = gradient * (1.5 * distance + 0.5 * offset)

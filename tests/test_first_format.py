@@ -9,14 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from experiments import load_record
 from experiments.interception.record_file import write_record
 from experiments.interception.scenario_file import load_scenario
-from sim import Body, Campaign, CampaignNoise, Outcome
+from sim import Body, Outcome
 from sim.storage import CampaignFolder, scenario_hash
-from sim.versions import calculating_versions
 
 DATA = Path(__file__).parent / "data" / "first-format"
 HASHES = {
@@ -65,21 +63,6 @@ def test_a_record_is_read_and_written_again(tmp_path: Path) -> None:
     again = load_record(tmp_path / "again.npz")
     assert again.result.outcomes == (Outcome.SET_EMPTY,)
     assert again.result.hit.mask.all()
-
-
-def test_a_folder_of_the_same_libraries_is_resumed(tmp_path: Path) -> None:
-    folder = CampaignFolder.read(DATA / "campaign")
-    if dict(calculating_versions()) != dict(folder.manifest.versions):
-        pytest.skip("the folder was written with other libraries")
-    for file in (DATA / "campaign").rglob("*"):
-        if file.is_file() and "0000001" not in file.name:
-            (tmp_path / file.relative_to(DATA / "campaign")).parent.mkdir(exist_ok=True)
-            (tmp_path / file.relative_to(DATA / "campaign")).write_bytes(file.read_bytes())
-    scenario = load_scenario(DATA / "campaign" / "scenario.toml")
-    result = Campaign(scenario, 8, tmp_path, noise=CampaignNoise.MIXED, chunk=4).run(workers=1, resume=True)
-    whole = folder.table()
-    for name in ("run", "miss_m", "impulse_m_s", "outcome"):
-        assert result.table.column(name).equals(whole.column(name))
 
 
 def test_a_body_is_part_of_the_fingerprint() -> None:

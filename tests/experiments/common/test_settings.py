@@ -50,9 +50,9 @@ def test_a_table_that_the_file_lacks_is_added() -> None:
 
 
 def test_text_needs_no_quotes_and_numbers_have_free_forms() -> None:
-    changed = load_tables(FORM, "pareto-2008", ["name=my meeting", "duration_s=.5e2", 'free=["y"]', "meet=intercept"])
+    changed = load_tables(FORM, "pareto-2008", ["name=my meeting", "duration_s=.5e2", 'free=["x"]', "meet=intercept"])
     assert (changed.name, changed.duration_s, len(changed.free)) == ("my meeting", Decimal(50), 1)
-    assert changed.description.endswith('with name = my meeting, duration_s = .5e2, free = ["y"], meet = intercept')
+    assert changed.description.endswith('with name = my meeting, duration_s = .5e2, free = ["x"], meet = intercept')
 
 
 def test_tables_of_an_array_are_numbered_from_1_as_in_messages() -> None:
