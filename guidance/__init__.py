@@ -3,6 +3,7 @@
 from guidance.estimate import Estimator, MissEstimate
 from guidance.game_noise import GameNoise
 from guidance.kalman import Kalman, KalmanBank
+from guidance.least_effort import LeastEffort
 from guidance.least_squares import LeastSquares, LeastSquaresFit
 from guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, TieRule
 from guidance.patient import Patient
@@ -22,6 +23,7 @@ __all__ = [
     "GameNoise",
     "Kalman",
     "KalmanBank",
+    "LeastEffort",
     "LeastSquares",
     "LeastSquaresFit",
     "LineOfSight",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from guidance.authority import correctable_later_m
 from guidance.predicted_miss import range_at_impulse, symmetric_impulse
 from guidance.situation import Situation
 from infoset.arrays import Floats
@@ -75,33 +76,6 @@ class Patient:
         wanted = np.where(np.abs(urgent) > np.abs(certain), urgent, certain)
         last = np.minimum(upper_range, lower_range) <= LAST_SECONDS_S * e
         return np.where(last, symmetric, wanted)
-
-
-def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
-    """Return the miss (m) that impulses after this step can still correct, if the object is now at `range_m`.
-
-    It is the sum of mu2 x_j/e over the later impulses with x_j > 0, as many as the budget allows.
-    """
-    thruster, e, step_s = situation.thruster, situation.closing_speed_m_s, situation.step_s
-    if situation.later_times_s is not None:
-        return _correctable_at_m(situation.later_times_s - situation.time_s, situation, range_m / e)
-    to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
-    steps = np.ceil(to_go_s / step_s) - 1.0
-    full = np.clip(np.floor(situation.budget_left_m_s / thruster.greatest_impulse_m_s), 0.0, np.maximum(steps, 0.0))
-    return np.asarray(thruster.greatest_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0)))
-
-
-def _correctable_at_m(times_s: Floats, situation: Situation, to_go_s: Floats) -> Floats:
-    """Return the miss (m) that impulses at some times from now can correct; the last one has the rest of the budget."""
-    thruster, budget = situation.thruster, situation.budget_left_m_s
-    number = np.searchsorted(times_s, to_go_s)
-    full = np.minimum(budget // thruster.greatest_impulse_m_s, number).astype(np.int64)
-    rest = np.minimum(budget - full * thruster.greatest_impulse_m_s, thruster.greatest_impulse_m_s)
-    rest = np.where((full < number) & (rest >= thruster.least_impulse_m_s), rest, 0.0)
-    times_s = times_s[: full.max(initial=0) + 1]
-    sums_s = np.append(0.0, np.cumsum(times_s))
-    next_s = np.append(times_s, 0.0)[full]
-    return np.asarray(thruster.greatest_impulse_m_s * (full * to_go_s - sums_s[full]) + rest * (to_go_s - next_s))
 
 
 def _impulse(miss_m: Floats, range_m: Floats, closing_speed_m_s: float) -> Floats:

@@ -7,6 +7,7 @@ from functools import partial
 from types import MappingProxyType
 
 from guidance.kalman import Kalman, KalmanBank
+from guidance.least_effort import LeastEffort
 from guidance.least_squares import LeastSquares, LeastSquaresFit
 from guidance.patient import Patient
 from guidance.predictive import Predictive
@@ -16,14 +17,14 @@ from guidance.symmetric_miss import SymmetricMiss
 from guidance.zero_effort import ZeroEffortMiss
 
 _STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType(
-    {kind.name: kind for kind in (SymmetricMiss, Patient, ZeroEffortMiss, Kalman, LeastSquares)}
+    {kind.name: kind for kind in (SymmetricMiss, LeastEffort, Patient, ZeroEffortMiss, Kalman, LeastSquares)}
     | {f"pn-{kind.name}": partial(ProportionalNavigation, kind) for kind in (KalmanBank, LeastSquaresFit)}
     | {f"apn-{kind.name}": partial(ProportionalNavigation, kind, True) for kind in (KalmanBank, LeastSquaresFit)}
     | {f"predictive-{kind.name}": partial(Predictive, kind) for kind in (KalmanBank, LeastSquaresFit)}
 )
 
 COMPARED = (
-    *("symmetric-miss", "patient", "zero-effort-miss"),
+    *("symmetric-miss", "least-effort", "patient", "zero-effort-miss"),
     *("kalman", "least-squares"),
     *("pn-kalman", "apn-kalman", "predictive-kalman"),
 )

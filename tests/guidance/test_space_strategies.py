@@ -14,6 +14,7 @@ from guidance import (
     GameNoise,
     Kalman,
     KalmanBank,
+    LeastEffort,
     LeastSquares,
     LeastSquaresFit,
     NoiseKind,
@@ -117,6 +118,7 @@ def planar(name: str, whole: Situation) -> Situation:
 ESTIMATORS = {"kalman": KalmanBank, "least-squares": LeastSquaresFit}
 EAGER: dict[str, Strategy] = {
     "symmetric-miss": SymmetricMiss(),
+    "least-effort": LeastEffort(),
     "patient": Patient(0.0),
     "zero-effort-miss": ZeroEffortMiss(),
     "kalman": Kalman(dead_zone=0.0),

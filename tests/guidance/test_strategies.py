@@ -21,10 +21,10 @@ from guidance import (
     ZeroEffortMiss,
     strategy_names,
 )
+from guidance.authority import correctable_later_m
 from guidance.estimate import MissEstimate
 from guidance.kalman import KalmanBank
 from guidance.least_squares import LeastSquaresFit
-from guidance.patient import correctable_later_m
 from infoset import AngleSensor, ExtremePoints, InformationSet, PredictedMiss, RangeSensor, SetModel, StateBox
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw

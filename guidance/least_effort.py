@@ -1,0 +1,139 @@
+"""The strategy that leaves the least effort to later impulses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from guidance.authority import correctable_later_m
+from guidance.predicted_miss import range_at_impulse
+from guidance.situation import Situation
+from infoset._compile import entry
+from infoset.arrays import Floats
+
+PARTS = 4
+"""Parts of the labels between two sections: the deciding time to go is often between sections."""
+LEAST_AUTHORITY_M = 1e-9
+NO_DEMAND_M = 1e200
+"""An excluded label has the interval from this to minus this: it never decides."""
+TRIALS = 60
+
+
+class LeastEffort:
+    """Minimise the greatest share of what later impulses can correct, over all possible times to go.
+
+    Notes
+    -----
+    A hypothesis is a label of the set, with the time to go tau and the interval [l, h] of possible misses. Its
+    *authority* A is the miss that later impulses can correct: the sum of mu2 tau_j over them, as many as schedule,
+    cut-off and budget allow, divided by 1 + eta, the greatest ratio of true and nominal closing speed. The *reference*
+    ref is the miss that no strategy can prevent (`unavoidable_m`). The *effort* rho is the share of the authority that
+    the hypothesis needs after the impulse u, if its worst miss is to become ref:
+
+        rho(u) = (max(h - u tau, u tau - l) - ref) / A .
+
+    The impulse minimises the greatest rho of all hypotheses. If that is more than 1, it minimises the greatest excess
+    max(h - u tau, u tau - l) - A instead. After the last impulse A is zero, and the excess is the miss. An impulse that
+    keeps all excesses below a bound that later impulses can keep too guarantees this bound, and effort costs no more
+    impulses than this asks.
+
+    U_s makes the extreme misses of all hypotheses opposite, as if all were equally urgent. If the range is unknown, one
+    extreme may belong to a hypothesis with 20 s to go, for which later impulses can correct kilometres, and the other
+    one to the truth, 3 s away. If range and closing speed are known, there is one hypothesis, and U_s is optimal.
+
+    Limits: a budget that an adversary can drain, a delay together with a cut-off, and very uncertain speeds, for which
+    large impulses widen the set. docs/strategies.md has the derivation and the measurements.
+    """
+
+    name = "least-effort"
+
+    def start(self, batch: int) -> None:
+        """Start without a state."""
+
+    def decide(self, situation: Situation, state: None) -> Floats:
+        """Return the impulses with the least greatest effort, m/s."""
+        view, e, most = situation.information, situation.closing_speed_m_s, situation.thruster.greatest_impulse_m_s
+        ranges = view.ranges_m
+        pending = situation.pending_m(ranges / e)
+        least, greatest = view.predicted_miss_by_section_m()
+        lower = _between(np.where(view.living, least - pending, NO_DEMAND_M))
+        upper = _between(np.where(view.living, greatest - pending, -NO_DEMAND_M))
+        ranges = _between(ranges)
+        fastest = max(e, *(-vx for vx in view.model.bounds.vx_m_s)) / e
+        authority = correctable_later_m(situation, ranges) / fastest
+        to_go_s = range_at_impulse(ranges, e, situation.lead_s) / e
+        share, reference = 1.0 / np.maximum(authority, LEAST_AUTHORITY_M), unavoidable_m(situation)
+        impulse, effort = balanced((upper - reference) * share, (-lower - reference) * share, to_go_s * share, most)
+        if (effort > 1.0).any():
+            urgent, _ = balanced(upper - authority, -lower - authority, to_go_s, most)
+            impulse = np.where(effort > 1.0, urgent, impulse)
+        return impulse
+
+
+def unavoidable_m(situation: Situation) -> float:
+    """Return the reference of `LeastEffort`, m: a miss that errors of the angles can force; zero with a schedule.
+
+    Two motions that differ by the sum of the error bounds at the first image, at the range x0, and at the range e tau
+    look alike until then. They arrive 2 e tau (h(e tau) + h(x0))/(1 - e tau/x0) apart, less if the bounds of the start
+    are nearer. Half of it, less what the impulses after tau can correct, is a miss of one of the two.
+    """
+    model, thruster, e = situation.information.model, situation.thruster, situation.closing_speed_m_s
+    if situation.later_times_s is not None:
+        return 0.0
+    box, x0 = model.bounds, model.bounds.x_m[0]
+    to_go_s: Floats = model.step_s * np.arange(1.0, math.ceil(x0 / (e * model.step_s)))
+    h = model.angle_sensor.error_bound
+    apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
+    widest_m = 0.5 * (np.ptp(box.z_m) + np.ptp(box.vz_m_s) * box.x_m[1] / e)
+    correctable_m = thruster.greatest_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
+    return float((np.minimum(apart_m, widest_m) - correctable_m).max(initial=0.0))
+
+
+def _between(values: Floats) -> Floats:
+    """Return values of sections, shape (B, S), with `PARTS` - 1 interpolated ones between neighbours."""
+    share = np.arange(PARTS) / PARTS
+    inner = values[:, :-1, None] * (1.0 - share) + values[:, 1:, None] * share
+    return np.concatenate([inner.reshape(len(values), -1), values[:, -1:]], axis=1)
+
+
+def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tuple[Floats, Floats]:
+    """Return the least greatest values of lines, and where they are, both of shape (B,).
+
+    The lines are falling - slopes u and rising + slopes u, of shape (B, L), with |u| <= most.
+    """
+    at, value = np.zeros((2, len(falling)))
+    balance_all(falling, rising, slopes, float(most), at, value)
+    return at, value
+
+
+@entry
+def balance_all(falling: Floats, rising: Floats, slopes: Floats, most: float, at: Floats, value: Floats) -> None:
+    """Write the results of `balanced`: at the minimum the greatest falling and rising lines are equal, or it is an end.
+
+    The next trial is where the two lines that are greatest now intersect, or the middle of the interval that is left.
+    """
+    for b in range(len(at)):
+        low, high, u = -most, most, 0.0
+        for _ in range(TRIALS):
+            fall = rise = -math.inf
+            fall_slope = rise_slope = 0.0
+            for s in range(falling.shape[1]):
+                slope = slopes[b, s]
+                if falling[b, s] - slope * u > fall:
+                    fall, fall_slope = falling[b, s] - slope * u, slope
+                if rising[b, s] + slope * u > rise:
+                    rise, rise_slope = rising[b, s] + slope * u, slope
+            at[b], value[b] = u, max(fall, rise)
+            if fall == rise or low == high:
+                break
+            if fall > rise:
+                low = u
+            else:
+                high = u
+            slope = fall_slope + rise_slope
+            u = u + (fall - rise) / slope if slope > 0.0 else low
+            if not low < u < high:
+                u = 0.5 * (low + high)
+            if abs(u - at[b]) <= 1e-13 * most:
+                break
