@@ -98,10 +98,7 @@ def _between(values: Floats) -> Floats:
 
 
 def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tuple[Floats, Floats]:
-    """Return the least greatest values of lines, and where they are, both of shape (B,).
-
-    The lines are falling - slopes u and rising + slopes u, of shape (B, L), with |u| <= most.
-    """
+    """Return the u, |u| <= most, where the greatest of falling - slopes u and rising + slopes u is least, and it."""
     at, value = np.zeros((2, len(falling)))
     balance_all(falling, rising, slopes, float(most), at, value)
     return at, value
