@@ -42,8 +42,8 @@ class LeastEffort:
     extreme may belong to a hypothesis with 20 s to go, for which later impulses can correct kilometres, and the other
     one to the truth, 3 s away. If range and closing speed are known, there is one hypothesis, and U_s is optimal.
 
-    Limits: a budget that an adversary can drain, a delay together with a cut-off, and very uncertain speeds, for which
-    large impulses widen the set. docs/strategies.md has the derivation and the measurements.
+    Limits: the authority does not contain a budget that an adversary can drain, nor the widening of the set by large
+    impulses at a very uncertain speed. docs/strategies.md has the derivation and the measurements.
     """
 
     name = "least-effort"

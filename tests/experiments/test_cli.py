@@ -238,7 +238,7 @@ def test_the_guaranteed_model_shows_its_certificate(infoset: Command) -> None:
     sets = "true state inside the set at every step: 4 of 4 runs (100 %); set became empty: 0 of 4 runs (0 %)"
     assert out.count(f"{sets}; miss within the bound Phi: 4 of 4 runs") == 4
     reason = "(manoeuvres 0.005 and gravity 3.8e-07, divided by 1 - 0.0172)"
-    assert f"acceleration along z at most 0.0050881 m/s^2 {reason}" in out  # (0.005 + 4.1e-7) / (1 - 1 / 58)
+    assert f"acceleration along z at most 0.0050881 m/s^2 {reason}" in out  # (0.005 + 3.8e-7) / (1 - 1 / 58)
     one = infoset.json("engage", "--model", "guaranteed", "--run", 3)
     assert one["phi_held"] is True
     assert one["truth_margin_m"] == min(step["truth_margin_m"] for step in one["steps"]) >= 0.0
