@@ -430,7 +430,7 @@ def _result_from_json(values: object, run: int, scenario: Scenario) -> Results:
         columns = _RESULT[key]
         components = value if isinstance(value, tuple) else (value,)
         for column, component in zip(columns, components, strict=True):
-            if column.optional and (component is None) == scenario.is_spatial:
+            if column.optional and column.component is not None and (component is None) == scenario.is_spatial:
                 state = "unknown in space" if component is None else "known in a plane"
                 raise ValueError(f"its header has a wrong result: {column.name} is {state}")
         fields[columns[0].field] = _array(columns[0], components)

@@ -51,8 +51,8 @@ from sim.storage.manifest import checksum
 from sim.versions import VersionError
 
 COLUMNS = [
-    *("run", "noise", "tie", "range_meter", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome"),
-    *("set_emptied", "hit", "truth_margin_m"),
+    *("run", "noise", "tie", "range_meter", "miss_m", "impulse_m_s", "guaranteed_miss_m"),
+    *("theorem_8_miss_m", "outcome", "set_emptied", "hit", "truth_margin_m"),
     *("z_km", "x_km", "vz_km_s", "vx_km_s"),
     *("y_km", "vy_km_s", "miss_y_m", "miss_z_m"),
 ]

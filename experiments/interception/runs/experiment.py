@@ -27,6 +27,7 @@ from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.own_strategy import own_strategy
 from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
 from experiments.interception.runs.shared import (
+    THEOREM_8_NAME,
     allowance,
     b_plane_figures,
     bound_name,
@@ -119,7 +120,7 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
     notes = []
     for curve in curves:
         results = curve.results
-        bounds = results.guaranteed_miss_m.compressed()
+        bounds, of_theorem_8 = results.guaranteed_miss_m.compressed(), results.theorem_8_miss_m.compressed()
         rows = (
             (f"{curve.number} {curve.noise.value}", "miss, m", results.miss_m),
             ("  + range meter" if curve.range_meter else "", "impulse, m/s", results.impulse_m_s),
@@ -128,6 +129,8 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
             table.add_row(title, quantity, *(number(value) for value in shown_quantiles(values, levels)))
         (median,) = shown_quantiles(bounds, [0.5]) if len(bounds) else (None,)
         table.add_row("", bound_name(scenario), "", number(median))
+        if len(of_theorem_8):
+            table.add_row("", THEOREM_8_NAME, "", number(shown_quantiles(of_theorem_8, [0.5])[0]))
         lines = [
             f"in {some_runs(count)} {text} ({outcome.value})"
             for outcome, text in endings.items()

@@ -1,0 +1,115 @@
+"""The bound of Theorem 8 of docs/guarantee.md for flights with `least-effort` and one hypothesis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from guidance.authority import correctable_later_m
+from guidance.least_effort import unavoidable_m
+from guidance.situation import Situation
+from infoset import AngleSensor, InitialSet, SetModel
+from infoset.arrays import Flags, Floats
+from infoset.section_law import BOUND_SLACK, PLANE, section_laws
+
+ONE_LABEL = 1e-7
+"""Greatest width of the interval of labels, in labels: the misses of all its labels are the same."""
+
+
+def has_theorem_8(model: SetModel, delay_steps: int) -> bool:
+    """Return whether the assumptions of Theorem 8 that belong to the scenario hold for the program.
+
+    They are the guaranteed model with a box, in a plane; known range and closing speed; angles whose bands are those of
+    Lemma 4; and impulses that are executed exactly and without delay.
+    """
+    is_planar_box = model.is_guaranteed and model.initial_set is InitialSet.BOX and len(model.axes) == 1
+    if not is_planar_box or delay_steps or model.execution_error_relative > 0.0:
+        return False
+    least, greatest = model.label_limits_m
+    fastest = max(-vx for vx in model.bounds.vx_m_s)
+    is_one = greatest - least <= ONE_LABEL * greatest and fastest == model.closing_speed_m_s
+    return is_one and section_laws(model)[0].angles == PLANE
+
+
+class Theorem8:
+    """The bound of the miss by Theorem 8, decision by decision, for B flights.
+
+    Notes
+    -----
+    The possible misses are within the box of the start and within equation (34), which the first image and the present
+    one limit. Psi_s is half the length of this interval less the authority M_s. It does not depend on what the
+    images in between measure. `excess_m` bounds R_s(u_s) by induction. At the first decision and in the dead zone of
+    the engine, where (32) is no bound, R_s(u_s) itself is computed.
+    """
+
+    def __init__(self, model: SetModel, batch: int) -> None:
+        self._law, self._eta = section_laws(model)[0], model.speed_error
+        self._label_m = 0.5 * sum(model.label_limits_m)
+        self._first_s, self._first_rad = np.full((2, batch), np.nan)
+        # Sums over the impulses since the first image: u, u t, |u|, |u| t.
+        self._given = np.zeros((4, batch))
+        self.valid, self._started = np.ones(batch, dtype=bool), np.zeros(batch, dtype=bool)
+        self.excess_m, self._later_m = np.zeros((2, batch))
+
+    @property
+    def miss_m(self) -> Floats:
+        """The bound of the miss after the last decision, m, shape (B,); `known` says where it exists."""
+        # Impulses below the range threshold count in M, and are not given.
+        return np.asarray((self.excess_m + self._later_m) * (1.0 + self._eta) * (1.0 + BOUND_SLACK))
+
+    @property
+    def known(self) -> Flags:
+        """Engagements whose decisions satisfied the assumptions: an image at each one, and a budget of mu2 or more."""
+        return self.valid & self._started
+
+    def decide(self, situation: Situation, wanted_m_s: Floats, given_m_s: Floats, deciding: Flags) -> None:
+        """Add a step: the impulses of the strategy and those of the engine, in the engagements that decide."""
+        angles = situation.measured.get(AngleSensor.name)
+        seen = deciding & situation.is_new(AngleSensor.name)
+        if angles is not None:
+            first = seen & np.isnan(self._first_s)
+            self._first_s[first], self._first_rad[first] = situation.time_s, angles[first]
+        if not situation.may_fire or angles is None:
+            self.valid &= ~deciding | (not situation.may_fire)
+            return
+        self.valid &= ~deciding | (seen & (situation.budget_left_m_s >= situation.thruster.greatest_impulse_m_s))
+        e, w = self._law.closing_speed, self._law.impulse_error
+        to_go_s = max(self._label_m / e - situation.time_s, 0.0)
+        later = correctable_later_m(situation, np.full(len(deciding), e * to_go_s))
+        excess = np.maximum(self.excess_m, self.half_width_m(situation.time_s, angles) - later)
+        start = deciding & ~self._started
+        if start.any():
+            excess[start] = unavoidable_m(situation)
+        exact = start | (wanted_m_s != given_m_s)
+        if exact.any():
+            moved, interval = given_m_s * to_go_s, situation.predicted_miss
+            worst = np.maximum(interval.upper_m - moved, moved - interval.lower_m) - later
+            excess = np.where(exact, np.maximum(excess, worst), excess)
+        size, since_s = np.abs(given_m_s), situation.time_s - self._first_s
+        self.excess_m = np.where(deciding, excess + w * size * to_go_s, self.excess_m)
+        self._later_m = np.where(deciding, later, self._later_m)
+        self._given += np.where(deciding, [given_m_s, given_m_s * since_s, size, size * since_s], 0.0)
+        self._started |= start
+
+    def half_width_m(self, time_s: float, angles_rad: Floats) -> Floats:
+        """Return half the length of the interval of possible misses by the start, the first image and this one, m."""
+        law, w, since_s = self._law, self._law.impulse_error, time_s - self._first_s
+        given, moments, sizes, size_moments = self._given
+        arrival_s = self._label_m / law.closing_speed
+        to_go_s, from_first_s = arrival_s - time_s, arrival_s - self._first_s
+        # The box of the start, moved by the impulses.
+        middle = 0.5 * (law.z_least + law.z_greatest + (law.vz_least + law.vz_greatest) * arrival_s)
+        middle = middle - (from_first_s * given - moments)
+        half = 0.5 * (law.z_greatest - law.z_least + (law.vz_greatest - law.vz_least) * arrival_s)
+        half += 0.5 * law.disturbance * arrival_s * (arrival_s + law.step)
+        half = half + w * (from_first_s * sizes - size_moments)
+        # Equation (34).
+        share = to_go_s / np.where(since_s > 0.0, since_s, np.nan)
+        x0, x = law.closing_speed * from_first_s, law.closing_speed * to_go_s
+        b0, b = (law.error_at_zero_range + law.error_slope * each for each in (x0, x))
+        greatest = x0 * (np.tan(angles_rad + b) - np.tan(self._first_rad - b0)) - moments + w * size_moments
+        least = x0 * (np.tan(angles_rad - b) - np.tan(self._first_rad + b0)) - moments - w * size_moments
+        drift = 0.5 * law.disturbance * to_go_s * (from_first_s + law.step)
+        # `fmin` and `fmax` ignore the first image, for which the share is not a number.
+        upper = np.fmin(middle + half, share * greatest + drift)
+        lower = np.fmax(middle - half, share * least - drift)
+        return 0.5 * (upper - lower)
