@@ -44,10 +44,12 @@ class Theorem8:
     def __init__(self, model: SetModel, batch: int) -> None:
         self._law, self._eta = section_laws(model)[0], model.speed_error
         self._label_m = 0.5 * sum(model.label_limits_m)
-        self._first_s, self._first_rad = np.full((2, batch), np.nan)
+        self._first_s = np.full(batch, np.nan)
+        self._first_slopes = np.zeros((2, batch))
         # Sums over the impulses since the first image: u, u t, |u|, |u| t.
         self._given = np.zeros((4, batch))
         self.valid, self._started = np.ones(batch, dtype=bool), np.zeros(batch, dtype=bool)
+        self._has_first = np.zeros(batch, dtype=bool)
         self.excess_m, self._later_m = np.zeros((2, batch))
 
     @property
@@ -65,9 +67,8 @@ class Theorem8:
         """Add a step: the impulses of the strategy and those of the engine, in the engagements that decide."""
         angles = situation.measured.get(AngleSensor.name)
         seen = deciding & situation.is_new(AngleSensor.name)
-        if angles is not None:
-            first = seen & np.isnan(self._first_s)
-            self._first_s[first], self._first_rad[first] = situation.time_s, angles[first]
+        if angles is not None and not self._has_first.all():
+            self._look_first(seen & ~self._has_first, situation.time_s, angles)
         if not situation.may_fire or angles is None:
             self.valid &= ~deciding | (not situation.may_fire)
             return
@@ -87,7 +88,8 @@ class Theorem8:
         size, since_s = np.abs(given_m_s), situation.time_s - self._first_s
         self.excess_m = np.where(deciding, excess + w * size * to_go_s, self.excess_m)
         self._later_m = np.where(deciding, later, self._later_m)
-        self._given += np.where(deciding, [given_m_s, given_m_s * since_s, size, size * since_s], 0.0)
+        given = np.stack([given_m_s, given_m_s * since_s, size, size * since_s])
+        self._given += given if deciding.all() else np.where(deciding, given, 0.0)
         self._started |= start
 
     def half_width_m(self, time_s: float, angles_rad: Floats) -> Floats:
@@ -97,19 +99,24 @@ class Theorem8:
         arrival_s = self._label_m / law.closing_speed
         to_go_s, from_first_s = arrival_s - time_s, arrival_s - self._first_s
         # The box of the start, moved by the impulses.
-        middle = 0.5 * (law.z_least + law.z_greatest + (law.vz_least + law.vz_greatest) * arrival_s)
-        middle = middle - (from_first_s * given - moments)
-        half = 0.5 * (law.z_greatest - law.z_least + (law.vz_greatest - law.vz_least) * arrival_s)
-        half += 0.5 * law.disturbance * arrival_s * (arrival_s + law.step)
-        half = half + w * (from_first_s * sizes - size_moments)
+        moved, doubt = from_first_s * given - moments, w * (from_first_s * sizes - size_moments)
+        drift = 0.5 * law.disturbance * arrival_s * (arrival_s + law.step)
+        box_upper = (law.z_greatest + law.vz_greatest * arrival_s + drift) - moved + doubt
+        box_lower = (law.z_least + law.vz_least * arrival_s - drift) - moved - doubt
         # Equation (34).
         share = to_go_s / np.where(since_s > 0.0, since_s, np.nan)
-        x0, x = law.closing_speed * from_first_s, law.closing_speed * to_go_s
-        b0, b = (law.error_at_zero_range + law.error_slope * each for each in (x0, x))
-        greatest = x0 * (np.tan(angles_rad + b) - np.tan(self._first_rad - b0)) - moments + w * size_moments
-        least = x0 * (np.tan(angles_rad - b) - np.tan(self._first_rad + b0)) - moments - w * size_moments
-        drift = 0.5 * law.disturbance * to_go_s * (from_first_s + law.step)
+        x0, disturbed = law.closing_speed * from_first_s, 0.5 * law.disturbance * to_go_s * (from_first_s + law.step)
+        error = law.error_at_zero_range + law.error_slope * law.closing_speed * to_go_s
+        first_least, first_greatest = self._first_slopes
+        greatest = x0 * (np.tan(angles_rad + error) - first_least) - moments + w * size_moments
+        least = x0 * (np.tan(angles_rad - error) - first_greatest) - moments - w * size_moments
         # `fmin` and `fmax` ignore the first image, for which the share is not a number.
-        upper = np.fmin(middle + half, share * greatest + drift)
-        lower = np.fmax(middle - half, share * least - drift)
-        return 0.5 * (upper - lower)
+        upper, lower = np.fmin(box_upper, share * greatest + disturbed), np.fmax(box_lower, share * least - disturbed)
+        return np.asarray(0.5 * (upper - lower))
+
+    def _look_first(self, first: Flags, time_s: float, angles_rad: Floats) -> None:
+        """Store the time and the slopes of the first image."""
+        law = self._law
+        error = law.error_at_zero_range + law.error_slope * (self._label_m - law.closing_speed * time_s)
+        self._first_s[first], self._has_first[first] = time_s, True
+        self._first_slopes[:, first] = np.tan(np.stack([angles_rad - error, angles_rad + error]))[:, first]

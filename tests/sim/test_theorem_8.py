@@ -33,7 +33,7 @@ def known() -> Scenario:
 
 def after(bound: Theorem8, first_rad: float, impulses: Sequence[tuple[float, float]] = ()) -> Theorem8:
     """Return the bound after a first image at t = 0 and impulses, each at a time."""
-    bound._first_s[:], bound._first_rad[:] = 0.0, first_rad
+    bound._look_first(np.ones(1, dtype=bool), 0.0, np.array([first_rad]))
     for time_s, u in impulses:
         bound._given[:, 0] += [u, u * time_s, abs(u), abs(u) * time_s]
     return bound
@@ -96,7 +96,8 @@ def test_the_interval_is_the_optimum_of_a_linear_program(known: Scenario, steps:
 def test_the_set_is_within_the_interval_at_each_decision(known: Scenario) -> None:
     for noise in NoiseKind:
         flight = Engagements(replace(known, noise=noise), draw(known, range(20), 3), guarantee=False)
-        bound, widths = flight._theorem_8, []
+        bound = flight._theorem_8
+        widths: list[Floats] = []
         assert bound is not None
 
         def compare(step: Step, bound: Theorem8 = bound, widths: list[Floats] = widths) -> None:
