@@ -80,11 +80,11 @@ class Theorem8:
         start = deciding & ~self._started
         if start.any():
             excess[start] = unavoidable_m(situation)
-        exact = start | (wanted_m_s != given_m_s)
-        if exact.any():
-            moved, interval = given_m_s * to_go_s, situation.predicted_miss
-            worst = np.maximum(interval.upper_m - moved, moved - interval.lower_m) - later
-            excess = np.where(exact, np.maximum(excess, worst), excess)
+        exact = np.flatnonzero(start | (wanted_m_s != given_m_s))
+        if exact.size:
+            moved, interval = given_m_s[exact] * to_go_s, situation.predicted_miss
+            worst = np.maximum(interval.upper_m[exact] - moved, moved - interval.lower_m[exact]) - later[exact]
+            excess[exact] = np.maximum(excess[exact], worst)
         size, since_s = np.abs(given_m_s), situation.time_s - self._first_s
         self.excess_m = np.where(deciding, excess + w * size * to_go_s, self.excess_m)
         self._later_m = np.where(deciding, later, self._later_m)
