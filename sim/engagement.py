@@ -130,7 +130,7 @@ class Engagements:
         self._guaranteed = np.zeros(batch)
         self._finished_label = np.zeros(batch, dtype=bool)
         applies = isinstance(self._strategy, LeastEffort) and has_theorem_8(model, len(self._queue))
-        self._theorem_8 = Theorem8(model, batch) if applies else None
+        self._theorem_8 = Theorem8(model, batch, scenario.thruster.budget_m_s) if applies else None
 
     @property
     def flying(self) -> bool:

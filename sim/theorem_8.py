@@ -41,13 +41,16 @@ class Theorem8:
     the engine, where (32) is no bound, R_s(u_s) itself is computed.
     """
 
-    def __init__(self, model: SetModel, batch: int) -> None:
+    def __init__(self, model: SetModel, batch: int, budget_m_s: float) -> None:
         self._law, self._eta = section_laws(model)[0], model.speed_error
         self._label_m = 0.5 * sum(model.label_limits_m)
+        self._arrival_s = self._label_m / model.closing_speed_m_s
         self._first_s = np.full(batch, np.nan)
         self._first_slopes = np.zeros((2, batch))
-        # Sums over the impulses since the first image: u, u t, |u|, |u| t.
-        self._given = np.zeros((4, batch))
+        # Sums over the impulses since the first image: u, and u t.
+        self._given, self._moments = np.zeros((2, batch))
+        # The sum of |u| in the widening is at most the budget.
+        self._doubt_m_s = self._law.impulse_error * budget_m_s
         self.valid, self._started = np.ones(batch, dtype=bool), np.zeros(batch, dtype=bool)
         self._has_first = np.zeros(batch, dtype=bool)
         self.excess_m, self._later_m = np.zeros((2, batch))
@@ -56,7 +59,11 @@ class Theorem8:
     def miss_m(self) -> Floats:
         """The bound of the miss after the last decision, m, shape (B,); `known` says where it exists."""
         # Impulses below the range threshold count in M, and are not given.
-        return np.asarray((self.excess_m + self._later_m) * (1.0 + self._eta) * (1.0 + BOUND_SLACK))
+        return np.asarray(
+            (self.excess_m + self._later_m + self._doubt_m_s * self._arrival_s)
+            * (1.0 + self._eta)
+            * (1.0 + BOUND_SLACK)
+        )
 
     @property
     def known(self) -> Flags:
@@ -73,7 +80,7 @@ class Theorem8:
             self.valid &= ~deciding | (not situation.may_fire)
             return
         self.valid &= ~deciding | (seen & (situation.budget_left_m_s >= situation.thruster.greatest_impulse_m_s))
-        e, w = self._law.closing_speed, self._law.impulse_error
+        e = self._law.closing_speed
         to_go_s = max(self._label_m / e - situation.time_s, 0.0)
         later = correctable_later_m(situation, np.full(len(deciding), e * to_go_s))
         excess = np.maximum(self.excess_m, self.half_width_m(situation.time_s, angles) - later)
@@ -85,33 +92,35 @@ class Theorem8:
             moved, interval = given_m_s[exact] * to_go_s, situation.predicted_miss
             worst = np.maximum(interval.upper_m[exact] - moved, moved - interval.lower_m[exact]) - later[exact]
             excess[exact] = np.maximum(excess[exact], worst)
-        size, since_s = np.abs(given_m_s), situation.time_s - self._first_s
-        self.excess_m = np.where(deciding, excess + w * size * to_go_s, self.excess_m)
+        given = given_m_s if deciding.all() else np.where(deciding, given_m_s, 0.0)
+        self.excess_m = np.where(deciding, excess, self.excess_m)
         self._later_m = np.where(deciding, later, self._later_m)
-        given = np.stack([given_m_s, given_m_s * since_s, size, size * since_s])
-        self._given += given if deciding.all() else np.where(deciding, given, 0.0)
+        self._given += given
+        self._moments += given * np.where(self._has_first, situation.time_s - self._first_s, 0.0)
         self._started |= start
 
     def half_width_m(self, time_s: float, angles_rad: Floats) -> Floats:
         """Return half the length of the interval of possible misses by the start, the first image and this one, m."""
-        law, w, since_s = self._law, self._law.impulse_error, time_s - self._first_s
-        given, moments, sizes, size_moments = self._given
-        arrival_s = self._label_m / law.closing_speed
+        law, since_s, moments, arrival_s = self._law, time_s - self._first_s, self._moments, self._arrival_s
         to_go_s, from_first_s = arrival_s - time_s, arrival_s - self._first_s
         # The box of the start, moved by the impulses.
-        moved, doubt = from_first_s * given - moments, w * (from_first_s * sizes - size_moments)
+        moved, doubt = from_first_s * self._given - moments, self._doubt_m_s * arrival_s
         drift = 0.5 * law.disturbance * arrival_s * (arrival_s + law.step)
-        box_upper = (law.z_greatest + law.vz_greatest * arrival_s + drift) - moved + doubt
-        box_lower = (law.z_least + law.vz_least * arrival_s - drift) - moved - doubt
+        box_upper = (law.z_greatest + law.vz_greatest * arrival_s + drift + doubt) - moved
+        box_lower = (law.z_least + law.vz_least * arrival_s - drift - doubt) - moved
         # Equation (34).
         share = to_go_s / np.where(since_s > 0.0, since_s, np.nan)
         x0, disturbed = law.closing_speed * from_first_s, 0.5 * law.disturbance * to_go_s * (from_first_s + law.step)
+        disturbed = disturbed + self._doubt_m_s * to_go_s
         error = law.error_at_zero_range + law.error_slope * law.closing_speed * to_go_s
         first_least, first_greatest = self._first_slopes
-        greatest = x0 * (np.tan(angles_rad + error) - first_least) - moments + w * size_moments
-        least = x0 * (np.tan(angles_rad - error) - first_greatest) - moments - w * size_moments
+        greatest = x0 * (np.tan(angles_rad + error) - first_least)
+        least = x0 * (np.tan(angles_rad - error) - first_greatest)
         # `fmin` and `fmax` ignore the first image, for which the share is not a number.
-        upper, lower = np.fmin(box_upper, share * greatest + disturbed), np.fmax(box_lower, share * least - disturbed)
+        upper, lower = (
+            np.fmin(box_upper, share * (greatest - moments) + disturbed),
+            np.fmax(box_lower, share * (least - moments) - disturbed),
+        )
         return np.asarray(0.5 * (upper - lower))
 
     def _look_first(self, first: Flags, time_s: float, angles_rad: Floats) -> None:
