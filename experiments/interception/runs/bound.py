@@ -67,7 +67,7 @@ def run(options: Bound) -> None:
         if options.out is not None:
             from experiments.interception.figures.bound import draw_bound
 
-            written.figure(FIGURE, draw_bound(scenario, lower))
+            written.figure(FIGURE, draw_bound(scenario, lower, {strategy.name: strategy.worst_m for strategy in worst}))
     show(_parts(scenario, lower, nominal, worst, value, options), options.quiet, stdout_taken=written.stdout_taken)
 
 
@@ -219,7 +219,7 @@ def _parts(
     if scenario.is_spatial:
         shape, axes = ("disc", "one axis") if scenario.set_model.angle_sensor.is_disc else ("box", "both axes")
         yield f"errors of the angles in a {shape}: the states of a pair differ along {axes}"
-    yield from (bounds, "", strategies, *value.lines())
+    yield from (bounds, "", strategies, "", *value.lines())
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
     yield "pairs: greatest miss of the states that prove the bound"
