@@ -82,7 +82,7 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
 
     Notes
     -----
-    docs/guarantee.md, "What separates the printed bound from the value", has the proof. Cost: one information set.
+    docs/guarantee.md, Lemma 22, has the proof. Cost: one information set.
     """
     course = _course(scenario)
     exact = replace(course, least_impulse_m_s=0.0, threshold_m=0.0, is_small=True)
@@ -127,7 +127,7 @@ def _course(scenario: Scenario) -> _Course:
     nearest_m = CENTROID_ERRORS_AT_THRESHOLD * (model.angle_sensor.centroid_error_m or 0.0)
     widest = InformationSet(replace(model, bounds=centred, range_threshold_m=nearest_m), guarantee=False)
     steps = math.ceil(box.x_m[0] / (e * step_s) * (1.0 - ROUNDING))
-    ranges_m = box.x_m[0] - e * step_s * np.arange(steps)
+    ranges_m: Floats = box.x_m[0] - e * step_s * np.arange(steps, dtype=np.float64)
     every, half_width_m = model.steps_in(model.angle_sensor.period_s), np.full(steps, np.inf)
     before_s = (scenario.nominal_arrival_s - step_s * np.arange(steps)).tolist()
     measured = np.array([i % every == 0 and model.angle_sensor.measures_at(before_s[i]) for i in range(steps)])
@@ -190,6 +190,6 @@ def _wider(sensor: AngleSensor, range_m: float, slope: float) -> float:
         if seen_rad >= 0.5 * math.pi:
             return math.inf
         if seen_rad == before_rad:
-            return greatest / bound / math.cos(seen_rad) ** 2
+            return math.tan(greatest) / math.tan(bound) / math.cos(seen_rad) ** 2
         greatest = max(greatest, sensor.error_bound(range_m / math.cos(seen_rad)))
     return math.inf

@@ -219,7 +219,8 @@ def _parts(
     if scenario.is_spatial:
         shape, axes = ("disc", "one axis") if scenario.set_model.angle_sensor.is_disc else ("box", "both axes")
         yield f"errors of the angles in a {shape}: the states of a pair differ along {axes}"
-    yield from (bounds, "", strategies, "", *value.lines())
+    yield from (bounds, "", strategies, "")
+    yield from value.lines()
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
     yield "pairs: greatest miss of the states that prove the bound"

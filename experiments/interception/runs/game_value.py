@@ -114,12 +114,13 @@ def value_of(scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrat
     """Return what is known of the value of the game from the lower bound and the engagements of strategies."""
     searched = [strategy for strategy in worst if strategy.searched.engagements]
     best = min(searched, key=lambda strategy: strategy.worst_m, default=None)
-    reasons, reserve = why_no_value(scenario), None
-    if not reasons:
-        reserve = value_reserve(scenario, lower)
-        if isinstance(reserve, str):
-            reasons, reserve = (reserve,), None
-    return GameValue(lower.bound_m, reserve, reasons, best)
+    failed = why_no_value(scenario)
+    reserve = failed if failed else value_reserve(scenario, lower)
+    if isinstance(reserve, str):
+        reserve = (reserve,)
+    if isinstance(reserve, ValueReserve):
+        return GameValue(lower.bound_m, reserve, (), best)
+    return GameValue(lower.bound_m, None, reserve, best)
 
 
 def _without_unit(values: dict[str, float]) -> dict[str, float]:
