@@ -155,8 +155,9 @@ class Bound(FileOptions):
     Two true states whose measurements are equal until some step receive equal impulses until that step, so at least
     one of them misses. The bound is the greatest miss, the least distance of the flight, that such pairs prove. In
     space, the two states differ along both axes if the errors of the angles are in a box, and along one axis if they
-    are in a disc. Each strategy is simulated with these pairs, and in the searches of infoset adversary. Without --out
-    or --json no file is written.
+    are in a disc. Each strategy is simulated with these pairs, and in the searches of infoset adversary. Where range
+    and closing speed are known and there is no gravity, the bound is the value of the game up to a reserve, which is
+    printed; otherwise the least of the greatest misses found is. Without --out or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"

@@ -1,15 +1,28 @@
-"""The lower bound of the miss that any strategy can guarantee: over the label, and the pair that proves it."""
+"""The lower bound of the miss that any strategy can guarantee: over the label, its pair, and strategies against it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import NullLocator, StrMethodFormatter
 
-from experiments.common.figure_style import INK, LIMIT, SET_EDGE, SET_FILL, figure_grid, style
+from experiments.common.figure_style import (
+    INK,
+    LIMIT,
+    SET_EDGE,
+    SET_FILL,
+    TRUTH,
+    new_figure,
+    place_axes,
+    separate_labels,
+    style,
+)
+from experiments.common.screen import number
 from infoset.arrays import Floats
 from sim import Scenario
 from sim.bound import LowerBound
@@ -20,20 +33,42 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#08306b", "linestyle": "-", "marker": "s"},
     {"color": "#5a9bd4", "linestyle": (0, (4, 1.5)), "marker": "^"},
 )
+_COLUMN_MM, _PANEL_MM, _ROW_MM, _TITLE_MM = 88.0, 58.0, 5.0, 6.0
+_LEFT_MM, _RIGHT_MM, _MM_A_CHARACTER = 15.0, 2.0, 1.45
+_ROWS_OF_NAME = 4
+"""Number of strategies from which the text at the bound has its value."""
+_BETWEEN_MM = 17.0
+"""Height of the title above a panel and of the labels below it."""
+_WIDE = 8.0
+"""Ratio of the greatest miss to the bound from which the axis of misses is logarithmic."""
 _SECONDS_SHOWN = 3.0
 """Length of the time axis, in durations between the last equal measurement and the arrival."""
 
 
-def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
-    """Draw (a) the bound over the label, one curve per closing speed, and (b) the true states that prove it.
+def draw_bound(scenario: Scenario, lower: LowerBound, worst_m: Mapping[str, float] | None = None) -> Figure:
+    """Draw the bound in one column: over the label, the true states that prove it, and the misses of strategies.
 
-    The bound is the result of `sim.lower_bound` for this scenario. In space, (b) has the offset of the two states along
-    the direction of their difference at x = 0. A bound by a single motion has its offset from the x axis.
+    Panel (a) has one curve per closing speed, (b) the motions of the pair, (c) the greatest misses found, `worst_m`,
+    m, by the name of the strategy; without them it is left out. The bound is the result of `sim.lower_bound` for this
+    scenario. In space, (b) has the offset of the two states along the direction of their difference at x = 0. A bound
+    by a single motion has its offset from the x axis.
     """
+    heights_mm = [_PANEL_MM, _PANEL_MM]
+    if worst_m:
+        heights_mm.append(_ROW_MM * (len(worst_m) + 1))
     with style():
-        figure, (left, right) = figure_grid(85.0, 1, 2, (13.0, 4.0, 12.0, 7.0), (14.0, 0.0))
-        _draw_labels(left, lower)
-        _draw_pair(right, scenario, lower)
+        height_mm = sum(heights_mm) + _BETWEEN_MM * len(heights_mm)
+        figure = new_figure(height_mm, _COLUMN_MM)
+        top_mm, panels = height_mm, []
+        for each_mm in heights_mm:
+            margins_mm = (_LEFT_MM, _RIGHT_MM, top_mm - _TITLE_MM - each_mm, height_mm - top_mm + _TITLE_MM)
+            ((axes,),) = place_axes(figure, 1, 1, margins_mm=margins_mm, gaps_mm=(0.0, 0.0))
+            panels.append(axes)
+            top_mm -= each_mm + _BETWEEN_MM
+        _draw_labels(panels[0], lower)
+        _draw_pair(panels[1], scenario, lower)
+        if worst_m:
+            _draw_strategies(panels[2], lower.bound_m, worst_m)
     return figure
 
 
@@ -66,7 +101,7 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
     place: dict[str, Any] = {"xytext": (7.0, 3.0), "textcoords": "offset points"}
     axes.annotate(f"{pair.bound_m:.1f} m", (pair.label_m / 1e3, pair.bound_m), color=INK, **place)
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.5 * (high - low))  # space for the legend
+    axes.set_ylim(low, high + (0.75 if banded else 0.5) * (high - low))  # space for the legend
     axes.set_title("(a) bound for all strategies")
     axes.set_xlabel("label: range at $t = 0$, km")
     axes.set_ylabel("lower bound of the guaranteed miss, m")
@@ -101,12 +136,12 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     axes.plot([], [], color=INK, linewidth=0.8, linestyle=":", label="with the largest correction")
     top *= 1.12
     if not pair.is_single:
-        axes.axvline(alike_until, ymax=0.72, color=LIMIT, linewidth=0.8, linestyle="--")
+        axes.axvline(alike_until, ymax=0.6, color=LIMIT, linewidth=0.8, linestyle="--")
         place: dict[str, Any] = {"ha": "left", "va": "bottom", "fontsize": 7.0}
         axes.text(alike_until, -0.93 * top, "  measurements\n  equal until here", color=LIMIT, **place)
     _bracket(axes, shown, float(half[-1]), pair.correction_m)
     axes.set_xlim(shown, -0.3 * shown)
-    axes.set_ylim(0.0 if pair.is_single else -top, 1.4 * top if pair.is_single else top)
+    axes.set_ylim(0.0 if pair.is_single else -top, 1.4 * top)
     axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
     axes.set_xlabel("time to arrival, s")
     what = "offset" if scenario.is_spatial else "$z$"
@@ -117,6 +152,41 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
         axes.set_title("(b) pair of true states that proves the bound")
         axes.set_ylabel(f"{what} relative to the midpoint, m")
     axes.legend(loc="upper right", handlelength=2.0, borderaxespad=0.2)
+
+
+def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -> None:
+    """Draw the greatest misses found, the least at the top, against the bound."""
+    rows = sorted(worst_m.items(), key=lambda item: item[1])
+    greatest = max(bound_m, rows[-1][1])
+    texts = [f"{name}, {number(miss_m)} m" for name, miss_m in rows]
+    width_mm = _COLUMN_MM - _LEFT_MM - _RIGHT_MM
+    # Each text must fit between its mark and the right side.
+    places = [max(0.3, 0.97 - _MM_A_CHARACTER * len(text) / width_mm) for text in texts]
+    if bound_m > 0.0 and greatest > _WIDE * bound_m:
+        low = bound_m / (greatest / bound_m) ** 0.2
+        high = max(low * (miss_m / low) ** (1.0 / place) for place, (_, miss_m) in zip(places, rows, strict=True))
+        axes.set_xscale("log")
+        ticks = [digit * 10.0**power for power in range(-3, 10) for digit in (1, 2, 5)]
+        axes.set_xticks([tick for tick in ticks if low < tick < 2.0 * greatest])
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.xaxis.set_minor_locator(NullLocator())
+    else:
+        low, high = 0.0, max(miss_m / place for place, (_, miss_m) in zip(places, rows, strict=True)) or 1.0
+    axes.axvspan(low, bound_m, color="#e8e8e8", linewidth=0.0)
+    axes.axvline(bound_m, color=INK, linewidth=1.2)
+    beside: dict[str, Any] = {"xytext": (-2.0, 0.0), "textcoords": "offset points", "rotation": 90.0}
+    name = "bound" if len(rows) < _ROWS_OF_NAME else f"bound, {number(bound_m)} m"
+    axes.annotate(name, (bound_m, 0.5 * (len(rows) - 1)), ha="right", va="center", fontsize=7.0, **beside)
+    for row, (text, (_, miss_m)) in enumerate(zip(texts, rows, strict=True)):
+        axes.plot([bound_m, miss_m], [row, row], color=SET_EDGE, linewidth=0.8)
+        axes.plot(miss_m, row, marker="o", markersize=4.0, color=TRUTH)
+        axes.annotate(text, (miss_m, row), xytext=(5.0, 0.0), textcoords="offset points", va="center", fontsize=7.0)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_yticks([])
+    axes.set_xlim(low, high)
+    axes.set_title("(c) strategies against the bound")
+    axes.set_xlabel("greatest miss found, m")
+    separate_labels(axes)
 
 
 def _draw_equal_measurements(axes: Axes, scenario: Scenario, pair: TruthPair, shown: float) -> float:

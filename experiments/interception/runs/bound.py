@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -24,52 +24,16 @@ from experiments.common.screen import (
 )
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Bound
+from experiments.interception.runs.game_value import GameValue, WorstOfStrategy, value_of
 from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
-from experiments.interception.study import greatest_guarantee_m
 from guidance import Strategy
-from sim import BoundError, Record, Results, Scenario
+from sim import BoundError, Scenario
 from sim.bound import LowerBound, lower_bound, pair_at
-from sim.pair import PairFlight, fly_pair
-from sim.results import join
+from sim.pair import fly_pair
 from sim.truth_pair import TruthPair
 
 FIGURE = "figure-bound"
-
-
-@dataclass(frozen=True)
-class WorstOfStrategy:
-    """Simulations of one strategy: the pairs of the bound, and the worst engagements of the searches."""
-
-    name: str
-    flights: tuple[tuple[TruthPair, PairFlight], ...]
-    searched: WorstMisses
-    records: tuple[Record, ...]
-
-    @property
-    def results(self) -> Results:
-        """Results of all simulations."""
-        return join([*(flight.results for _, flight in self.flights), *(record.result for record in self.records)])
-
-    @property
-    def pairs_m(self) -> float:
-        """Greatest miss of the pairs, m."""
-        return max(float(flight.results.miss_m.max()) for _, flight in self.flights)
-
-    @property
-    def set_kept_m(self) -> float | None:
-        """Greatest miss of the engagements whose set never became empty, m; None if there is none."""
-        results = self.results
-        return max(results.miss_m[~results.set_emptied].tolist(), default=None)
-
-    @property
-    def guaranteed_m(self) -> float | None:
-        """Greatest guaranteed miss of all simulations, m; None if the model has no guarantee."""
-        return greatest_guarantee_m(self.results)
-
-    def over(self, lower: LowerBound) -> float | None:
-        """Return the greatest miss with the set never empty, divided by the bound; None if one of them is missing."""
-        return self.set_kept_m / lower.bound_m if lower.bound_m > 0.0 and self.set_kept_m is not None else None
 
 
 def run(options: Bound) -> None:
@@ -90,19 +54,21 @@ def run(options: Bound) -> None:
                 "scenario with: infoset scenarios check FILE"
             ) from None
         worst = _simulate(scenario, lower, strategies, options, begin)
+        value = value_of(scenario, lower, worst)
         summary = {
             **summary_head(scenario, warnings),
             "model": scenario.set_model.kind.value,
             "elapsed_s": perf_counter() - began_s,
             **_summary(scenario, lower, nominal, worst),
+            "value": value.summary(),
         }
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         if options.out is not None:
             from experiments.interception.figures.bound import draw_bound
 
-            written.figure(FIGURE, draw_bound(scenario, lower))
-    show(_parts(scenario, lower, nominal, worst, options), options.quiet, stdout_taken=written.stdout_taken)
+            written.figure(FIGURE, draw_bound(scenario, lower, {strategy.name: strategy.worst_m for strategy in worst}))
+    show(_parts(scenario, lower, nominal, worst, value, options), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _simulate(
@@ -168,7 +134,7 @@ def _summary(
         "strategies": [
             {
                 "name": strategy.name,
-                "worst_found_m": float(strategy.results.miss_m.max()),
+                "worst_found_m": strategy.worst_m,
                 "worst_found_set_kept_m": strategy.set_kept_m,
                 "guaranteed_m": strategy.guaranteed_m,
                 "worst_over_bound": strategy.over(lower),
@@ -219,7 +185,12 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
 
 
 def _parts(
-    scenario: Scenario, lower: LowerBound, nominal: TruthPair, worst: Sequence[WorstOfStrategy], options: Bound
+    scenario: Scenario,
+    lower: LowerBound,
+    nominal: TruthPair,
+    worst: Sequence[WorstOfStrategy],
+    value: GameValue,
+    options: Bound,
 ) -> Iterator[Part]:
     titles = ("closing speed\nkm/s", "bound\nm", "range at t = 0\nkm", "equal measurements until\ns before arrival")
     bounds = number_table(*titles)
@@ -248,7 +219,8 @@ def _parts(
     if scenario.is_spatial:
         shape, axes = ("disc", "one axis") if scenario.set_model.angle_sensor.is_disc else ("box", "both axes")
         yield f"errors of the angles in a {shape}: the states of a pair differ along {axes}"
-    yield from (bounds, "", strategies)
+    yield from (bounds, "", strategies, "")
+    yield from value.lines()
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
     yield "pairs: greatest miss of the states that prove the bound"

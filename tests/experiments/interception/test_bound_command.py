@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.common.screen import number
 from experiments.interception.figures.bound import draw_bound, ripples
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from guidance.registry import COMPARED
@@ -24,8 +25,9 @@ from tests.space import in_space
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
 KEYS = [
     *("version", "scenario", "scenario_hash", "model", "elapsed_s", "disturbance_m_s2"),
-    *("lower_bound_m", "reached_at", "at_nominal_range", "by_label", "strategies"),
+    *("lower_bound_m", "reached_at", "at_nominal_range", "by_label", "strategies", "value"),
 ]
+IS_VALUE = "the bound is the value of the game up to a reserve of "
 
 Infoset = Callable[..., tuple[int, str, str]]
 
@@ -109,6 +111,57 @@ def test_bound_into_a_folder(
         assert title in out
     assert "miss / bound: greatest miss of pairs and search, without sets that became empty" in out
     assert re.search(r"^guaranteed: ", out, re.MULTILINE)
+    best = min(found["strategies"], key=lambda each: each["worst_found_m"])
+    assert found["value"] == {
+        "at_least_m": found["lower_bound_m"],
+        "at_most_m": None,
+        "reserve_m": None,
+        "not_proved_because": ["gravity", "range not exactly known", "closing speed not exactly known"],
+        "best_strategy": best["name"],
+        "best_strategy_worst_found_m": best["worst_found_m"],
+    }
+    assert (
+        "the value of the game lies between the bound and what the best strategy guarantees: "
+        f"{found['lower_bound_m']:.3g} m and {best['worst_found_m']:.3g} m ({best['name']}); the upper end is found, "
+        "not proved\n"
+    ) in out
+    assert (
+        "a proof of the upper end does not cover: gravity, range not exactly known, closing speed not exactly known\n"
+    ) in out
+    assert IS_VALUE not in out
+
+
+def test_value_where_range_and_speed_are_known(infoset: Infoset, short: Scenario, tmp_path: Path) -> None:
+    box = replace(short.set_model.bounds, x_m=(1745e3, 1745e3), vx_m_s=(-58e3, -58e3))
+    free = replace(short, sun=None, dispersion=box, set_model=replace(short.set_model, bounds=box))
+    file = tmp_path / "free.toml"
+    file.write_text(scenario_to_toml(free))
+    options = (file, "--strategies", "least-effort,symmetric-miss", "--json", tmp_path / "found.json", "--overwrite")
+    code, out, _ = infoset(*options, "--budget", 100)
+    assert code == 0
+    found = json.loads((tmp_path / "found.json").read_text())
+    value, symmetric = found["value"], found["strategies"][1]
+    parts = value["reserve_m"]
+    total = parts.pop("total")
+    assert list(parts) == ["lower_bound", "tangent", "dead_zone", "range_threshold"]
+    assert total == pytest.approx(sum(parts.values()))
+    assert (value["at_least_m"], value["not_proved_because"]) == (found["lower_bound_m"], [])
+    assert value["at_most_m"] == pytest.approx(found["lower_bound_m"] + total)
+    assert found["lower_bound_m"] <= symmetric["worst_found_m"] <= value["at_most_m"] < 1.1 * found["lower_bound_m"]
+    assert f"{IS_VALUE}{total:.3g} m: no strategy guarantees less than {found['lower_bound_m']:.3g} m" in out
+    assert re.search(r"^reserve, m: lower bound \S+, tangent \S+, dead zone \S+, range threshold \S+$", out, re.M)
+    assert "found, not proved" not in out
+    code, out, _ = infoset(*options, "--budget", 0, "--set", "thruster.budget_m_s=100")
+    assert code == 0
+    value = json.loads((tmp_path / "found.json").read_text())["value"]
+    (reason,) = value["not_proved_because"]
+    assert reason.startswith("budget below the ")
+    assert [value[key] for key in ("at_most_m", "reserve_m", "best_strategy", "best_strategy_worst_found_m")] == [
+        None
+    ] * 4
+    assert f"a proof of the upper end does not cover: {reason}\n" in out
+    assert "without a search it has no upper end" in out
+    assert IS_VALUE not in out
 
 
 @pytest.mark.usefixtures("known")
@@ -254,6 +307,23 @@ def test_figure_of_few_labels_and_of_many(short: Scenario, planar: LowerBound) -
     (left, _) = draw_bound(short, many).axes
     assert len(left.collections) == 1  # the ripple as a band
     assert len(left.get_lines()[0].get_xydata()) == 3  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("greatest_m", [40.0, 4e3])
+def test_figure_of_strategies(greatest_m: float, short: Scenario, planar: LowerBound) -> None:
+    worst_m = {"patient": greatest_m, "least-effort": 26.0, "module.OfAnEngineer": 30.0}
+    figure = draw_bound(short, planar, worst_m)
+    width_mm, _ = 25.4 * figure.get_size_inches()
+    assert width_mm == pytest.approx(88.0)  # a column of a paper
+    axes = figure.axes[2]
+    assert axes.get_xscale() == ("linear" if greatest_m < 100.0 else "log")
+    marks = [line.get_xydata().tolist()[0] for line in axes.get_lines() if line.get_marker() == "o"]  # type: ignore[union-attr]
+    assert marks == [[26.0, 0.0], [30.0, 1.0], [greatest_m, 2.0]]
+    assert axes.get_lines()[0].get_xdata()[0] == planar.bound_m  # type: ignore[index]
+    named = [text.get_text() for text in axes.texts]
+    assert named == ["bound", "least-effort, 26 m", "module.OfAnEngineer, 30 m", f"patient, {number(greatest_m)} m"]
+    frame = axes.get_window_extent()
+    assert all(text.get_window_extent().x1 <= frame.x1 for text in axes.texts)
 
 
 @pytest.mark.usefixtures("unrendered")
