@@ -260,18 +260,21 @@ class Engagements:
 
     def _manoeuvre(self, sight: Sight) -> Floats | None:
         """Return the acceleration of the targets over this step; None without a target that manoeuvres."""
-        target = self.scenario.target
-        if self._target is None and (target is None or self._draws.target is None):
-            return None
-        step_s = self.scenario.set_model.step_s
-        left = np.maximum(self._arrival_s - self.step * step_s, 0.0)
-        predicted = (sight.omega_rad_s * sight.range_m - self._impulse) * left
         if self._target is not None:
-            return self._target.acceleration_m_s2(self.step, predicted)
+            return self._target.acceleration_m_s2(self.step, self._true_predicted_miss(sight))
+        target, draws = self.scenario.target, self._draws.target
+        if target is None or draws is None:
+            return None
+        predicted = self._true_predicted_miss(sight)
         if isinstance(self._noise, GameNoise):
             side = self._noise.truth_side
             predicted = np.where(side == 0.0, predicted, side)
-        return acceleration_m_s2(target, self._draws.target, self.step, step_s, predicted)
+        return acceleration_m_s2(target, draws, self.step, self.scenario.set_model.step_s, predicted)
+
+    def _true_predicted_miss(self, sight: Sight) -> Floats:
+        """Return the signed misses of the true states without further impulses, m, shape (B,), or (2, B) in space."""
+        left_s = np.maximum(self._arrival_s - self.step * self.scenario.set_model.step_s, 0.0)
+        return np.asarray((sight.omega_rad_s * sight.range_m - self._impulse) * left_s)
 
     def _pending(self) -> Pending:
         """Return the impulses that are decided and not given yet, with the times from now to them, s."""

@@ -10,11 +10,13 @@ import pytest
 from guidance import GameNoise, NoiseKind, Situation, TieRule
 from guidance.scripted_noise import ScriptedNoise
 from infoset import Convention, ErrorShape, InitialSet, Model, RateSensor, StateBox
-from sim import Outcome, Scenario
+from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.closed_form import worst_shift_m
 from sim.draws import corners, draw
 from sim.engagement import Engagements
+from sim.first_plans import FirstPlans
+from sim.planned_flights import PlannedTarget, Plans, PlanSpace
 from sim.target import GivenTarget
 from tests.space import in_space
 
@@ -268,3 +270,42 @@ def test_with_a_cut_off_the_search_begins_with_game_noise_and_its_shift(coarse: 
     shifted = GameNoise(TieRule.UPPER, np.ones((1, 1)), worst_shift_m(game), side)
     assert first.miss_m == pytest.approx(miss_m(shifted), rel=1e-9)
     assert first.miss_m > 1.05 * miss_m(GameNoise(TieRule.UPPER, np.ones((1, 1))))
+
+
+def test_a_planned_target_keeps_its_sign_or_increases_the_miss() -> None:
+    """Along y at 0.1 m/s^2 and z at 0.2: signs of the plan, and of the predicted miss where the plan has none."""
+    sides = np.array([[[1.0], [0.0]], [[0.0], [-1.0]]])
+    none = np.zeros(2, dtype=np.int64)
+    plans = Plans(np.zeros((2, 6)), np.zeros((2, 3, 2, 1)), np.ones((2, 1), dtype=bool), sides, none, none)
+    target = PlannedTarget(plans, np.array([0.1, 0.2]))
+    predicted_miss_m = np.array([[-5.0, -5.0], [3.0, 3.0]])
+    assert target.acceleration_m_s2(0, predicted_miss_m).tolist() == [[0.1, -0.1], [0.2, -0.2]]
+    assert target.accelerations_m_s2[..., 0].tolist() == [[0.1, 0.2], [-0.1, -0.2]]
+
+
+def test_targets_accelerate_at_the_bound_of_the_model_or_as_that_of_the_scenario(coarse: Scenario) -> None:
+    plane = guaranteed(coarse)
+    assert PlanSpace.of(plane, 10).acceleration_m_s2.tolist() == [0.005]
+    fast = replace(plane, target=Target(Manoeuvre.CONSTANT, 0.02))
+    assert PlanSpace.of(fast, 10).acceleration_m_s2.tolist() == [0.02]
+    spatial = in_space(plane)
+    spatial = replace(spatial, set_model=replace(spatial.set_model, disturbance_y_m_s2=0.01))
+    assert PlanSpace.of(spatial, 10).acceleration_m_s2.tolist() == [0.01, 0.005]
+    for still in (coarse, replace(coarse, target=Target(Manoeuvre.CONSTANT, 0.02))):
+        assert not PlanSpace.of(still, 10).has_accelerations
+    found = find_worst(coarse, budget=1, seed=2)
+    assert found.accelerations_m_s2 is found.target() is None
+
+
+def test_a_search_flies_constant_blockwise_and_increasing_accelerations(coarse: Scenario) -> None:
+    space = PlanSpace.of(guaranteed(coarse), 200)
+    plans = FirstPlans(space, np.random.default_rng(0)).make(90)
+    of_game = np.concatenate([each.sides for each, tie in plans if tie is not None])
+    others = np.concatenate([each.sides for each, tie in plans if tie is None])
+    assert (np.abs(of_game).min(axis=-1) == 1.0).all()
+    assert (of_game == of_game[..., :1]).all()
+    is_increasing = (others == 0.0).all(axis=(1, 2))
+    is_constant = (others == others[..., :1]).all(axis=(1, 2)) & ~is_increasing
+    is_in_blocks = (np.abs(others) == 1.0).all(axis=(1, 2)) & ~is_constant
+    for kind in (is_increasing, is_constant, is_in_blocks):
+        assert 5 <= np.count_nonzero(kind) <= 30
