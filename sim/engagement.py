@@ -321,7 +321,7 @@ class Engagements:
     def _finish_labels(self) -> None:
         """Drop labels below the threshold, and store the predicted misses of those whose control ends."""
         information, is_over = self._information, self._control_is_over()
-        if not (self._label_ends.begin_to_end(is_over) or information.sections_are_leaving()):
+        if not (self._label_ends.ends_now(is_over) or information.sections_are_leaving()):
             information.drop_below_threshold()
             return
         living, labels = information.living.copy(), information.labels_m.copy()

@@ -43,7 +43,7 @@ class LabelEnds:
         # Labels, which sections count, and their misses: impulses move them until their range is zero.
         self._moving: list[tuple[Floats, Flags, Floats]] = []
 
-    def begin_to_end(self, control_is_over: Flags) -> bool:
+    def ends_now(self, control_is_over: Flags) -> bool:
         """Return whether control ends now in an engagement where it had not ended before."""
         return bool((control_is_over & ~self._is_over).any())
 
@@ -57,7 +57,7 @@ class LabelEnds:
         for labels, counts, misses in self._moving:
             to_go_s = np.maximum(labels / self._model.closing_speed_m_s - time_s, 0.0)
             if not (counts & (to_go_s > 0.0)).any():
-                self._settle(labels, counts, misses)
+                self._settled_m = np.maximum(self._settled_m, self._reached_m(labels, counts, misses))
                 continue
             misses[0] -= (impulse + doubt)[..., None] * to_go_s
             misses[1] -= (impulse - doubt)[..., None] * to_go_s
@@ -93,16 +93,14 @@ class LabelEnds:
         The true state is such a state if it was always inside its section. Where the set became empty, or no section
         has ended, it is the only one.
         """
-        for part in self._moving:
-            self._settle(*part)
-        self._moving = []
         ended = self._exists & ~results.set_emptied
         of_truth = np.where(ended & ~results.truth_kept, 0.0, results.miss_m)
-        return np.maximum(np.where(ended, self._settled_m, 0.0), of_truth)
+        of_sections = np.maximum.reduce([self._settled_m, *(self._reached_m(*part) for part in self._moving)])
+        return np.maximum(np.where(ended, of_sections, 0.0), of_truth)
 
-    def _settle(self, labels: Floats, counts: Flags, misses: Floats) -> None:
-        reached = np.where(counts, _greatest(misses) * self._scale(labels), 0.0).max(axis=1)
-        self._settled_m = np.maximum(self._settled_m, reached)
+    def _reached_m(self, labels: Floats, counts: Flags, misses: Floats) -> Floats:
+        """Return the greatest true miss of some sections of each engagement, m, shape (B,)."""
+        return np.asarray(np.where(counts, _greatest(misses) * self._scale(labels), 0.0).max(axis=1))
 
     def _scale(self, labels: Floats) -> Floats:
         """Return the greatest 1 + eta of a label: a length of the guaranteed model times 1 + eta is the true one.
