@@ -36,6 +36,7 @@ from sim.truth_section import TruthSection
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+LEAST_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 Pending = tuple[tuple[float, Floats], ...]
 """Impulses that are decided and not given yet: times from now, s, and impulses, m/s."""
 
@@ -180,7 +181,7 @@ class Engagements:
         self._truth.fire(self._executed(self._impulse))
         self._information.shift(self._impulse, self._flying)
         self._truth_section.shift(self._impulse, given > 0.0)
-        self._label_ends.fire(np.where(self._flying, self._impulse, 0.0), self.step * model.step_s)
+        self._label_ends.fire(self._impulse, self._flying, self.step * model.step_s)
         self._finish_labels()
         self._information.predict()
         self._truth_section.predict()
@@ -330,10 +331,13 @@ class Engagements:
 
     def _control_is_over(self) -> Flags:
         """Return whether no later step can give an impulse: after the last one of the schedule, or without budget."""
-        least, last = self.scenario.thruster.least_impulse_m_s, self._last_impulse_step
-        is_spent = (self._budget < least) | (self._budget == 0.0)
-        is_last = last is not None and self.step >= last
-        return np.asarray((is_spent | is_last) & ~np.any([modulus(queued) > 0.0 for queued in self._queue], axis=0))
+        if self._last_impulse_step is not None and self.step >= self._last_impulse_step:
+            is_over = np.ones_like(self._tracking)
+        else:
+            is_over = self._budget < max(self.scenario.thruster.least_impulse_m_s, LEAST_FLOAT)
+        for queued in self._queue:
+            is_over &= modulus(queued) == 0.0
+        return is_over
 
     def any_state_miss_m(self, results: Results) -> Floats:
         """Return the greatest miss of a state of the set, m, shape (B,): `LabelEnds.any_state_miss_m`."""

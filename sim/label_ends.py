@@ -45,13 +45,13 @@ class LabelEnds:
 
     def ends_now(self, control_is_over: Flags) -> bool:
         """Return whether control ends now in an engagement where it had not ended before."""
-        return bool((control_is_over & ~self._is_over).any())
+        return bool((control_is_over > self._is_over).any())
 
-    def fire(self, impulse_m_s: Floats, time_s: float) -> None:
+    def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
         """Move the labels that have left and have not arrived by impulses of shape (B,), or (2, B) in space, m/s."""
         if not self._moving:
             return
-        impulse = impulse_m_s.reshape(len(self._laws), -1)
+        impulse = np.where(where, impulse_m_s, 0.0).reshape(len(self._laws), -1)
         doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
         still = []
         for labels, counts, misses in self._moving:

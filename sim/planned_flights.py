@@ -132,13 +132,17 @@ class PlannedTarget:
     accelerations_m_s2: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        self.accelerations_m_s2 = np.zeros_like(self.plans.sides)
+        sides = self.plans.sides
+        self.accelerations_m_s2 = np.zeros_like(sides)
+        self._planned, self._increases = self.bound_m_s2[:, None] * sides, sides == 0.0
+        self._increases_any = self._increases.any(axis=(0, 1))
 
     def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
         """Return the acceleration over a step, m/s^2, shape (B,), or (2, B) in space."""
-        planned = self.plans.sides[:, :, step]
-        increasing = np.where(np.atleast_2d(predicted_miss_m).T >= 0.0, 1.0, -1.0)
-        chosen = self.bound_m_s2 * np.where(planned == 0.0, increasing, planned)
+        chosen = self._planned[:, :, step]
+        if self._increases_any[step]:
+            increasing = np.copysign(self.bound_m_s2, np.atleast_2d(predicted_miss_m).T)
+            chosen = np.where(self._increases[:, :, step], increasing, chosen)
         self.accelerations_m_s2[:, :, step] = chosen
         return by_axis(chosen)
 

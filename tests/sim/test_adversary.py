@@ -294,7 +294,8 @@ def test_targets_accelerate_at_the_bound_of_the_model_or_as_that_of_the_scenario
     for still in (coarse, replace(coarse, target=Target(Manoeuvre.CONSTANT, 0.02))):
         assert not PlanSpace.of(still, 10).has_accelerations
     found = find_worst(coarse, budget=1, seed=2)
-    assert found.accelerations_m_s2 is found.target() is None
+    assert found.accelerations_m_s2 is None
+    assert found.target() is None
 
 
 def test_a_search_flies_constant_blockwise_and_increasing_accelerations(coarse: Scenario) -> None:
