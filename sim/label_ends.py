@@ -49,16 +49,14 @@ class LabelEnds:
 
     def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
         """Move the labels that have left and have not arrived by impulses of shape (B,), or (2, B) in space, m/s."""
-        if not self._moving:
-            return
-        impulse = np.where(where, impulse_m_s, 0.0).reshape(len(self._laws), -1)
-        doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
         still = []
         for labels, counts, misses in self._moving:
             to_go_s = np.maximum(labels / self._model.closing_speed_m_s - time_s, 0.0)
             if not (counts & (to_go_s > 0.0)).any():
                 self._settled_m = np.maximum(self._settled_m, self._reached_m(labels, counts, misses))
                 continue
+            impulse = np.where(where, impulse_m_s, 0.0).reshape(len(self._laws), -1)
+            doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
             misses[0] -= (impulse + doubt)[..., None] * to_go_s
             misses[1] -= (impulse - doubt)[..., None] * to_go_s
             still.append((labels, counts, misses))
