@@ -32,13 +32,13 @@ def guaranteed(name: str, *, has_range_sensor: bool) -> Scenario:
 
 
 def row(scenario: Scenario, strategy: str, budget: int, seeds: int) -> str:
-    """Return the figures of one strategy: random errors, and the greatest misses found, by seed."""
+    """Return the figures of one strategy: random errors, and the greatest misses of any state found, by seed."""
     random = simulate(scenario, RUNS, strategy=strategy, guarantee=False)
     worst = []
     for seed in range(seeds):
         try:
             worst.append(
-                f"{find_worst(scenario, strategy=strategy, budget=budget, seed=seed, keep_set=True).miss_m:.4g}"
+                f"{find_worst(scenario, strategy=strategy, budget=budget, seed=seed, keep_set=True).value_m:.4g}"
             )
         except NothingCountsError:
             worst.append("-")

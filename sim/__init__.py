@@ -1,6 +1,6 @@
 """The simulator: scenarios, true motion, closed loop, records, campaigns, bounds and statistics."""
 
-from sim.adversary import NothingCountsError, WorstEngagement, find_worst
+from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.bound import LowerBound, lower_bound
 from sim.campaign import Campaign, CampaignResult, Sweep
 from sim.chunk import CampaignNoise
@@ -39,6 +39,7 @@ __all__ = [
     "LowerBound",
     "Manoeuvre",
     "NothingCountsError",
+    "Objective",
     "Outcome",
     "QuantileEstimate",
     "QuantileName",

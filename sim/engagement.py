@@ -29,14 +29,16 @@ from sim.closed_form import worst_shift_m
 from sim.draws import Draws
 from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight
+from sim.label_ends import LabelEnds
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
-from sim.target import acceleration_m_s2, constant_side
+from sim.target import TargetMotion, acceleration_m_s2, constant_side
 from sim.theorem_8 import Theorem8, has_theorem_8
 from sim.truth_section import TruthSection
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+LEAST_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 Pending = tuple[tuple[float, Floats], ...]
 """Impulses that are decided and not given yet: times from now, s, and impulses, m/s."""
 
@@ -75,7 +77,8 @@ class Step:
 class Engagements:
     """A batch of engagements in flight.
 
-    `strategy`, `truth` and `noise` replace the strategy, the Kepler motion and the measurement noise of the scenario.
+    `strategy`, `truth`, `noise` and `target` replace the strategy, the Kepler motion, the measurement noise and the
+    target's acceleration of the scenario.
     `guarantee` computes the bound Phi in the guaranteed model; it doubles the run time.
 
     One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the true motion advances,
@@ -90,6 +93,7 @@ class Engagements:
         truth: KeplerMotion | None = None,
         noise: MeasurementNoise | None = None,
         *,
+        target: TargetMotion | None = None,
         guarantee: bool = True,
     ) -> None:
         self.scenario = scenario
@@ -97,6 +101,7 @@ class Engagements:
         self._draws = draws
         self._batch = batch = len(draws.position_m)
         self._noise = noise or _make_noise(scenario, draws)
+        self._target = target
         self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._model = model = on_board_model(scenario)
@@ -121,14 +126,14 @@ class Engagements:
         self._spent = np.zeros(batch, dtype=bool)
         steps = scenario.impulse_steps
         self._impulse_times_s = None if steps is None else np.array(steps) * model.step_s
+        self._last_impulse_step = None if steps is None else steps[-1]
         self._number_of_burn = {step: i for i, step in enumerate(steps or ()) if scenario.thruster.impulses_s}
         self._burns_m_s = np.zeros((batch, len(self._number_of_burn)))
         # Impulses that are decided and not given yet, one for each of the next steps.
         self._queue = [self._impulse] * scenario.thruster.delay_steps
         self._lead_s = scenario.thruster.delay_steps * model.step_s
         self._not_given = np.zeros(batch)
-        self._guaranteed = np.zeros(batch)
-        self._finished_label = np.zeros(batch, dtype=bool)
+        self._label_ends = LabelEnds(model, batch)
         applies = isinstance(self._strategy, LeastEffort) and has_theorem_8(model, len(self._queue))
         self._theorem_8 = Theorem8(model, batch, scenario.thruster.budget_m_s) if applies else None
 
@@ -182,6 +187,7 @@ class Engagements:
         self._truth.fire(self._executed(self._impulse))
         self._information.shift(self._impulse, self._flying)
         self._truth_section.shift(self._impulse, given > 0.0)
+        self._label_ends.fire(self._impulse, self._flying, self.step * model.step_s)
         self._finish_labels()
         self._information.predict()
         self._truth_section.predict()
@@ -261,16 +267,21 @@ class Engagements:
 
     def _manoeuvre(self, sight: Sight) -> Floats | None:
         """Return the acceleration of the targets over this step; None without a target that manoeuvres."""
-        target = self.scenario.target
-        if target is None or self._draws.target is None:
+        if self._target is not None:
+            return self._target.acceleration_m_s2(self.step, self._true_predicted_miss(sight))
+        target, draws = self.scenario.target, self._draws.target
+        if target is None or draws is None:
             return None
-        step_s = self.scenario.set_model.step_s
-        left = np.maximum(self._arrival_s - self.step * step_s, 0.0)
-        predicted = (sight.omega_rad_s * sight.range_m - self._impulse) * left
+        predicted = self._true_predicted_miss(sight)
         if isinstance(self._noise, GameNoise):
             side = self._noise.truth_side
             predicted = np.where(side == 0.0, predicted, side)
-        return acceleration_m_s2(target, self._draws.target, self.step, step_s, predicted)
+        return acceleration_m_s2(target, draws, self.step, self.scenario.set_model.step_s, predicted)
+
+    def _true_predicted_miss(self, sight: Sight) -> Floats:
+        """Return the signed misses of the true states without further impulses, m, shape (B,), or (2, B) in space."""
+        left_s = np.maximum(self._arrival_s - self.step * self.scenario.set_model.step_s, 0.0)
+        return np.asarray((sight.omega_rad_s * sight.range_m - self._impulse) * left_s)
 
     def _pending(self) -> Pending:
         """Return the impulses that are decided and not given yet, with the times from now to them, s."""
@@ -315,17 +326,28 @@ class Engagements:
         )
 
     def _finish_labels(self) -> None:
-        """Drop labels below the threshold, and store the predicted miss of those that leave."""
-        if self._model.is_guaranteed or not self._information.sections_are_leaving():
-            self._information.drop_below_threshold()
+        """Drop labels below the threshold, and store the predicted misses of those whose control ends."""
+        information, is_over = self._information, self._control_is_over()
+        if not (self._label_ends.ends_now(is_over) or information.sections_are_leaving()):
+            information.drop_below_threshold()
             return
-        worst = self._information.worst_predicted_miss_m()
-        left = self._information.drop_below_threshold()
-        if left.any():
-            finished = left.any(axis=1)
-            payoff = np.where(left, worst, 0.0).max(axis=1)
-            self._guaranteed = np.where(finished, np.maximum(self._guaranteed, payoff), self._guaranteed)
-            self._finished_label |= finished
+        living, labels = information.living.copy(), information.labels_m.copy()
+        misses = np.stack(information.predicted_miss_by_section_m())
+        self._label_ends.end(information.drop_below_threshold(), living, is_over, labels, misses)
+
+    def _control_is_over(self) -> Flags:
+        """Return whether no later step can give an impulse: after the last one of the schedule, or without budget."""
+        if self._last_impulse_step is not None and self.step >= self._last_impulse_step:
+            is_over = np.ones_like(self._tracking)
+        else:
+            is_over = self._budget < max(self.scenario.thruster.least_impulse_m_s, LEAST_FLOAT)
+        for queued in self._queue:
+            is_over &= modulus(queued) == 0.0
+        return is_over
+
+    def any_state_miss_m(self, results: Results) -> Floats:
+        """Return the greatest miss of a state of the set, m, shape (B,): `LabelEnds.any_state_miss_m`."""
+        return self._label_ends.any_state_miss_m(results)
 
     def _theorem_8_miss_m(self) -> MaskedFloats:
         """Return the bound of Theorem 8, masked where its assumptions do not hold or the flight has not ended."""
@@ -339,7 +361,7 @@ class Engagements:
         arrivals_s = self._arrivals_s()
         lost = self._information.inconsistent
         margin = self._truth_section.least_margin_m(arrivals_s)
-        payoff, known = self._guaranteed, self._finished_label
+        payoff, known = self._label_ends.published_m, self._label_ends.left
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()
         # Without a closest approach within the greatest number of steps, the miss is the present range.

@@ -1,4 +1,4 @@
-"""Adversary plans (start and errors of each engagement) and their outcomes."""
+"""Adversary plans (start, errors and target of each engagement) and their outcomes."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from guidance.scripted_noise import errors_made, measure_with_errors
 from infoset import InformationSetView
 from infoset.arrays import Flags, Floats, Integers
 from infoset.sensor import Measurements, Sensor
+from sim.draws import corners
+from sim.scenario import Manoeuvre, Scenario
+from sim.target import amplitudes_m_s2
 
 ROWS = ("angle", "range", "rate")
 """Sensors of the first rows of a sequence, also if absent: the random numbers of a search depend on the row count."""
@@ -34,6 +37,8 @@ class Plans:
     prescribed : ndarray of bool, shape (n, steps)
         Whether the errors of a step are those of the sequence. Otherwise the noise keeps, along each axis, the upper
         extreme of the predicted miss if the element of the angle is not negative, and the lower one if it is.
+    sides : ndarray, shape (n, axes, steps)
+        Sign of the target's acceleration, 1 or -1; 0 is the sign of the true predicted miss, which it increases.
     lineage, changes : ndarray of int, shape (n,)
         Index of the first plan from which a plan was derived, and number of changes since then.
     """
@@ -41,6 +46,7 @@ class Plans:
     start: Floats
     sequence: Floats
     prescribed: Flags
+    sides: Floats
     lineage: Integers
     changes: Integers
 
@@ -106,6 +112,94 @@ class PlannedNoise:
         return measure_with_errors(sight, errors)
 
 
+@dataclass
+class PlannedTarget:
+    """Targets of planned engagements that accelerate at their bound, and store their accelerations.
+
+    Parameters
+    ----------
+    bound_m_s2 : ndarray, shape (axes,)
+        Greatest acceleration along each lateral axis, m/s^2.
+
+    Attributes
+    ----------
+    accelerations_m_s2 : ndarray, shape (n, axes, steps)
+        Accelerations so far, m/s^2.
+    """
+
+    plans: Plans
+    bound_m_s2: Floats
+    accelerations_m_s2: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        sides = self.plans.sides
+        self.accelerations_m_s2 = np.zeros_like(sides)
+        self._planned, self._increases = self.bound_m_s2[:, None] * sides, sides == 0.0
+        self._increases_any = self._increases.any(axis=(0, 1))
+
+    def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
+        """Return the acceleration over a step, m/s^2, shape (B,), or (2, B) in space."""
+        chosen = self._planned[:, :, step]
+        if self._increases_any[step]:
+            increasing = np.copysign(self.bound_m_s2, np.atleast_2d(predicted_miss_m).T)
+            chosen = np.where(self._increases[:, :, step], increasing, chosen)
+        self.accelerations_m_s2[:, :, step] = chosen
+        return by_axis(chosen)
+
+
+@dataclass(frozen=True)
+class PlanSpace:
+    """What the plans of a scenario consist of, and what they may change.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Sensors of the rows of a sequence.
+    lower, upper : ndarray, shape (4,) or (6,)
+        Limits of the starts.
+    acceleration_m_s2 : ndarray, shape (axes,)
+        Greatest acceleration of the target along each axis, m/s^2; zero if the target is that of the scenario.
+    """
+
+    scenario: Scenario
+    steps: int
+    names: tuple[str, ...]
+    lower: Floats
+    upper: Floats
+    acceleration_m_s2: Floats
+
+    @staticmethod
+    def of(scenario: Scenario, steps: int) -> PlanSpace:
+        """Return the space of a scenario with flights of a number of steps.
+
+        In the guaranteed model the target accelerates up to the bound of the model, or up to that of the scenario's
+        target if that is greater. In the model `paper` the disturbance is fictitious.
+        """
+        model, target = scenario.set_model, scenario.target
+        most = np.zeros(len(model.axes))
+        if model.is_guaranteed:
+            most = np.array([model.axis(axis).disturbance_m_s2 for axis in model.axes])
+            if target is not None and target.manoeuvre is not Manoeuvre.NONE:
+                most = np.maximum(most, amplitudes_m_s2(target, len(most)))
+        lower, upper = corners(model.bounds)
+        return PlanSpace(scenario, steps, tuple(dict.fromkeys((*ROWS, *scenario.sensors))), lower, upper, most)
+
+    @property
+    def axes(self) -> int:
+        """Number of lateral axes."""
+        return len(self.acceleration_m_s2)
+
+    @property
+    def has_accelerations(self) -> bool:
+        """Whether a plan chooses the accelerations of the target."""
+        return bool(self.acceleration_m_s2.any())
+
+
+def range_m(start: Floats) -> Floats:
+    """Return the range x of starts, m; the last of the positions."""
+    return np.asarray(start[..., start.shape[-1] // 2 - 1])
+
+
 def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
     """Return values of shape (n, axes, ...) as a sensor uses them: (n, ...), or by axis in space, (2, n, ...).
 
@@ -122,16 +216,23 @@ class Flown:
     Parameters
     ----------
     value : ndarray
-        Miss, m; -inf if the engagement does not count.
+        What the search maximises, m; -inf if the engagement does not count.
+    miss_m, any_state_miss_m : ndarray
+        Miss of the true state, and greatest miss of a state of the set, m.
     errors : ndarray, shape (n, rows, axes, steps)
         Errors made, in units of their bounds.
+    accelerations_m_s2 : ndarray, shape (n, axes, steps)
+        Accelerations of the target, m/s^2; zero if the target is that of the scenario.
     lateral_miss_m : ndarray, shape (n, 2)
         Position (y, z) at the closest approach, m; without meaning in a plane.
     """
 
     plans: Plans
     value: Floats
+    miss_m: Floats
+    any_state_miss_m: Floats
     errors: Floats
+    accelerations_m_s2: Floats
     outcomes: NDArray[np.object_]
     set_emptied: Flags
     truth_kept: Flags

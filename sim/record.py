@@ -16,6 +16,7 @@ from sim.engagement import Engagements, Step
 from sim.pictures import course_html
 from sim.results import Results, ending
 from sim.scenario import Scenario, strategy_name, with_strategy
+from sim.target import TargetMotion
 
 _MOST_DRAWN = 1000
 """Most steps of the predicted misses in a notebook."""
@@ -178,6 +179,7 @@ def fly_one(
     seed: int = 0,
     strategy: Strategy | str | None = None,
     noise: MeasurementNoise | None = None,
+    target: TargetMotion | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Record:
     """Simulate one engagement and return the record of its steps.
@@ -192,6 +194,8 @@ def fly_one(
         A strategy of your own, the name of a registered one, or None for the scenario's.
     noise : MeasurementNoise or None
         A noise of your own, for a batch of one; None is the scenario's.
+    target : TargetMotion or None
+        Accelerations of the target, for a batch of one; None is the scenario's target.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
 
@@ -205,7 +209,7 @@ def fly_one(
     WHOLE.need("seed", seed)
     scenario, own_strategy = with_strategy(scenario, strategy)
     draws = draw(scenario, [run], seed)
-    flight = Engagements(scenario, draws, own_strategy, noise=noise)
+    flight = Engagements(scenario, draws, own_strategy, noise=noise, target=target)
     recorded: list[StepRecord] = []
 
     axes = scenario.set_model.axes

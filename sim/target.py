@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -10,6 +12,30 @@ from infoset.arrays import Floats
 from sim.scenario import Manoeuvre, Target
 
 ROUNDING = 1e-12
+
+
+class TargetMotion(Protocol):
+    """Lateral acceleration of the targets of a batch, in place of that of the scenario."""
+
+    def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
+        """Return the acceleration over a step, m/s^2, shape (B,), or (2, B) in space; see `acceleration_m_s2`."""
+
+
+@dataclass(frozen=True)
+class GivenTarget:
+    """Targets whose accelerations are given in advance.
+
+    Parameters
+    ----------
+    accelerations_m_s2 : ndarray, shape (B, steps), or (2, B, steps) in space
+        Lateral acceleration in each step, m/s^2.
+    """
+
+    accelerations_m_s2: Floats
+
+    def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
+        """Return the acceleration over a step, m/s^2, shape (B,), or (2, B) in space."""
+        return np.asarray(self.accelerations_m_s2[..., step])
 
 
 def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:
@@ -33,10 +59,15 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
         side = first * (-1.0) ** switches.sum(axis=-1)
     else:
         side = np.where(predicted_miss_m >= 0.0, 1.0, -1.0)
-    along_z, along_y = target.acceleration_m_s2, target.acceleration_y_m_s2
     if draws.ndim == 2:
-        return np.asarray(along_z * side)
-    return np.array([[along_z if along_y is None else along_y], [along_z]]) * side
+        return np.asarray(target.acceleration_m_s2 * side)
+    return np.asarray(amplitudes_m_s2(target, 2)[:, None] * side)
+
+
+def amplitudes_m_s2(target: Target, axes: int) -> Floats:
+    """Return the acceleration of a target along each of its lateral axes, z or y and z, m/s^2."""
+    along_z, along_y = target.acceleration_m_s2, target.acceleration_y_m_s2
+    return np.array([along_z if along_y is None else along_y, along_z][-axes:])
 
 
 def constant_side(target: Target | None, draws: Floats | None) -> Floats | None:

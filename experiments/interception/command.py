@@ -178,12 +178,14 @@ class Bound(FileOptions):
 
 @dataclass(frozen=True)
 class Adversary(FileOptions):
-    """Search for the initial state and the measurement errors that give the greatest miss of a strategy.
+    """Search for the initial state, the measurement errors and the target that give the greatest miss of a strategy.
 
-    The search covers all initial states that the scenario allows, and all errors within their bounds. The result is a
-    simulated miss: the strategy cannot guarantee a smaller one, and greater misses may exist. If the set became empty
-    in some engagements, a second search includes them, and both greatest misses are printed. The same seed and budget
-    give the same result, also in infoset bound. Without --out, --json or --record no file is written.
+    The search covers all initial states that the scenario allows, all errors within their bounds and, in the model
+    guaranteed, targets that accelerate at the bound of the model. Two misses of the worst engagement are printed: the
+    greatest one of any state that the set contains when control ends, and that of the simulated truth. Greater misses
+    may exist. If the set became empty in some engagements, a second search includes them, and both results are printed.
+    The same seed and budget give the same result; infoset bound has the searches with --objective fixed-truth. Without
+    --out, --json or --record no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -194,6 +196,13 @@ class Adversary(FileOptions):
     budget: Annotated[
         int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of engagements in a search.")
     ] = 2000
+    objective: Annotated[
+        Literal["any-state", "fixed-truth"],
+        typer.Option(
+            help="What the search maximises: the greatest miss of any state of the set when control ends, which agrees "
+            "with all measurements until then, or the miss of the simulated truth."
+        ),
+    ] = "any-state"
     keep_set: Annotated[
         bool,
         typer.Option("--keep-set", help="Record and draw the worst engagement in which the set never became empty."),

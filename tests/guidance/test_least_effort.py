@@ -120,9 +120,9 @@ def test_the_worst_miss_without_a_range_sensor_is_near_the_bound(guaranteed: Sce
     """Searches find 74 to 77 m for U_s and at most 30 m for least effort; no strategy guarantees less than 24.4 m."""
     for seed in range(seeds):
         worst = find_worst(guaranteed, strategy="least-effort", budget=budget, seed=seed, keep_set=True)
-        assert worst.miss_m < 30.0
+        assert worst.value_m < 30.0
     symmetric = find_worst(guaranteed, strategy="symmetric-miss", budget=budget, keep_set=True)
-    assert symmetric.miss_m > (60.0 if budget > 1000 else 40.0)
+    assert symmetric.value_m > (60.0 if budget > 1000 else 40.0)
 
 
 def test_random_errors_cost_no_more_than_with_the_published_strategy(guaranteed: Scenario) -> None:

@@ -22,7 +22,7 @@ from experiments.interception.runs.shared import WorstMisses, find_worst_misses,
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import scenario_title
 from sim import Scenario
-from sim.adversary import WorstEngagement
+from sim.adversary import Objective, WorstEngagement
 
 RECORD = "record-worst.npz"
 
@@ -39,7 +39,14 @@ def run(options: Adversary) -> None:
         warnings = scenario_warnings(scenario)
         say_warnings(warnings, options.quiet, notes)
         began_s = perf_counter()
-        worst = find_worst_misses(scenario, own, budget=options.budget, seed=options.seed, begin=begin)
+        worst = find_worst_misses(
+            scenario,
+            own,
+            objective=Objective(options.objective),
+            budget=options.budget,
+            seed=options.seed,
+            begin=begin,
+        )
         elapsed_s = perf_counter() - began_s
         chosen = worst.set_kept if options.keep_set else worst.overall
         if chosen is None:
@@ -73,8 +80,11 @@ def _summary(
         "range_meter": scenario.range_sensor is not None,
         "elapsed_s": elapsed_s,
         "strategy": chosen.strategy,
+        "objective": chosen.objective.value,
+        "searched_accelerations_m_s2": chosen.greatest_acceleration_m_s2,
         **worst.misses(),
         "keep_set": options.keep_set,
+        "worst_any_state_miss_m": chosen.any_state_miss_m,
         "worst_miss_m": chosen.miss_m,
         **{f"worst_miss_{axis}_m": value for axis, value in chosen.lateral_miss_m.items()},
         "outcome": chosen.outcome.value,
@@ -84,7 +94,7 @@ def _summary(
         "found_from": chosen.construction,
         "changes": chosen.changes,
         "start": chosen.start(),
-        "history": [{"evaluations": evaluations, "worst_miss_m": miss_m} for evaluations, miss_m in chosen.history],
+        "history": [{"evaluations": evaluations, "value_m": value_m} for evaluations, value_m in chosen.history],
     }
 
 
@@ -94,7 +104,8 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
     position, velocity = ", ".join(axes), ", ".join(f"V_{axis}" for axis in axes)
     across = [("miss along y, z, m", lambda found: ", ".join(map(number, found.lateral_miss_m.values())))]
     return [
-        ("greatest miss found, m", lambda found: number(found.miss_m)),
+        ("greatest miss of any state of the set, m", lambda found: number(found.any_state_miss_m)),
+        ("miss of the simulated truth, m", lambda found: number(found.miss_m)),
         *(across if scenario.is_spatial else []),
         ("outcome", lambda found: found.outcome.value),
         ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
@@ -102,7 +113,7 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
         (f"initial {velocity}, km/s", lambda found: _texts(found.velocity_m_s / M_PER_KM)),
         ("errors at the start of the search", lambda found: found.construction),
         ("rounds of improvement", lambda found: str(found.changes)),
-        ("greatest miss after half the budget, m", lambda found: number(_halfway_m(found))),
+        ("objective after half the budget, m", lambda found: number(_halfway_m(found))),
     ]
 
 
@@ -111,7 +122,29 @@ def _texts(values: NDArray[np.float64]) -> str:
 
 
 def _halfway_m(found: WorstEngagement) -> float | None:
-    return max((miss for count, miss in found.history if 2 * count <= found.evaluations), default=None)
+    return max((value for count, value in found.history if 2 * count <= found.evaluations), default=None)
+
+
+def _notes(found: WorstEngagement) -> Iterator[str]:
+    """Return lines about what was searched and what the two misses mean."""
+    bounds = found.greatest_acceleration_m_s2
+    each = ", ".join(
+        f"{number(bound)} m/s^2" + (f" along {axis}" if len(bounds) > 1 else "") for axis, bound in bounds.items()
+    )
+    target = f"target accelerations up to {each}" if bounds else "the target of the scenario"
+    objective = {
+        Objective.ANY_STATE: "any state of the set",
+        Objective.FIXED_TRUTH: "the simulated truth",
+    }[found.objective]
+    yield f"searched: starts in the uncertainty, errors within their bounds, {target}; objective: {objective}"
+    yield (
+        "any state of the set: greatest miss of a state that a section contained when control ended for it; the "
+        "sections contain at least all states that agree with the measurements"
+    )
+    yield (
+        "simulated truth: the simulated miss of the same engagement; the strategy cannot guarantee a smaller one, and "
+        "greater misses may exist"
+    )
 
 
 def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> Iterator[Part]:
@@ -128,7 +161,7 @@ def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s
         f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
     )
     yield table
-    yield "each miss was simulated: the strategy cannot guarantee a smaller one, and greater misses may exist"
+    yield from _notes(worst.engagements[0])
     if not same:
         emptied = max(found.sets_emptied for found in worst.engagements)
         yield (

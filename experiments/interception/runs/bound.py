@@ -224,7 +224,10 @@ def _parts(
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
     yield "pairs: greatest miss of the states that prove the bound"
-    searched_by = f"`infoset adversary` with --model {model} --budget {options.budget} --seed {options.seed}"
+    searched_by = (
+        f"`infoset adversary` with --objective fixed-truth --model {model} --budget {options.budget} --seed "
+        f"{options.seed}"
+    )
     found = f"greatest misses found by {searched_by}" if options.budget else "not searched"
     yield f"set never empty, also empty: {found}"
     yield "miss / bound: greatest miss of pairs and search, without sets that became empty, divided by the bound"

@@ -18,7 +18,7 @@ from experiments.interception.scenario_file import scenario_hash
 from experiments.interception.study import set_counts
 from guidance import NoiseKind, Strategy
 from sim import Results, Scenario, simulate
-from sim.adversary import BudgetError, NothingCountsError, WorstEngagement, find_worst
+from sim.adversary import BudgetError, NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.gravity import on_board_model
 from sim.scenario import strategy_name
 
@@ -119,7 +119,7 @@ def certificate(results: Results) -> str:
 
 @dataclass(frozen=True)
 class WorstMisses:
-    """The engagements with the greatest misses of a strategy: of those whose set never became empty, and of all.
+    """The engagements with the greatest values of a strategy: of those whose set never became empty, and of all.
 
     The first is None if there was none, the second if no miss was finite.
     """
@@ -134,17 +134,24 @@ class WorstMisses:
         return tuple(engagement for engagement in both if engagement is not None)
 
     def misses(self) -> dict[str, float | None]:
-        """Return both misses as JSON, m."""
+        """Return both values as JSON, m."""
         named = {"worst_of_search_set_kept_m": self.set_kept, "worst_of_search_m": self.overall}
-        return {name: None if engagement is None else engagement.miss_m for name, engagement in named.items()}
+        return {name: None if engagement is None else engagement.value_m for name, engagement in named.items()}
 
 
 def find_worst_misses(
-    scenario: Scenario, own: Strategy | None, *, budget: int, seed: int, begin: BeginProgress
+    scenario: Scenario,
+    own: Strategy | None,
+    *,
+    budget: int,
+    seed: int,
+    begin: BeginProgress,
+    objective: Objective = Objective.FIXED_TRUTH,
 ) -> WorstMisses:
     """Search for the greatest miss with the set never empty, and for the greatest miss of all engagements.
 
-    The second search is simulated only if the set became empty in the first one. Otherwise both are the same.
+    The second search is simulated only if the set became empty in the first one. Otherwise both are the same. The
+    default objective is that of `infoset bound`, which compares simulated misses.
     """
 
     def search(keep_set: bool, name: str) -> WorstEngagement | None:
@@ -152,6 +159,7 @@ def find_worst_misses(
             return find_worst(
                 scenario,
                 strategy=own,
+                objective=objective,
                 budget=budget,
                 seed=seed,
                 keep_set=keep_set,
@@ -168,4 +176,4 @@ def find_worst_misses(
         return WorstMisses(set_kept, set_kept)
     overall = search(False, ", empty sets included")
     found = [engagement for engagement in (overall, set_kept) if engagement is not None]
-    return WorstMisses(set_kept, max(found, key=lambda engagement: engagement.miss_m, default=None))
+    return WorstMisses(set_kept, max(found, key=lambda engagement: engagement.value_m, default=None))

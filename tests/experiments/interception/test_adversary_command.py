@@ -30,9 +30,12 @@ KEYS = [
     "range_meter",
     "elapsed_s",
     "strategy",
+    "objective",
+    "searched_accelerations_m_s2",
     "worst_of_search_set_kept_m",
     "worst_of_search_m",
     "keep_set",
+    "worst_any_state_miss_m",
     "worst_miss_m",
     "outcome",
     "truth_kept",
@@ -65,9 +68,11 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert (found["seed"], found["evaluations"], found["record"]) == (5, BUDGET, "worst.npz")
     assert (found["strategy"], found["model"], found["range_meter"]) == ("symmetric-miss", "guaranteed", True)
     worst = find_worst(scenario, budget=BUDGET, seed=5)
-    assert found["worst_miss_m"] == worst.miss_m == found["history"][-1]["worst_miss_m"]
-    assert worst.miss_m == found["worst_of_search_m"] >= found["worst_of_search_set_kept_m"]
-    assert found["worst_of_search_set_kept_m"] == find_worst(scenario, budget=BUDGET, seed=5, keep_set=True).miss_m
+    assert (found["objective"], found["searched_accelerations_m_s2"]) == ("any-state", {"z": 0.005})
+    assert found["worst_any_state_miss_m"] == worst.value_m == found["history"][-1]["value_m"]
+    assert found["worst_miss_m"] == worst.miss_m
+    assert worst.value_m == found["worst_of_search_m"] >= found["worst_of_search_set_kept_m"]
+    assert found["worst_of_search_set_kept_m"] == find_worst(scenario, budget=BUDGET, seed=5, keep_set=True).value_m
     assert list(found["start"].values()) == [*worst.position_m.tolist(), *worst.velocity_m_s.tolist()]
 
     record = load_record(tmp_path / "worst.npz")
@@ -96,7 +101,10 @@ def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path)
     assert "asteroid-1997, without range meter, model guaranteed, strategy patient: 12 simulated" in out
     lines = (
         "patient",
-        "greatest miss found, m",
+        "greatest miss of any state of the set, m",
+        "miss of the simulated truth, m",
+        "searched: starts in the uncertainty, errors within their bounds, target accelerations up to 0.005 m/s^2; "
+        "objective: any state of the set",
         "set never empty, set also empty",
         "initial z, x, km",
         "rounds of improvement",
@@ -137,8 +145,9 @@ def test_both_greatest_misses_are_those_of_bound(infoset: Command, monkeypatch: 
     monkeypatch.setattr("sim.bound.PERIODS_LOOKED_AT", 1)  # few pairs
     monkeypatch.setattr("sim.bound.REFINEMENTS", 0)
     options = ("--budget", 12, "--model", "paper", "--json")
+    same = ("--objective", "fixed-truth", *options)
     table = infoset("bound", "--strategies", "symmetric-miss", *options, "bound.json")[1]
-    shown = infoset("adversary", "--strategy", "symmetric-miss", *options, "adversary.json")[1]
+    shown = infoset("adversary", "--strategy", "symmetric-miss", *same, "adversary.json")[1]
     (of_bound,) = json.loads(Path("bound.json").read_text())["strategies"]
     found = json.loads(Path("adversary.json").read_text())
     misses = [found[name] for name in ("worst_of_search_set_kept_m", "worst_of_search_m")]
@@ -148,6 +157,8 @@ def test_both_greatest_misses_are_those_of_bound(infoset: Command, monkeypatch: 
     for miss in misses:
         assert f" {number(miss)} " in table
         assert number(miss) in shown.split()
+    assert "the target of the scenario; objective: the simulated truth" in shown
+    assert found["searched_accelerations_m_s2"] == {}
     assert "use --model guaranteed, whose set keeps the true state" in shown
 
 
@@ -163,7 +174,8 @@ def test_the_worst_in_a_folder_as_engage_writes_it(infoset: Command, tmp_path: P
     assert all(name in err for name in files)
     found = json.loads((tmp_path / "worst" / "results.json").read_text())
     record = load_record(tmp_path / "worst" / "record-worst.npz")
-    assert float(record.result.miss_m[0]) == found["worst_miss_m"] == found["worst_of_search_set_kept_m"]
+    assert float(record.result.miss_m[0]) == found["worst_miss_m"]
+    assert found["worst_any_state_miss_m"] == found["worst_of_search_set_kept_m"]
     assert not record.result.set_emptied[0]
     rows = (tmp_path / "worst" / "steps.csv").read_text().splitlines()
     assert len(rows) == 1 + len(record.steps)

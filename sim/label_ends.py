@@ -1,0 +1,117 @@
+"""Misses that the set contains when control ends for a label.
+
+Control ends for a label when it leaves the set below the range threshold, and for all labels after the last scheduled
+impulse, after a cut-off, or with the budget spent. All states of a section then agree with everything that was
+measured until control ended, so that each of them may be the true one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from infoset import SetModel
+from infoset.arrays import Flags, Floats
+from infoset.section_law import section_laws
+from infoset.section_stack import impulse_doubts
+from sim.results import Results
+
+
+class LabelEnds:
+    """The misses of the stored sections of a batch of engagements at the end of their control.
+
+    Attributes
+    ----------
+    published_m : ndarray, shape (B,)
+        Greatest predicted miss of the sections when they left the set, m: Phi of the paper.
+    left : ndarray of bool, shape (B,)
+        Whether a section has left the set.
+
+    Notes
+    -----
+    Misses along y and z are combined as in Phi: a section in space is the product of both planes. Labels between the
+    stored ones are not considered.
+    """
+
+    def __init__(self, model: SetModel, batch: int) -> None:
+        self._model, self._laws = model, section_laws(model)
+        self.published_m: Floats = np.zeros(batch)
+        self.left: Flags = np.zeros(batch, dtype=bool)
+        self._settled_m = np.zeros(batch)
+        self._exists = np.zeros(batch, dtype=bool)
+        # Without control, no later section counts.
+        self._is_over = np.zeros(batch, dtype=bool)
+        # Labels, which sections count, and their misses: impulses move them until their range is zero.
+        self._moving: list[tuple[Floats, Flags, Floats]] = []
+
+    def ends_now(self, control_is_over: Flags) -> bool:
+        """Return whether control ends now in an engagement where it had not ended before."""
+        return bool((control_is_over > self._is_over).any())
+
+    def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
+        """Move the labels that have left and have not arrived by impulses of shape (B,), or (2, B) in space, m/s."""
+        still = []
+        for labels, counts, misses in self._moving:
+            to_go_s = np.maximum(labels / self._model.closing_speed_m_s - time_s, 0.0)
+            if not (counts & (to_go_s > 0.0)).any():
+                self._settled_m = np.maximum(self._settled_m, self._reached_m(labels, counts, misses))
+                continue
+            impulse = np.where(where, impulse_m_s, 0.0).reshape(len(self._laws), -1)
+            doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
+            misses[0] -= (impulse + doubt)[..., None] * to_go_s
+            misses[1] -= (impulse - doubt)[..., None] * to_go_s
+            still.append((labels, counts, misses))
+        self._moving = still
+
+    def end(self, left: Flags, living: Flags, control_is_over: Flags, labels_m: Floats, misses_m: Floats) -> None:
+        """Add the sections whose control ends in this step.
+
+        Parameters
+        ----------
+        left, living : ndarray of bool, shape (B, S)
+            Sections that leave the set now, and those that lived before.
+        control_is_over : ndarray of bool, shape (B,)
+            Engagements in which no further impulse can be given.
+        labels_m : ndarray, shape (B, S)
+            Labels of the sections, m.
+        misses_m : ndarray, shape (2, B, S), or (2, 2, B, S) in space
+            Least and greatest predicted miss of each section, m; in space along y and z.
+        """
+        misses = misses_m.reshape(2, len(self._laws), *labels_m.shape)
+        self.left |= left.any(axis=1)
+        self.published_m = np.maximum(self.published_m, np.where(left, _greatest(misses), 0.0).max(axis=1))
+        counts = np.where(control_is_over[:, None], living, left) & ~self._is_over[:, None]
+        self._is_over = self._is_over | control_is_over
+        if counts.any():
+            self._exists |= counts.any(axis=1)
+            self._moving.append((labels_m, counts, misses))
+
+    def any_state_miss_m(self, results: Results) -> Floats:
+        """Return the greatest miss of a state that the set contained when control ended for its label, m, shape (B,).
+
+        The true state is such a state if it was always inside its section. Where the set became empty, or no section
+        has ended, it is the only one.
+        """
+        ended = self._exists & ~results.set_emptied
+        of_truth = np.where(ended & ~results.truth_kept, 0.0, results.miss_m)
+        of_sections = np.maximum.reduce([self._settled_m, *(self._reached_m(*part) for part in self._moving)])
+        return np.maximum(np.where(ended, of_sections, 0.0), of_truth)
+
+    def _reached_m(self, labels: Floats, counts: Flags, misses: Floats) -> Floats:
+        """Return the greatest true miss of some sections of each engagement, m, shape (B,)."""
+        return np.asarray(np.where(counts, _greatest(misses) * self._scale(labels), 0.0).max(axis=1))
+
+    def _scale(self, labels: Floats) -> Floats:
+        """Return the greatest 1 + eta of a label: a length of the guaranteed model times 1 + eta is the true one.
+
+        The label is the true range at t = 0 divided by 1 + eta.
+        """
+        model = self._model
+        if not model.is_guaranteed:
+            return np.ones_like(labels)
+        farthest = model.bounds.x_m[1] * (1.0 + model.gravity_speed_change) / labels
+        return np.asarray(np.minimum(1.0 + model.speed_error, farthest))
+
+
+def _greatest(misses: Floats) -> Floats:
+    """Return the greatest modulus of least and greatest misses of shape (2, C, B, S), shape (B, S)."""
+    return np.asarray(np.hypot.reduce(np.maximum(misses[1], -misses[0]), axis=0))
