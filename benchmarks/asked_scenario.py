@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from experiments import load_scenario
-from experiments.interception.scenario_file import default_initial_set
 from infoset import Model
 from sim import Scenario
 
@@ -25,9 +24,9 @@ def asked_scenario(
     options = parser.parse_args(arguments)
     scenario = load_scenario(options.scenario)
     kind = Model(options.model)
-    if kind is not scenario.set_model.kind:
-        set_model = replace(scenario.set_model, kind=kind, initial_set=default_initial_set(kind))
-        scenario = replace(scenario, set_model=set_model)
+    if kind is not scenario.information_set.model:
+        settings = replace(scenario.information_set, model=kind, initial_set=None)
+        scenario = replace(scenario, information_set=settings)
     if options.no_range_meter:
         scenario = replace(scenario, range_sensor=None)
     return scenario, options.runs, options.seed

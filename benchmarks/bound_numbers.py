@@ -17,6 +17,7 @@ from guidance import Thruster
 from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
 from sim import Scenario, Sun
 from sim.bound import lower_bound
+from sim.scenario import of_model
 
 RANGES_KM = (60e3, 140e3, 190e3, 200e3, 300e3, 400e3)
 SUN = Sun(1.324948e20, 60e9, 0.5 * math.pi)
@@ -26,19 +27,28 @@ def slow(range_km: float) -> Scenario:
     """Return the slow approach from a range."""
     range_m = 1e3 * range_km
     box = StateBox((-1e4, 1e4), (range_m - 500.0, range_m + 500.0), (-0.1, 0.1), (-2000.01, -1999.99))
-    sensor = AngleSensor(200.0, 5e-6, 5e-6, range_m, centroid_error_m=5.0)
-    model = SetModel(2e3, 200.0, box, sensor, range_threshold_m=1e5, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    sensor = AngleSensor.camera(200.0, 5e-6, 5.0)
+    model = SetModel(2e3, 200.0, box, sensor, range_threshold_m=1e5, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
     thruster = Thruster(30.0, 1e-4, 2.0, last_impulse_s=2000.0)
-    return Scenario("slow", "", SUN, range_m, box, model, None, thruster)
+    return Scenario(
+        name="slow",
+        description="",
+        sun=SUN,
+        nominal_range_m=range_m,
+        dispersion=box,
+        **of_model(model),
+        range_sensor=None,
+        thruster=thruster,
+    )
 
 
 def far() -> Scenario:
     """Return the approach of 1997 from a far start with a weak engine."""
     published = load_scenario("asteroid-1997")
     box = StateBox((8e3, 10e3), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
-    model = replace(published.set_model, bounds=box, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    model = replace(published.set_model, bounds=box, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
     thruster = replace(published.thruster, greatest_impulse_m_s=0.5)
-    return replace(published, sun=None, dispersion=box, set_model=model, thruster=thruster)
+    return replace(published, sun=None, dispersion=box, **of_model(model), thruster=thruster)
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from experiments.common.figure_style import CURVE_LOOKS, new_figure, place_axes,
 from experiments.common.output import Output
 from guidance import NoiseKind
 from sim import Campaign, Scenario, simulate
+from sim.scenario import of_model
 
 RUNS = (128, 256, 512, 1024, 2048)
 SECTIONS = (15, 29, 58, 116, 232)
@@ -53,7 +54,7 @@ def main() -> None:
             by_runs = [campaign_s(scenario, runs) for runs in RUNS]
             model = scenario.set_model
             by_sections = [
-                campaign_s(replace(scenario, set_model=replace(model, sections=count)), 64 * BATCHES) / (64 * BATCHES)
+                campaign_s(replace(scenario, **of_model(replace(model, sections=count))), 64 * BATCHES) / (64 * BATCHES)
                 for count in SECTIONS
             ]
             for axes, ticks, values, name in (

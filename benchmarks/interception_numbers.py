@@ -13,6 +13,7 @@ from experiments.interception.curves import curve_scenarios
 from guidance import NoiseKind, TieRule
 from infoset import InitialSet
 from sim import Results, Scenario, simulate
+from sim.scenario import of_model
 
 SINGLE_LEVELS = (0.05, 0.5, 0.95, 1.0)
 CURVE_LEVELS = (0.1, 0.5, 0.9, 0.99)
@@ -48,7 +49,7 @@ def variants(single: Scenario) -> dict[str, Scenario]:
         "no dead zone": {"least_impulse_m_s": 0.0},
         "delay of one step": {"delay_steps": 1},
     }
-    changed = {name: replace(single, set_model=replace(model, **fields)) for name, fields in sets.items()}
+    changed = {name: replace(single, **of_model(replace(model, **fields))) for name, fields in sets.items()}
     return changed | {
         name: replace(single, thruster=replace(single.thruster, **fields)) for name, fields in engines.items()
     }

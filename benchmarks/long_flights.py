@@ -24,6 +24,7 @@ from infoset import RateSensor
 from sim import Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements
+from sim.scenario import of_model
 from sim.statistics import quantiles
 
 STEPS = (100, 1000, 10_000)
@@ -71,7 +72,7 @@ def of_steps(scenario: Scenario, steps: int) -> Scenario:
     return replace(
         scenario,
         rate_sensor=rate_sensor,
-        set_model=replace(scenario.set_model, step_s=step_s, angle_sensor=sensor),
+        **of_model(replace(scenario.set_model, step_s=step_s, angle_sensor=sensor)),
         thruster=replace(scenario.thruster, greatest_impulse_m_s=ACCELERATION_M_S2 * step_s),
     )
 

@@ -81,13 +81,13 @@ def ours(problem: ObserverProblem, measured: Floats, runs: int | None) -> Floats
 
 def with_shapely(problem: ObserverProblem, measured: Floats) -> Floats:
     """Return the same with one shapely object a step: hulls of points, and intersections with strips."""
-    assert isinstance(problem.disturbance, Zonotope)
-    w, (normal,), half = problem.disturbance.generators[0], problem.c, problem.half_width[0]
+    assert isinstance(problem.disturbance_set, Zonotope)
+    w, (normal,), half = problem.disturbance_set.generators[0], np.array(problem.system.C), problem.noise.half_width[0]
     along = 100.0 * np.array([-normal[1], normal[0]])
     polygon = shapely.box(-3.0, -3.0, 3.0, 3.0)
     for k, (y,) in enumerate(measured):
         if k:
-            points = shapely.get_coordinates(polygon)[:-1] @ problem.a.T
+            points = shapely.get_coordinates(polygon)[:-1] @ np.transpose(problem.system.A)
             polygon = shapely.convex_hull(shapely.multipoints(np.vstack([points + w, points - w])))
         low, high = ((y + side * half) * normal / (normal @ normal) for side in (-1.0, 1.0))
         strip = shapely.polygons([low - along, low + along, high + along, high - along])
@@ -99,18 +99,22 @@ def with_shapely(problem: ObserverProblem, measured: Floats) -> Floats:
 def with_zonoopt(zonoopt: Any, problem: ObserverProblem, measured: Floats, bounds: bool) -> Floats:
     """Return the same with constrained zonotopes; with their bounds at every step, or at the last one alone."""
     sparse = importlib.import_module("scipy.sparse").csc_matrix
-    assert isinstance(problem.disturbance, Zonotope)
+    assert isinstance(problem.disturbance_set, Zonotope)
 
     def zonotope(centre: Sequence[float], generators: Floats) -> Any:
         return zonoopt.Zono(sparse(generators.T), np.array(centre))
 
-    w = zonotope([0.0, 0.0], problem.disturbance.generators)
-    shape, a, c = zonotope([0.0, 0.0], 3.0 * np.eye(2)), sparse(problem.a), sparse(problem.c)
+    w = zonotope([0.0, 0.0], problem.disturbance_set.generators)
+    shape, a, c = (
+        zonotope([0.0, 0.0], 3.0 * np.eye(2)),
+        sparse(np.array(problem.system.A)),
+        sparse(np.array(problem.system.C)),
+    )
     box = None
     for k, y in enumerate(measured):
         if k:
             shape = zonoopt.minkowski_sum(zonoopt.affine_map(shape, a), w)
-        shape = zonoopt.intersection(shape, zonotope(y, problem.half_width[None]), c)
+        shape = zonoopt.intersection(shape, zonotope(y, np.array([problem.noise.half_width])), c)
         if bounds or k == len(measured) - 1:
             box = shape.bounding_box()
     assert box is not None

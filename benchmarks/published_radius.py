@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 
 from experiments.common.hill_axes import to_paper
 from experiments.reachability.file import load_rendezvous
-from experiments.reachability.printed_tables import PROBLEM, TABLES, compare_published, corrected
+from experiments.reachability.printed_tables import PROBLEM, compare_published, printed_tables
 from experiments.reachability.published import flown_controls, published_motion
 from infoset.arrays import Floats
 from rendezvous.reachability import solve
@@ -33,7 +33,7 @@ def main() -> None:
     problem = rendezvous.problem
     controls = flown_controls(problem, compare_published(rendezvous, solve(problem)))
     linear = to_paper(problem.run(controls))[:, 1:]
-    printed = np.array([table.nonlinear - corrected(table, "linear x") for table in TABLES])
+    printed = np.array([table.nonlinear - table.linear for table in printed_tables().values()])
 
     def residuals(curvature_1_mm: Floats) -> Floats:
         motion = published_motion(rendezvous.truth.orbit, 1e6 / float(curvature_1_mm[0]))

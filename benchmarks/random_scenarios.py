@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from experiments.common.errors import InputError
-from experiments.interception.scenario_file import read_scenario, scenario_to_toml
+from experiments.common.input_file import read_text, to_toml
 from guidance import NoiseKind, Thruster, TieRule
 from infoset import (
     AngleSensor,
@@ -32,6 +32,7 @@ from infoset import (
 )
 from sim import Manoeuvre, Scenario, Sun, Target
 from sim.gravity import on_board_model
+from sim.scenario import of_model
 
 SOLAR_PARAMETER_M3_S2 = 1.324948e20
 STRATEGIES = ("symmetric-miss", "patient")
@@ -47,7 +48,7 @@ def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
     while True:
         try:
             scenario = _drawn(generator, number, rate_sensor)
-            return read_scenario(scenario_to_toml(scenario), f"random scenario {number}")
+            return read_text(Scenario, to_toml(scenario), f"random scenario {number}")
         except InputError:
             continue  # an invalid scenario is drawn again
 
@@ -109,7 +110,7 @@ def gravity_scenario(number: int) -> Scenario:
         sun=Sun(parameter, distance_m, float(direction), float(elevation) if is_spatial else 0.0),
         nominal_range_m=range_m,
         dispersion=box,
-        set_model=model,
+        **of_model(model),
         range_sensor=None if ranging is None else replace(ranging, period_s=step_s),
         rate_sensor=None if rates is None else replace(rates, period_s=step_s),
         target=None,
@@ -138,9 +139,8 @@ def camera_scenario(number: int) -> Scenario:
     convention = list(Convention)[number // 3 % 3] if number % 3 else Convention.PLANE
     sensor = AngleSensor.camera(
         model.angle_sensor.period_s,
-        model.angle_sensor.error_at_zero_range_rad * float(10.0 ** generator.uniform(-2.0, 0.0)),
+        model.angle_sensor.constant_error_rad * float(10.0 ** generator.uniform(-2.0, 0.0)),
         0.0 if often(0.1) else centroid_m * (1.0 - 1e-12),
-        nominal_range_m=scenario.nominal_range_m,
         convention=convention,
         error_shape=ErrorShape.DISC if number % 3 and (convention is Convention.CONE or often(0.3)) else None,
         bias=Bias.CONSTANT if often(0.5) else Bias.RANDOM,
@@ -149,7 +149,7 @@ def camera_scenario(number: int) -> Scenario:
         miss_probability=float(generator.uniform(0.0, 0.8)) if often(0.5) else 0.0,
     )
     if number % 3 == 0:
-        return replace(scenario, set_model=replace(model, angle_sensor=sensor))
+        return replace(scenario, **of_model(replace(model, angle_sensor=sensor)))
     scale = float(10.0 ** generator.uniform(-1.5, 0.5))
 
     def in_space(box: StateBox) -> StateBox:
@@ -162,7 +162,7 @@ def camera_scenario(number: int) -> Scenario:
     known = replace(known, vy_m_s=(-model.bounds.vz_m_s[1], model.bounds.vz_m_s[1] * max(scale, 1.0)))
     thruster = replace(scenario.thruster, pointing_error_rad=float(generator.choice([0.0, 0.02])))
     spatial = replace(model, bounds=known, angle_sensor=sensor)
-    return replace(scenario, set_model=spatial, dispersion=dispersion, thruster=thruster)
+    return replace(scenario, **of_model(spatial), dispersion=dispersion, thruster=thruster)
 
 
 def scheduled(scenario: Scenario, number: int) -> Scenario:
@@ -209,12 +209,12 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
         step_s,
         bounds,
         AngleSensor(step_s * int(generator.integers(1, 4)), error_rad, error_at_zero_rad, range_m),
-        disturbance_m_s2,
+        disturbance_m_s2=disturbance_m_s2,
         range_threshold_m=range_m * decades(-5.0, -1.5),
         sections=sections,
         fewest_sections=int(generator.integers(2, min(6, sections) + 1)),
         initial_set=InitialSet.BOX,
-        kind=Model.GUARANTEED,
+        model=Model.GUARANTEED,
     )
     greatest_m_s = z_m / flight_s * decades(-0.5, 1.5)
     thruster = Thruster(
@@ -232,14 +232,14 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
     rate_error_rad_s = error_rad / step_s * decades(-2.5, 0.5)
     kinds = [manoeuvre for manoeuvre in Manoeuvre if manoeuvre is not Manoeuvre.NONE]
     return Scenario(
-        f"random-{number}",
-        "",
-        sun,
-        range_m,
-        dispersion,
-        model,
-        RangeSensor(step_s * int(generator.integers(1, 5)), decades(-3.0, -0.5)) if often(0.5) else None,
-        thruster,
+        name=f"random-{number}",
+        description="",
+        sun=sun,
+        nominal_range_m=range_m,
+        dispersion=dispersion,
+        **of_model(model),
+        range_sensor=RangeSensor(step_s * int(generator.integers(1, 5)), decades(-3.0, -0.5)) if often(0.5) else None,
+        thruster=thruster,
         strategy=STRATEGIES[int(generator.integers(len(STRATEGIES)))],
         # Draws contain tie choices only with this noise; `soundness` uses them as additional random numbers.
         noise=NoiseKind.GAME,

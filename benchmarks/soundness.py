@@ -35,6 +35,7 @@ from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
 from sim.pair import middle
+from sim.scenario import of_model
 
 Floats = NDArray[np.float64]
 BATCH, SPACE_BATCH = 80, 160
@@ -112,8 +113,8 @@ def in_space(scenario: Scenario, number: int) -> Scenario:
         sensor,
         convention=convention,
         error_shape=ErrorShape.DISC if is_disc else None,
-        error_at_nominal_range_y_rad=1.5 * sensor.error_at_nominal_range_rad if differ else None,
-        error_at_zero_range_y_rad=0.7 * sensor.error_at_zero_range_rad if differ else None,
+        error_at_nominal_range_y_rad=1.5 * (sensor.error_at_nominal_range_rad or 0.0) if differ else None,
+        error_at_zero_range_y_rad=0.7 * sensor.constant_error_rad if differ else None,
     )
     box = model.bounds
     widths = 10.0 ** random.uniform(-1.5, 0.5, 2)
@@ -126,14 +127,14 @@ def in_space(scenario: Scenario, number: int) -> Scenario:
         direction, height = random.uniform(-np.pi, np.pi), random.uniform(-1.0, 1.0)
         sun = replace(sun, direction_rad=float(direction), elevation_rad=float(np.arcsin(height)))
     known = replace(model, bounds=bounds, angle_sensor=sensor)
-    return replace(scenario, sun=sun, dispersion=bounds, set_model=known)
+    return replace(scenario, sun=sun, dispersion=bounds, **of_model(known))
 
 
 def guaranteed(scenario: Scenario, hostile: bool) -> Scenario:
     """Return the scenario with the guaranteed model and starts anywhere in B x D."""
-    model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
     # Draws contain tie choices only with this noise; they are used as additional random numbers here.
-    scenario = replace(scenario, set_model=model, dispersion=model.bounds, noise=NoiseKind.GAME, tie=TieRule.RANDOM)
+    scenario = replace(scenario, **of_model(model), dispersion=model.bounds, noise=NoiseKind.GAME, tie=TieRule.RANDOM)
     if not hostile:
         return scenario
     target = Target(Manoeuvre.WORST_CASE, model.disturbance_m_s2)

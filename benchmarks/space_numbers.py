@@ -23,6 +23,7 @@ from guidance import NoiseKind, TieRule
 from infoset import ErrorShape, InitialSet, Model
 from sim import Results, Scenario, simulate
 from sim.results import join
+from sim.scenario import of_model
 
 Floats = NDArray[np.float64]
 SEEDS = (1, 2, 3)
@@ -30,10 +31,10 @@ LEVELS = (0.1, 0.5, 0.9, 0.99)
 RESAMPLES = 400
 
 
-def of_model(scenario: Scenario, model: Model) -> Scenario:
+def in_model(scenario: Scenario, model: Model) -> Scenario:
     """Return the scenario with a model of the set, and the initial set of that model."""
     shape = InitialSet.BOX if model is Model.GUARANTEED else InitialSet.RECTANGLE
-    return replace(scenario, set_model=replace(scenario.set_model, kind=model, initial_set=shape))
+    return replace(scenario, **of_model(replace(scenario.set_model, model=model, initial_set=shape)))
 
 
 def rows() -> Iterator[tuple[str, Scenario]]:
@@ -45,11 +46,11 @@ def rows() -> Iterator[tuple[str, Scenario]]:
     yield "random", spatial
     for tie in (TieRule.UPPER, TieRule.ALTERNATE, TieRule.RANDOM):
         yield f"game, {tie.value}", replace(spatial, noise=NoiseKind.GAME, tie=tie)
-    yield "random in the disc", replace(spatial, set_model=disc)
-    yield "game in the disc, upper", replace(spatial, set_model=disc, noise=NoiseKind.GAME)
+    yield "random in the disc", replace(spatial, **of_model(disc))
+    yield "game in the disc, upper", replace(spatial, **of_model(disc), noise=NoiseKind.GAME)
     # Gravity is the only acceleration, as in the prototype.
-    sure = of_model(spatial, Model.GUARANTEED)
-    sure = replace(sure, set_model=replace(sure.set_model, disturbance_m_s2=0.0))
+    sure = in_model(spatial, Model.GUARANTEED)
+    sure = replace(sure, **of_model(replace(sure.set_model, disturbance_m_s2=0.0)))
     ranging = replace(sure, range_sensor=meter)
     anywhere = replace(sure, dispersion=sure.set_model.bounds)
     for title, scenario in (
@@ -92,7 +93,7 @@ def cost(runs: int) -> Iterator[str]:
     planar, spatial = (load_scenario(name) for name in ("asteroid-1997", "asteroid-1997-space"))
     for model in Model:
         for noise in NoiseKind:
-            pair = [replace(of_model(scenario, model), noise=noise) for scenario in (planar, spatial)]
+            pair = [replace(in_model(scenario, model), noise=noise) for scenario in (planar, spatial)]
             times: list[list[float]] = [[], []]
             for _ in range(6):
                 for scenario, taken in zip(pair, times, strict=True):

@@ -16,6 +16,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from guidance import NoiseKind
 from infoset import InitialSet, Model
 from sim import Scenario, simulate
+from sim.scenario import of_model
 
 Check = Callable[[str, float, float, str], None]
 
@@ -69,8 +70,8 @@ def test_rate(benchmark: BenchmarkFixture, curve: Scenario, at_least: Check) -> 
 
 
 def test_phi_costs_at_most_three_times(curve: Scenario, under: Check) -> None:
-    model = replace(curve.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    scenario = replace(curve, set_model=model)
+    model = replace(curve.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    scenario = replace(curve, **of_model(model))
 
     def elapsed_s(guarantee: bool) -> float:
         began = time.perf_counter()

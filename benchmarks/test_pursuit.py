@@ -32,7 +32,7 @@ PHASES, INCLINATIONS = 101, 21
 @pytest.fixture(scope="module")
 def game() -> Game:
     """The game of the slides: thrusts of 20 N and 10 N."""
-    return load_pursuit("geo-pursuit").game()
+    return load_pursuit("geo-pursuit").game
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from experiments import load_scenario
-from experiments.interception.figures.animation import GIF, animate
+from experiments.interception.figures.animation import animate
 from sim import fly_one
 
 FRAMES = 18
@@ -21,7 +21,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="the file to write")
     arguments = parser.parse_args()
     record = fly_one(load_scenario("asteroid-1997-single"))
-    arguments.out.write_bytes(animate([record], GIF, FRAMES))
+    arguments.out.write_bytes(animate([record], FRAMES))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ MODULE = "experiments.files"
 
 BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
 FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
+Like = Annotated[str, typer.Option("--like", metavar="NAME", help="The built-in file to copy.")]
 NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
 
 
@@ -45,6 +46,13 @@ def _commands(noun: str, built_in: str, text: str, example: str) -> typer.Typer:
         loaded(MODULE, False).show(noun, name)
 
     @app.command(
+        help=f"Copy a built-in {noun} with its comments, as a start for your own.",
+        epilog=f"Example: {name} new mine.toml --like {built_in}",
+    )
+    def new(file: NewFile, like: Like = built_in, overwrite: Overwrite = False, quiet: Quiet = False) -> None:
+        loaded(MODULE, quiet).new(noun, like, file, overwrite, quiet)
+
+    @app.command(
         help=f"Check a {noun} file. The exit code is 0 if it is valid; otherwise it is 2, and all errors are listed.",
         epilog=f"Example: {name} check mine.toml",
     )
@@ -56,7 +64,7 @@ def _commands(noun: str, built_in: str, text: str, example: str) -> typer.Typer:
 
 scenarios = _commands(
     "scenario",
-    "asteroid-1997",
+    "own-scenario",
     "List, show and check scenarios, and create a scenario file. Without a command, list the built-in scenarios.",
     "new mine.toml",
 )
@@ -65,29 +73,5 @@ problems = _commands(
     "pareto-2008",
     "List, show and check problems of rendezvous, pursuit and estimation, and create a problem file.\n\n"
     "Without a command, list the built-in problems.",
-    "new multipoint mine.toml",
+    "new mine.toml --like service-2",
 )
-
-
-@scenarios.command("new", epilog="Example: infoset scenarios new mine.toml")
-def new_scenario(file: NewFile, overwrite: Overwrite = False, quiet: Quiet = False) -> None:
-    """Write a scenario file with a comment on every key, as a template for your own scenario."""
-    loaded(MODULE, quiet).new(None, file, overwrite, quiet)
-
-
-@problems.command("new", epilog="Example: infoset problems new multipoint mine.toml")
-def new_problem(
-    kind: Annotated[
-        str,
-        typer.Argument(
-            metavar="KIND",
-            help="Kind of the problem: pareto-encounter, multipoint, reachable-rendezvous, pursuit-evasion or "
-            "observer; or the command that takes it, for example reach.",
-        ),
-    ],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")],
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
-) -> None:
-    """Write a problem file with a comment on every key, as a template for your own problem."""
-    loaded(MODULE, quiet).new(kind, file, overwrite, quiet)

@@ -70,7 +70,7 @@ def independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
     """
     sensor = model.angle_sensor
     if sensor.bias is Bias.CONSTANT:
-        return np.full_like(range_m, sensor.pixel_error_rad)
+        return np.full_like(range_m, sensor.constant_error_rad)
     return np.maximum(sensor.error_bound(range_m), 0.5 * sensor.error_bound(model.bounds.farthest_m))
 
 
@@ -80,7 +80,7 @@ def constant_error_m(sensor: AngleSensor) -> float:
     The angles then show a point at this lateral distance from the centre, which no measurement can tell from the
     centre: the error of an estimated miss contains it unchanged.
     """
-    return sensor.centroid_error_m or 0.0 if sensor.bias is Bias.CONSTANT else 0.0
+    return sensor.centroid_error_m if sensor.bias is Bias.CONSTANT else 0.0
 
 
 def correct_outside_dead_zone(situation: Situation, estimator: Estimator, dead_zone: float, last_s: float) -> Floats:

@@ -142,7 +142,7 @@ class LeastSquaresFit:
         bounds, sensor, e = model.bounds, model.angle_sensor, situation.closing_speed_m_s
         intervals = np.array([bounds.z_m, bounds.vz_m_s, bounds.x_m, (-bounds.vx_m_s[1], -bounds.vx_m_s[0])])
         # An exactly known value gets a variance that is negligible against its size and against the angle errors.
-        angle = max(sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad)
+        angle = max(sensor.constant_error_rad, sensor.error_at_nominal_range_rad or 0.0)
         resolved = np.array([angle * bounds.x_m[1], angle * e, 0.0, 0.0])
         if self._size > ACCELERATION:
             nu = model.acceleration_m_s2

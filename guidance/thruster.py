@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.limits import ADDED_LATER, POSITIVE, WHOLE, NotNegative, Part, Positive, check_fields
+from infoset.limits import POSITIVE, WHOLE, NotNegative, Part, Positive, check_fields
 
 STEP_TOLERANCE = 1e-9
 """Part of a step by which a time may be after a step and still belong to it, for times that are rounded decimals."""
@@ -53,10 +53,10 @@ class Thruster:
     least_impulse_m_s: NotNegative
     greatest_impulse_m_s: Positive
     execution_error_relative: Part = 0.0
-    pointing_error_rad: Part = field(default=0.0, metadata=ADDED_LATER)
-    last_impulse_s: NotNegative | None = field(default=None, metadata=ADDED_LATER)
-    impulses_s: Annotated[tuple[float, ...], POSITIVE] = field(default=(), metadata=ADDED_LATER)
-    delay_steps: Annotated[int, WHOLE] = field(default=0, metadata=ADDED_LATER)
+    pointing_error_rad: Part = 0.0
+    last_impulse_s: NotNegative | None = None
+    impulses_s: Annotated[tuple[float, ...], POSITIVE] = ()
+    delay_steps: Annotated[int, WHOLE] = 0
 
     def __post_init__(self) -> None:
         check_fields(self)

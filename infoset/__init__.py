@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 
 from infoset.convex_polygons import ConvexPolygons
 from infoset.information_set import InformationSet, InformationSetView
-from infoset.model import InitialSet, Model, Recovery, SetModel, StateBox
+from infoset.model import InitialSet, Model, Recovery, SetModel, SetSettings, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.sensor import Sensor
 from infoset.sensors import AngleSensor, Bias, Convention, ErrorShape, RangeSensor, RateSensor
 from infoset.set_queries import Section, to_omega_alpha
 from infoset.set_state import SetStatus
-from infoset.shapes import from_shapely, to_shapely
 from infoset.zonotope import Zonotope
 
 if TYPE_CHECKING:
@@ -53,12 +52,11 @@ __all__ = [
     "Section",
     "Sensor",
     "SetModel",
+    "SetSettings",
     "SetStatus",
     "StateBox",
     "Zonotope",
-    "from_shapely",
     "to_omega_alpha",
-    "to_shapely",
 ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,10 +18,8 @@ from infoset._set_arguments import (
     with_hint,
 )
 from infoset.arrays import Flags, Floats
-from infoset.limits import Limits, need_pair, real_values, shown
-from infoset.pictures import outlines_svg
+from infoset.limits import Limits, real_values, shown
 from infoset.polygon_arrays import PolygonArrays
-from infoset.renamed import renamed
 
 if TYPE_CHECKING:
     from infoset.polytope import Polytope
@@ -66,18 +63,6 @@ class ConvexPolygons(PolygonArrays):
     """
 
     __array_ufunc__ = None
-
-    @classmethod
-    def box(cls, x: tuple[float, float], y: tuple[float, float]) -> ConvexPolygons:
-        """Return `from_box((x[0], y[0]), (x[1], y[1]))`. Deprecated."""
-        warnings.warn("box is deprecated and will be removed: use from_box", DeprecationWarning, stacklevel=2)
-        need_pair("x", x)
-        need_pair("y", y)
-        return cls.from_box((x[0], y[0]), (x[1], y[1]))
-
-    def _repr_svg_(self) -> str:
-        outlines = [self.vertices[index][: self.counts[index]] for index in np.ndindex(self.shape)]
-        return outlines_svg(outlines, "x", "y", repr(self).strip("<>"))
 
     def __repr__(self) -> str:
         if self.shape:
@@ -409,5 +394,3 @@ class ConvexPolygons(PolygonArrays):
 
     def __le__(self, other: ConvexPolygons) -> Flags:
         return self.is_subset(other) if isinstance(other, ConvexPolygons) else NotImplemented
-
-    clip, support = renamed("clip", "cut"), renamed("support", "support_function")

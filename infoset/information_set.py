@@ -12,7 +12,7 @@ from infoset.arrays import Flags, Floats
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import ANGLE, IMPULSE, PREDICTION, RATE, WIDENING, History
 from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, real_values, shown
-from infoset.model import InitialSet, Recovery, SetModel
+from infoset.model import Recovery, SetModel
 from infoset.section_law import BOUND_SLACK, section_laws
 from infoset.section_stack import SectionStack
 from infoset.set_queries import SetQueries
@@ -101,7 +101,7 @@ class InformationSet(InformationSetView):
             np.linspace(least, greatest, model.sections) if model.sections > 1 else 0.5 * (least + greatest)
         )
         laws = section_laws(model)
-        has_phi = guarantee and model.is_guaranteed and model.initial_set is InitialSet.BOX
+        has_phi = guarantee and model.is_guaranteed and model.starts_as_box
         state = SetState(
             model=model,
             stack=SectionStack(laws, labels, np.full(batch, model.sections)),

@@ -67,6 +67,22 @@ class Limits:
         if problem is not None:
             raise ValueError(f"{name} {problem}: got {shown(value)}")
 
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return the schema of a field for readers of files: its type, and these limits for each of its numbers."""
+        from pydantic_core import core_schema
+
+        is_pair = source == tuple[float, float]
+
+        def checked(value: Any) -> Any:
+            problem = next(filter(None, map(self.problem, value if isinstance(value, tuple) else (value,))), None)
+            if problem is None and is_pair and value[0] > value[1]:
+                problem = "must be a pair [minimum, maximum], and is reversed"
+            if problem is not None:
+                raise ValueError(problem)
+            return value
+
+        return core_schema.no_info_after_validator_function(checked, handler(source))
+
 
 NUMBER = Limits()
 POSITIVE = Limits(above=0.0)
@@ -76,9 +92,43 @@ PART = Limits(least=0.0, below=1.0)
 WHOLE = Limits(least=0, whole=True)
 COUNT = Limits(least=1, whole=True)
 
-ADDED_LATER = {"added_later": True}
-"""Metadata of an optional field that the first version of the files lacks: they omit it if it has its default."""
+LONGEST_NAME, LONGEST_DESCRIPTION = 100, 300
 
+
+@dataclass(frozen=True)
+class Line:
+    """One line of printable text; `names_files` if files are named after it."""
+
+    longest: int
+    names_files: bool = False
+
+    def problem(self, value: str) -> str | None:
+        """Return why a text is not such a line, or None."""
+        if len(value) > self.longest:
+            return f"must have at most {self.longest} characters"
+        if not value.isprintable():
+            return "must be one line without control characters"
+        if self.names_files and (value[:1] in ("", "-", ".", " ") or set('/\\:*?"<>|$') & set(value)):
+            return (
+                'must begin with a letter or a digit, without any of / \\ : * ? " < > | $, because files have this name'
+            )
+        return None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return the schema of a field for readers of files."""
+        from pydantic_core import core_schema
+
+        def checked(value: str) -> str:
+            problem = self.problem(value)
+            if problem is not None:
+                raise ValueError(problem)
+            return value
+
+        return core_schema.no_info_after_validator_function(checked, handler(source))
+
+
+Name = Annotated[str, Line(LONGEST_NAME, names_files=True)]
+Description = Annotated[str, Line(LONGEST_DESCRIPTION)]
 Number = Annotated[float, NUMBER]
 Positive = Annotated[float, POSITIVE]
 NotNegative = Annotated[float, NOT_NEGATIVE]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from typing import Annotated
 
-from infoset.limits import ADDED_LATER, NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
+from infoset.limits import NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
 from infoset.sensor import Sensor
 from infoset.sensors import AngleSensor
 
@@ -84,8 +84,8 @@ class StateBox:
     x_m: Annotated[Interval, POSITIVE]
     vz_m_s: Annotated[Interval, NUMBER]
     vx_m_s: Annotated[Interval, _APPROACH]
-    y_m: Annotated[Interval, NUMBER] | None = field(default=None, metadata=ADDED_LATER)
-    vy_m_s: Annotated[Interval, NUMBER] | None = field(default=None, metadata=ADDED_LATER)
+    y_m: Annotated[Interval, NUMBER] | None = None
+    vy_m_s: Annotated[Interval, NUMBER] | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -133,8 +133,63 @@ class StateBox:
         return max(math.hypot(greatest, offset), offset + self.lateral_speed_m_s * (greatest / -self.vx_m_s[1]))
 
 
+@dataclass(frozen=True, kw_only=True)
+class SetSettings:
+    """Choices of an information set.
+
+    Parameters
+    ----------
+    model : Model
+        What the set allows for.
+    initial_set : InitialSet or None
+        Shape of a section at the start; None is RECTANGLE in the paper's model and BOX in the guaranteed one.
+    sections : int
+        Number of x-sections at the start, on a uniform grid over the possible ranges, ends included.
+    fewest_sections : int
+        If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1.
+    recovery : Recovery
+        What happens to a set that a measurement leaves empty.
+    range_threshold_m : float
+        Hypotheses whose range is about to fall below this value eps leave the set, m.
+    disturbance_m_s2 : float
+        Bound of the acceleration along z, m/s^2: nu of the fictitious one in the paper's model, that of the target's
+        manoeuvres in the guaranteed model.
+    disturbance_y_m_s2 : float or None
+        The same bound along y; None is the value along z. For space only.
+
+    Raises
+    ------
+    TypeError, ValueError
+            If a value is not within its limits, or `sections` is less than `fewest_sections`.
+    """
+
+    model: Model = Model.GUARANTEED
+    initial_set: InitialSet | None = None
+    sections: Annotated[int, _SECTIONS] = 29
+    fewest_sections: Annotated[int, _SECTIONS] = 5
+    recovery: Recovery = Recovery.WIDENED
+    range_threshold_m: NotNegative = 0.0
+    disturbance_m_s2: NotNegative = 0.0
+    disturbance_y_m_s2: NotNegative | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.sections < self.fewest_sections:
+            raise ValueError(f"sections must be at least fewest_sections, {self.fewest_sections}: got {self.sections}")
+
+    @property
+    def is_guaranteed(self) -> bool:
+        """Whether the model is the guaranteed one, whose set keeps the true state."""
+        return self.model is Model.GUARANTEED
+
+    @property
+    def starts_as_box(self) -> bool:
+        """Whether a section at the start is a rectangle in (z, V), and not in (omega, alpha)."""
+        return self.is_guaranteed if self.initial_set is None else self.initial_set is InitialSet.BOX
+
+
 @dataclass(frozen=True)
-class SetModel:
+class SetModel(SetSettings):
     """Parameters of an information set.
 
     Parameters
@@ -145,25 +200,20 @@ class SetModel:
         The step Delta of observation and control, s.
     bounds : StateBox
         Possible states at t = 0.
-    disturbance_m_s2 : float
-        Bound of the acceleration along z, m/s^2: nu of the fictitious one in the paper's model, that of the target's
-        manoeuvres in the guaranteed model.
-    range_threshold_m : float
-        Hypotheses whose range is about to fall below this value eps leave the set, m.
-    sections : int
-        Number of x-sections at the start, on a uniform grid over the possible ranges, ends included.
-    fewest_sections : int
-        If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1.
+    angle_sensor : AngleSensor
+        The line-of-sight sensor.
     gravity_m_s2 : float
         Bound of the difference of gravity along z; used by the guaranteed model only.
+    gravity_y_m_s2 : float or None
+        The same bound along y; None is the value along z. For space only.
     gravity_speed_change : float
         Bound of the relative change of the closing speed by gravity; used by the guaranteed model only.
     execution_error_relative : float
         Bound of |given / commanded - 1| of an impulse; used by the guaranteed model only.
-    disturbance_y_m_s2, gravity_y_m_s2 : float or None
-        `disturbance_m_s2` and `gravity_m_s2` along y; None is the value along z. For space only.
     pointing_error_rad : float
         Bound of the angle between the given and the commanded impulse; used by the guaranteed model in space only.
+    **settings
+        Fields of `SetSettings`.
 
     Raises
     ------
@@ -179,26 +229,14 @@ class SetModel:
     step_s: Positive
     bounds: StateBox
     angle_sensor: AngleSensor
-    disturbance_m_s2: NotNegative = 0.0
-    range_threshold_m: NotNegative = 0.0
-    sections: Annotated[int, _SECTIONS] = 29
-    fewest_sections: Annotated[int, _SECTIONS] = 5
-    initial_set: InitialSet = InitialSet.RECTANGLE
-    kind: Model = Model.PAPER
-    recovery: Recovery = Recovery.WIDENED
     gravity_m_s2: NotNegative = 0.0
+    gravity_y_m_s2: NotNegative | None = None
     gravity_speed_change: NotNegative = 0.0
     execution_error_relative: Part = 0.0
-    disturbance_y_m_s2: NotNegative | None = field(default=None, metadata=ADDED_LATER)
-    gravity_y_m_s2: NotNegative | None = field(default=None, metadata=ADDED_LATER)
-    pointing_error_rad: Part = field(default=0.0, metadata=ADDED_LATER)
+    pointing_error_rad: Part = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(self)
-        if self.sections < self.fewest_sections:
-            raise ValueError(
-                f"SetModel: sections must be at least fewest_sections, {self.fewest_sections}: got {self.sections}"
-            )
+        super().__post_init__()
         if len(self.axes) == 1:
             for name, is_set in (
                 ("angle_sensor", self.angle_sensor.is_spatial),
@@ -213,7 +251,7 @@ class SetModel:
                     )
         self.check_period("angle_sensor", self.angle_sensor)
         self.check_start("bounds", self.bounds)
-        nearest_m = CENTROID_ERRORS_AT_THRESHOLD * (self.angle_sensor.centroid_error_m or 0.0)
+        nearest_m = CENTROID_ERRORS_AT_THRESHOLD * self.angle_sensor.centroid_error_m
         if self.range_threshold_m < nearest_m:
             raise ValueError(
                 f"SetModel: range_threshold_m must be at least {CENTROID_ERRORS_AT_THRESHOLD:g} times "
@@ -292,11 +330,6 @@ class SetModel:
                 f"angle_sensor: its error bound must be positive up to the greatest distance of {name}, "
                 f"{box.farthest_m:g} m: got {bound:.3g} rad there"
             )
-
-    @property
-    def is_guaranteed(self) -> bool:
-        """Whether the model is the guaranteed one, whose set keeps the true state."""
-        return self.kind is Model.GUARANTEED
 
     @property
     def speed_error(self) -> float:

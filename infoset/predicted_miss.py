@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from infoset.arrays import Flags, Floats
-from infoset.pictures import predicted_miss_svg
 
 
 @dataclass(frozen=True)
@@ -60,6 +59,3 @@ class PredictedMiss:
             self.lower_point.axis(number),
             self.upper_point.axis(number),
         )
-
-    def _repr_svg_(self) -> str:
-        return predicted_miss_svg(self.exists, self.lower_m, self.upper_m)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset._compile import inlined, record_of
-from infoset.model import InitialSet, Interval, SetModel
+from infoset.model import Interval, SetModel
 from infoset.sensors import Convention
 
 BOUND_SLACK = 1e-9
@@ -146,7 +146,7 @@ def _law(model: SetModel) -> SectionLaw:
     correspond to a label, and adds eta to the engine's error of an impulse. See docs/guarantee.md.
     """
     box, sensor, eta = model.bounds, model.angle_sensor, model.speed_error
-    slope, error = sensor.error_slope_rad_per_m, sensor.error_at_zero_range_rad
+    slope, error = sensor.error_slope_rad_per_m, sensor.constant_error_rad
     half_v = model.acceleration_m_s2 * model.step_s
     guaranteed = model.is_guaranteed
     if guaranteed:
@@ -155,7 +155,7 @@ def _law(model: SetModel) -> SectionLaw:
     z_least, z_greatest = _scaled_outward(box.z_m, eta)
     vz_least, vz_greatest = _scaled_outward(box.vz_m_s, eta)
     # The true distance of a label is at least (1 - eta) x.
-    centroid = (sensor.centroid_error_m or 0.0) * (1.0 + BOUND_SLACK) / (1.0 - eta)
+    centroid = sensor.centroid_error_m * (1.0 + BOUND_SLACK) / (1.0 - eta)
     least_label, greatest_label = model.label_limits_m
     if guaranteed:
         offset, speed = max(abs(z) for z in box.z_m), max(abs(v) for v in box.vz_m_s)
@@ -187,7 +187,7 @@ def _law(model: SetModel) -> SectionLaw:
         vz_greatest=vz_greatest,
         vx_least=float(box.vx_m_s[0]),
         vx_greatest=float(box.vx_m_s[1]),
-        rectangle=model.initial_set is InitialSet.RECTANGLE,
+        rectangle=not model.starts_as_box,
         angles=LINEAR if centroid > 0.0 or (guaranteed and slope > 0.0) else PLANE,
         other_error_at_zero_range=0.0,
         other_error_slope=0.0,

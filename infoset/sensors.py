@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from typing import Any, ClassVar, TypeVar
@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from infoset.arrays import Flags, Floats
-from infoset.limits import ADDED_LATER, Checked, Fraction, NotNegative, Part, Positive, check_fields
+from infoset.limits import Checked, Fraction, NotNegative, Part, Positive, check_fields
 from infoset.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
 
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
@@ -63,19 +63,20 @@ class AngleSensor(Sensor):
     ----------
     period_s : float
         Time between measurements, s; the first is at t = 0.
-    error_at_nominal_range_rad, error_at_zero_range_rad : float
+    error_at_nominal_range_rad, error_at_zero_range_rad : float or None
         Bound a + h(d) at `nominal_range_m` and at zero range, rad, in (0, 1). The same line continues beyond.
-    nominal_range_m : float
+    nominal_range_m : float or None
         Range at which the first of the two holds, m.
+    pixel_error_rad : float or None
+        A number makes the sensor a camera, in place of the three values above. Its bound at the distance d is
+        pixel_error_rad + centroid_error_m / d, the same for both axes.
+    centroid_error_m : float
+        Greatest distance between the point of the body that a camera measures and its centre, m.
     error_at_nominal_range_y_rad, error_at_zero_range_y_rad : float or None
         The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For space only.
     error_shape : ErrorShape or None
         Shape of the set of errors in space; None is DISC for the convention CONE and BOX for the others. The
         information set takes a disc as the box around it.
-    centroid_error_m : float or None
-        A number makes the sensor a camera. Its bound at the distance d is pixel + centroid_error_m / d, the same for
-        both axes; `error_at_nominal_range_rad` and `error_at_zero_range_rad` are both the pixel error. The centroid
-        error is the greatest distance between the measured point of the body and its centre, m.
     first_image_s, last_image_s : float
         Times before the nominal arrival of the first and the last image, s. Images begin at the start for None, and
         continue until the true arrival for 0.
@@ -97,33 +98,36 @@ class AngleSensor(Sensor):
     stream: ClassVar[int] = 1
 
     period_s: Positive
-    error_at_nominal_range_rad: Fraction
-    error_at_zero_range_rad: Fraction
-    nominal_range_m: Positive
-    error_at_nominal_range_y_rad: Part | None = field(default=None, metadata=ADDED_LATER)
-    error_at_zero_range_y_rad: Part | None = field(default=None, metadata=ADDED_LATER)
-    convention: Convention = field(default=Convention.PLANE, metadata=ADDED_LATER)
-    error_shape: ErrorShape | None = field(default=None, metadata=ADDED_LATER)
-    centroid_error_m: NotNegative | None = field(default=None, metadata=ADDED_LATER)
-    bias: Bias = field(default=Bias.RANDOM, metadata=ADDED_LATER)
-    first_image_s: Positive | None = field(default=None, metadata=ADDED_LATER)
-    last_image_s: NotNegative = field(default=0.0, metadata=ADDED_LATER)
-    miss_probability: Part = field(default=0.0, metadata=ADDED_LATER)
+    error_at_nominal_range_rad: Fraction | None = None
+    error_at_zero_range_rad: Fraction | None = None
+    nominal_range_m: Positive | None = None
+    pixel_error_rad: Fraction | None = None
+    centroid_error_m: NotNegative = 0.0
+    error_at_nominal_range_y_rad: Part | None = None
+    error_at_zero_range_y_rad: Part | None = None
+    convention: Convention = Convention.PLANE
+    error_shape: ErrorShape | None = None
+    bias: Bias = Bias.RANDOM
+    first_image_s: Positive | None = None
+    last_image_s: NotNegative = 0.0
+    miss_probability: Part = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.is_camera and not (
-            self.error_at_nominal_range_rad == self.error_at_zero_range_rad
-            and self.error_at_nominal_range_y_rad is None
-            and self.error_at_zero_range_y_rad is None
-        ):
+        line = (self.error_at_nominal_range_rad, self.error_at_zero_range_rad, self.nominal_range_m)
+        of_y = (self.error_at_nominal_range_y_rad, self.error_at_zero_range_y_rad)
+        if self.is_camera and not set(line + of_y) == {None}:
             raise ValueError(
-                "AngleSensor: with centroid_error_m, error_at_nominal_range_rad and error_at_zero_range_rad must both "
-                "be the pixel error, and error_at_nominal_range_y_rad and error_at_zero_range_y_rad must be left out: "
-                f"got {self.error_at_nominal_range_rad!r} and {self.error_at_zero_range_rad!r}"
+                "AngleSensor: with pixel_error_rad, a camera, leave out error_at_nominal_range_rad, "
+                "error_at_zero_range_rad and nominal_range_m, and those of y"
+            )
+        if not self.is_camera and (None in line or self.centroid_error_m > 0.0):
+            raise ValueError(
+                "AngleSensor: must have error_at_nominal_range_rad, error_at_zero_range_rad and nominal_range_m of the "
+                "linear bound, or pixel_error_rad and centroid_error_m of a camera"
             )
         if self.bias is Bias.CONSTANT and not self.is_camera:
-            raise ValueError("AngleSensor: bias can be constant only with centroid_error_m, whose part is constant")
+            raise ValueError("AngleSensor: bias can be constant only for a camera, whose centroid part is constant")
         if self.first_image_s is not None and self.first_image_s < self.last_image_s:
             raise ValueError(
                 "AngleSensor: first_image_s must be at least last_image_s, because both are times before the arrival: "
@@ -145,18 +149,17 @@ class AngleSensor(Sensor):
         cls, period_s: float, pixel_error_rad: float, centroid_error_m: float = 0.0, **others: Any
     ) -> AngleSensor:
         """Return a camera, with the error bound pixel + centroid_error_m / d at the distance d; `others` are fields."""
-        law = {"nominal_range_m": 1.0, "centroid_error_m": centroid_error_m}
-        return cls(period_s, pixel_error_rad, pixel_error_rad, **law | others)
+        return cls(period_s, pixel_error_rad=pixel_error_rad, centroid_error_m=centroid_error_m, **others)
 
     @property
     def is_camera(self) -> bool:
         """Whether the error bound is that of a camera."""
-        return self.centroid_error_m is not None
+        return self.pixel_error_rad is not None
 
     @property
-    def pixel_error_rad(self) -> float:
-        """The part of a camera's error bound that does not depend on the distance, rad."""
-        return self.error_at_zero_range_rad
+    def constant_error_rad(self) -> float:
+        """The part of the error bound that does not depend on the range, rad: that at range zero, or of the pixel."""
+        return (self.pixel_error_rad if self.is_camera else self.error_at_zero_range_rad) or 0.0
 
     @property
     def is_disc(self) -> bool:
@@ -180,41 +183,40 @@ class AngleSensor(Sensor):
     @cached_property
     def _planar(self) -> dict[str, AngleSensor]:
         """The sensors of both plane angles, which strategies need at every step."""
-        along_z = (self.error_at_nominal_range_rad, self.error_at_zero_range_rad)
-        along_y = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
-        return {
-            name: replace(
-                self,
-                error_at_nominal_range_rad=at_nominal,
-                error_at_zero_range_rad=at_zero,
-                error_at_nominal_range_y_rad=None,
-                error_at_zero_range_y_rad=None,
-                convention=Convention.PLANE,
-                error_shape=None,
-            )
-            for name, (at_nominal, at_zero) in (("y", along_y), ("z", along_z))
-        }
+        plain = replace(
+            self,
+            error_at_nominal_range_y_rad=None,
+            error_at_zero_range_y_rad=None,
+            convention=Convention.PLANE,
+            error_shape=None,
+        )
+        if self.is_camera:
+            return {"y": plain, "z": plain}
+        at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
+        along_y = replace(plain, error_at_nominal_range_rad=at_nominal, error_at_zero_range_rad=at_zero)
+        return {"y": along_y, "z": plain}
 
     @property
     def _bounds_of_y(self) -> tuple[float, float]:
         """The bounds of the angle of the y axis at the nominal range and at range zero, rad; they may be zero."""
-        at_nominal, at_zero = self.error_at_nominal_range_y_rad, self.error_at_zero_range_y_rad
-        return (
-            self.error_at_nominal_range_rad if at_nominal is None else at_nominal,
-            self.error_at_zero_range_rad if at_zero is None else at_zero,
-        )
+        own = (self.error_at_nominal_range_y_rad, self.error_at_zero_range_y_rad)
+        common = (self.error_at_nominal_range_rad, self.error_at_zero_range_rad)
+        at_nominal, at_zero = ((of_z if of_y is None else of_y) or 0.0 for of_y, of_z in zip(own, common, strict=True))
+        return at_nominal, at_zero
 
     @property
     def error_slope_rad_per_m(self) -> float:
         """Change of the bound with range, rad/m."""
-        return (self.error_at_nominal_range_rad - self.error_at_zero_range_rad) / self.nominal_range_m
+        if self.error_at_nominal_range_rad is None or self.nominal_range_m is None:
+            return 0.0
+        return (self.error_at_nominal_range_rad - self.constant_error_rad) / self.nominal_range_m
 
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
         """Return the greatest size of the error at a range (m), rad.
 
         The bound of a camera does not increase at distances below its centroid error, where c/d is greater than 1 rad.
         """
-        bound = self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
+        bound = self.constant_error_rad + self.error_slope_rad_per_m * range_m
         if self.centroid_error_m:
             distance: RangeOrRanges = np.maximum(range_m, self.centroid_error_m)
             bound = bound + self.centroid_error_m / distance
@@ -232,7 +234,7 @@ class AngleSensor(Sensor):
             return self.error_bound(range_m)
         y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))
         at_nominal, at_zero = self._bounds_of_y
-        return np.stack([at_zero + (at_nominal - at_zero) / self.nominal_range_m * y, self.error_bound(z)])
+        return np.stack([at_zero + (at_nominal - at_zero) / (self.nominal_range_m or 1.0) * y, self.error_bound(z)])
 
     def plane_angles(self, measured: Floats) -> Floats:
         """Return the angles atan2(y, x) and atan2(z, x) of measured angles, rad, shape (..., B)."""
@@ -271,7 +273,7 @@ class AngleSensor(Sensor):
         error, bias : ndarray, shape (..., B)
             Errors in units of the bounds of the two parts, within [-1, 1] or the unit disc.
         """
-        share = self.pixel_error_rad / self.error_bound(sight.range_m)
+        share = self.constant_error_rad / self.error_bound(sight.range_m)
         return share * error + (1.0 - share) * bias
 
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:

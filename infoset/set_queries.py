@@ -14,7 +14,6 @@ from infoset.arrays import Flags, Floats
 from infoset.chain_storage import Chains
 from infoset.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, POSITIVE, WHOLE, Limits, real_array
-from infoset.pictures import sections_svg
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.replays import PROBE, ROWS, replay_label, replay_room
 from infoset.section_stack import outline
@@ -62,9 +61,6 @@ class Section:
         """The section in the (omega, alpha) plane of the y axis, rad/s and rad; None in a plane."""
         return None if self.polygon_y is None else to_omega_alpha(self.polygon_y, self.range_m, self.closing_speed_m_s)
 
-    def _repr_svg_(self) -> str:
-        return sections_svg(_outlines([self]), f"section at x = {self.range_m / 1e3:.6g} km")
-
 
 def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
     """Map polygons from the (V, z) plane to the (omega, alpha) plane at a range.
@@ -85,13 +81,6 @@ def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: f
     POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     x, e = range_m, closing_speed_m_s
     return polygon.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
-
-
-def _outlines(sections: Sequence[Section]) -> dict[str, list[Floats]]:
-    """Return the vertices of sections in the (omega, alpha) plane, or in those of y and z."""
-    of_z = [section.omega_alpha.polygon() for section in sections]
-    of_y = [polygon.polygon() for section in sections if (polygon := section.omega_alpha_y) is not None]
-    return {", plane (x, y)": of_y, ", plane (x, z)": of_z} if of_y else {"": of_z}
 
 
 _TRACKING = SetStatus.TRACKING.value
@@ -340,14 +329,7 @@ class SetQueries:
 
         Those of a set in space are of the z axis; ``axis("y").to_shapely()`` returns those of y.
         """
-        from infoset.shapes import to_shapely
-
-        return [to_shapely(section.omega_alpha) for section in self.sections(engagement)]
-
-    def _repr_svg_(self) -> str:
-        which = "" if self.batch == 1 else f", the first of {self.batch} engagements"
-        title = f"{self.section_counts[0]} sections at t = {self.time_s:g} s{which}"
-        return sections_svg(_outlines(self.sections()), title)
+        return [section.omega_alpha.to_shapely() for section in self.sections(engagement)]
 
     def __repr__(self) -> str:
         head = f"{type(self).__name__} at t = {self.time_s:g} s"

@@ -28,8 +28,8 @@ from sim.storage import (
     Damage,
     Manifest,
     StorageError,
+    fingerprint,
     read_manifest,
-    scenario_hash,
 )
 from sim.undecided_cells import UndecidedCells
 from sim.versions import calculating_versions
@@ -215,7 +215,7 @@ class Campaign:
         """Return the manifest of the campaign; a resumed campaign keeps the size of its chunks."""
         noise, stored = self._noise, self._stored()
         required = self.until if self.require is None and isinstance(self.until, AnyRequirement) else self.require
-        hashes = ",".join(scenario_hash(noise.applied_to(cell)) for cell in self.cells)
+        hashes = ",".join(fingerprint(noise.applied_to(cell)) for cell in self.cells)
         return Manifest(
             scenario=noise.applied_to(self.scenario),
             runs=self.greatest_runs,
@@ -226,7 +226,6 @@ class Campaign:
             guarantee=self.guarantee,
             versions=dict(calculating_versions()),
             axes=self.axes,
-            order=stored.order if stored is not None and stored.axes else "rounds" if self.axes else "cells",
             cells_hash=hashlib.sha256(hashes.encode()).hexdigest()[:32] if self.cells else "",
             until=None if self.until is None else str(self.until),
             require=None if required is None else str(required),

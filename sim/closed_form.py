@@ -150,7 +150,7 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
     """
     model = scenario.set_model
     camera = model.angle_sensor
-    if camera.centroid_error_m is None:
+    if not camera.is_camera:
         raise ValueError("the closed form is that of a camera: set angle_sensor.pixel_error_rad and centroid_error_m")
     if camera.miss_probability > 0.0:
         raise ValueError(
@@ -160,7 +160,7 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
     along = (
         possible_miss_m(
             model.closing_speed_m_s,
-            camera.pixel_error_rad,
+            camera.constant_error_rad,
             camera.centroid_error_m,
             first_s,
             last_s,

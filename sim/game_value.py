@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from infoset import AngleSensor, InformationSet, InitialSet, StateBox
+from infoset import AngleSensor, InformationSet, StateBox
 from infoset.arrays import Flags, Floats
 from infoset.model import CENTROID_ERRORS_AT_THRESHOLD
 from sim.bound import LowerBound
@@ -67,7 +67,7 @@ def why_no_value(scenario: Scenario) -> tuple[str, ...]:
         "impulses with a delay": thruster.delay_steps > 0,
         # In the paper's model the set can lose the true state, and symmetric-miss guarantees nothing.
         "model paper": not model.is_guaranteed,
-        "starts in a rectangle of angle and rate": model.initial_set is not InitialSet.BOX,
+        "starts in a rectangle of angle and rate": not model.starts_as_box,
         # The pairs of the lower bound get all images; the reserve counts the limits of the angle alone.
         "images that can be lost": model.angle_sensor.miss_probability > 0.0,
         "rate sensor": scenario.rate_sensor is not None,

@@ -13,13 +13,9 @@ from infoset.arrays import Floats
 from infoset.limits import WHOLE
 from sim.draws import draw
 from sim.engagement import Engagements, Step
-from sim.pictures import course_html
 from sim.results import Results, ending
 from sim.scenario import Scenario, strategy_name, with_strategy
 from sim.target import TargetMotion
-
-_MOST_DRAWN = 1000
-"""Most steps of the predicted misses in a notebook."""
 
 
 @dataclass(frozen=True)
@@ -146,29 +142,6 @@ class Record:
             f"{self.noise_name} noise, {len(self.steps)} steps\n {self.ending}, "
             f"miss {result.miss_m[0]:.4g} m for {result.impulse_m_s[0]:.4g} m/s, "
             f"true state {inside} its section at every step>"
-        )
-
-    def _repr_html_(self) -> str:
-        result, thruster = self.result, self.scenario.thruster
-        every = -(-len(self.steps) // _MOST_DRAWN)
-        known = [step for step in self.steps[::every] if step.predicted_miss_m is not None]
-        axes = self.scenario.set_model.axes
-        along = {axis: f" along {axis}" if len(axes) > 1 else "" for axis in axes}
-        lateral = zip(result.lateral_miss[0].compressed(), along.values(), strict=False)  # no miss by axis in a plane
-        return course_html(
-            f"{self.ending}: {len(self.steps)} steps, seed {self.seed}, run {self.run}",
-            {
-                "scenario": self.scenario.name,
-                "noise, strategy": f"{self.noise_name}, {self.strategy}",
-                "miss": ", ".join(f"{miss:.4g} m{mark}" for miss, mark in [(result.miss_m[0], ""), *lateral]),
-                "impulse": f"{result.impulse_m_s[0]:.4g} m/s of {thruster.budget_m_s:g}",
-                "truth kept": "yes" if result.truth_kept[0] else "no",
-            },
-            np.array([step.time_s for step in self.steps]),
-            {along[axis]: np.array([step.axes[axis].impulse_m_s for step in self.steps]) for axis in axes},
-            thruster.greatest_impulse_m_s,
-            np.array([step.time_s for step in known]),
-            {along[axis]: np.array([step.axes[axis].predicted_miss_m for step in known]) for axis in axes},
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
 from functools import partial
@@ -15,7 +15,6 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import NOT_NEGATIVE
 from infoset.set_queries import MaskedFloats
 from sim.columns import Column, columns, columns_with_values, documented, values_of
-from sim.pictures import results_html
 from sim.statistics import HitEstimate, estimate_hits
 
 MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
@@ -36,14 +35,6 @@ class Outcome(Enum):
     DIVERGED = "diverged"
     """The miss is greater than the nominal range."""
 
-    @classmethod
-    def _missing_(cls, value: object) -> Outcome | None:
-        return OLD_OUTCOMES.get(value) if isinstance(value, str) else None
-
-
-OLD_OUTCOMES: Mapping[str, Outcome] = {"intercepted": Outcome.ARRIVED, "set-lost": Outcome.SET_EMPTY}
-"""Names of outcomes in files of version 0.1.0."""
-
 
 _PHI = (
     "Bound Phi of the miss (in the paper's model the published Phi, which is not a bound); unknown where no label "
@@ -58,7 +49,7 @@ _THEOREM_8 = (
     "closing speed are known, and for other strategies"
 )
 _HELD = "Miss at most the guaranteed miss; unknown without a guarantee"
-_EMPTY = "A measurement left the set empty, whatever the outcome is; old files lack it, and the outcome says so"
+_EMPTY = "A measurement left the set empty, whatever the outcome is"
 _HIT = "Miss at most the radius of the body; unknown if the body has no size"
 
 
@@ -94,7 +85,7 @@ class Results:
         metadata=columns(Column("theorem_8_miss_m", "m", _THEOREM_8, nullable=True, optional=True, limits=NOT_NEGATIVE))
     )
     outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
-    set_emptied: Flags = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool, nullable=True)))
+    set_emptied: Flags = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool)))
     hit: MaskedFlags = field(metadata=columns(Column("hit", "", _HIT, bool, nullable=True)))
     truth_kept: Flags = field(
         init=False, metadata=columns(Column("truth_kept", "", "True state inside its section at every step", bool))
@@ -126,9 +117,6 @@ class Results:
 
     def __post_init__(self) -> None:
         unknown = np.ma.getmaskarray(self.guaranteed_miss_m) | (not self.guarantees)
-        if isinstance(self.set_emptied, np.ma.MaskedArray):
-            emptied = [outcome is Outcome.SET_EMPTY for outcome in self.outcomes]
-            object.__setattr__(self, "set_emptied", np.where(self.set_emptied.mask, emptied, self.set_emptied.data))
         within = self.miss_m <= self.guaranteed_miss_m.filled(np.inf)
         object.__setattr__(self, "truth_kept", self.truth_margin_m.filled(0.0) >= 0.0)
         object.__setattr__(self, "phi_held", np.ma.MaskedArray(within, mask=unknown))
@@ -173,17 +161,6 @@ class Results:
             return tuple(values[index] for index in indices) if isinstance(values, tuple) else values[indices]
 
         return Results(**{name: taken(getattr(self, name)) for name in _INPUTS})
-
-    def _repr_html_(self) -> str:
-        guaranteed = "guaranteed miss, m" if self.guarantees else "the paper's Φ (not a bound here), m"
-        samples = {
-            "miss, m": self.miss_m,
-            "impulse, m/s": self.impulse_m_s,
-            guaranteed: self.guaranteed_miss_m.compressed(),
-        }
-        outcomes = [outcome.value for outcome in self.outcomes]
-        hits = None if self.hits is None else self.hits.hits
-        return results_html(samples, outcomes, int(self.truth_kept.sum()), hits)
 
     def __repr__(self) -> str:
         miss, fuel = np.median(self.miss_m), np.median(self.impulse_m_s)

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, fields, replace
 from enum import Enum
-from typing import Annotated
+from functools import cached_property
+from typing import Annotated, Any
 
 from guidance.noise import NoiseKind, TieRule
 from guidance.strategy import Strategy
 from guidance.thruster import Thruster
-from infoset.limits import ADDED_LATER, Checked, Limits, NotNegative, Positive, check_fields
-from infoset.model import SetModel, StateBox
+from infoset.limits import Checked, Description, Limits, Name, NotNegative, Positive, check_fields
+from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensor import Sensor
-from infoset.sensors import RangeSensor, RateSensor
+from infoset.sensors import AngleSensor, RangeSensor, RateSensor
 
 _DIRECTION = Limits(least=-2.0 * math.pi, most=2.0 * math.pi)
 _ELEVATION = Limits(least=-0.5 * math.pi, most=0.5 * math.pi)
+MOST_STEPS = 100_000
+"""Greatest number of steps of a flight; all random numbers are drawn before it starts."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Sun(Checked):
     gravitational_parameter_m3_s2: Positive
     distance_m: Positive
     direction_rad: Annotated[float, _DIRECTION]
-    elevation_rad: Annotated[float, _ELEVATION] = field(default=0.0, metadata=ADDED_LATER)
+    elevation_rad: Annotated[float, _ELEVATION] = 0.0
 
 
 class Manoeuvre(Enum):
@@ -83,7 +86,7 @@ class Target(Checked):
     manoeuvre: Manoeuvre
     acceleration_m_s2: NotNegative
     switching_period_s: Positive = 10.0
-    acceleration_y_m_s2: NotNegative | None = field(default=None, metadata=ADDED_LATER)
+    acceleration_y_m_s2: NotNegative | None = None
 
 
 @dataclass(frozen=True)
@@ -104,18 +107,30 @@ class Body(Checked):
     radius_m: Positive
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """An interception: true motion, sensors, engine, guidance and noise.
+    """An interception: true motion, sensors, engine, guidance and noise. Its fields are the keys of a scenario file.
 
     Parameters
     ----------
-    sun : Sun or None
-        None is free space.
+    name, description : str
+        Name of the results, and a line about the scenario.
+    nominal_range_m, closing_speed_m_s : float
+        Range at the start, m, and closing speed e, m/s, of the nominal motion, which the on-board model believes in.
+    step_s : float
+        The step Delta of observation and control, s.
+    strategy : str
+        Name of the guidance strategy.
+    noise, tie : NoiseKind, TieRule
+        How errors of measurements are chosen, and what game noise keeps of two equally bad extremes.
+    uncertainty : StateBox
+        Starts that are possible on board (B x D).
     dispersion : StateBox
         True starts (B0 x D0), uniform, unknown on board. A fixed value has equal ends.
-    set_model : SetModel
-        Knowledge and assumptions on board, with the closing speed, the step and the angle sensor.
+    information_set : SetSettings
+        Choices of the information set.
+    sun : Sun or None
+        None is free space.
     target : Target or None
         A target that manoeuvres; None does not.
     body : Body or None
@@ -127,20 +142,24 @@ class Scenario:
         If a value is not within its limits, or two of them contradict each other.
     """
 
-    name: str
-    description: str
-    sun: Sun | None
+    name: Name
+    description: Description = ""
     nominal_range_m: Positive
-    dispersion: StateBox
-    set_model: SetModel
-    range_sensor: RangeSensor | None
-    thruster: Thruster
+    closing_speed_m_s: Positive
+    step_s: Positive
     strategy: str = "symmetric-miss"
     noise: NoiseKind = NoiseKind.RANDOM
     tie: TieRule = TieRule.UPPER
+    sun: Sun | None = None
+    uncertainty: StateBox
+    dispersion: StateBox
+    angle_sensor: AngleSensor
+    range_sensor: RangeSensor | None = None
     rate_sensor: RateSensor | None = None
     target: Target | None = None
-    body: Body | None = field(default=None, metadata=ADDED_LATER)
+    body: Body | None = None
+    thruster: Thruster
+    information_set: SetSettings
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -149,23 +168,42 @@ class Scenario:
         self._check_axes()
         _ = self.impulse_steps  # raises ValueError if the thruster can give no impulse
         self.set_model.check_start("dispersion", self.dispersion)
-        greatest = max(self.dispersion.x_m[1], self.set_model.bounds.x_m[1])
+        if self.information_set.is_guaranteed:
+            _ = self.set_model.label_limits_m  # raises ValueError if the closing speed is too uncertain
+        farthest_m, slowest_m_s = self.dispersion.x_m[1], -self.dispersion.vx_m_s[1]
+        if farthest_m > MOST_STEPS * (1.0 + 1e-9) * slowest_m_s * self.step_s:
+            raise ValueError(
+                f"step_s must be long enough for at most {MOST_STEPS} steps from {farthest_m:g} m at "
+                f"{slowest_m_s:g} m/s: got {self.step_s!r}"
+            )
+        greatest = max(self.dispersion.x_m[1], self.uncertainty.x_m[1])
         if self.sun is not None and self.sun.distance_m <= greatest:
             raise ValueError(
                 f"sun.distance_m must be greater than the greatest possible range, {greatest:g} m: "
                 f"got {self.sun.distance_m!r}"
             )
-        least = min(self.dispersion.x_m[0], self.set_model.bounds.x_m[0])
+        least = min(self.dispersion.x_m[0], self.uncertainty.x_m[0])
         if self.body is not None and self.body.radius_m >= least:
             raise ValueError(
                 f"body.radius_m must be less than the least possible range, {least:g} m: got {self.body.radius_m!r}"
             )
 
+    @cached_property
+    def set_model(self) -> SetModel:
+        """Knowledge and assumptions on board, without gravity and the errors of the engine (`sim.gravity`)."""
+        return SetModel(
+            closing_speed_m_s=self.closing_speed_m_s,
+            step_s=self.step_s,
+            bounds=self.uncertainty,
+            angle_sensor=self.angle_sensor,
+            **vars(self.information_set),
+        )
+
     def _check_axes(self) -> None:
         """Check that start and set are both in a plane or both in space, and that a plane has no values of space."""
         if self.dispersion.axes != self.set_model.axes:
             raise ValueError(
-                "Scenario: dispersion and set_model.bounds must both have y_m and vy_m_s (an engagement in space), or "
+                "Scenario: uncertainty and dispersion must both have y_m and vy_m_s (an engagement in space), or "
                 "neither"
             )
         if self.is_spatial:
@@ -184,12 +222,12 @@ class Scenario:
     @property
     def nominal_arrival_s(self) -> float:
         """Time from the start to x = 0 at the nominal range and closing speed, s."""
-        return self.nominal_range_m / self.set_model.closing_speed_m_s
+        return self.nominal_range_m / self.closing_speed_m_s
 
     @property
     def impulse_steps(self) -> Sequence[int] | None:
         """Steps in which impulses can be given (`Thruster.impulse_steps`); None is every step from the delay on."""
-        return self.thruster.impulse_steps(self.nominal_arrival_s, self.set_model.step_s)
+        return self.thruster.impulse_steps(self.nominal_arrival_s, self.step_s)
 
     @property
     def is_spatial(self) -> bool:
@@ -204,8 +242,22 @@ class Scenario:
     @property
     def sensors(self) -> dict[str, Sensor]:
         """Sensors on board by name, in the order in which a step applies their measurements."""
-        fitted = (self.range_sensor, self.set_model.angle_sensor, self.rate_sensor)
+        fitted = (self.range_sensor, self.angle_sensor, self.rate_sensor)
         return {sensor.name: sensor for sensor in fitted if sensor is not None}
+
+
+def of_model(model: SetModel) -> dict[str, Any]:
+    """Return the fields of a scenario with a set model: ``replace(scenario, **of_model(model))``.
+
+    The bounds of gravity and of the engine's errors are not among them; they follow from the scenario.
+    """
+    return {
+        "closing_speed_m_s": model.closing_speed_m_s,
+        "step_s": model.step_s,
+        "uncertainty": model.bounds,
+        "angle_sensor": model.angle_sensor,
+        "information_set": SetSettings(**{field.name: getattr(model, field.name) for field in fields(SetSettings)}),
+    }
 
 
 def strategy_name(scenario: Scenario, own: Strategy | None) -> str:

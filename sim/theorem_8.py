@@ -7,7 +7,7 @@ import numpy as np
 from guidance.authority import correctable_later_m
 from guidance.least_effort import unavoidable_m
 from guidance.situation import Situation
-from infoset import AngleSensor, InitialSet, SetModel
+from infoset import AngleSensor, SetModel
 from infoset.arrays import Flags, Floats
 from infoset.section_law import BOUND_SLACK, PLANE, section_laws
 
@@ -21,7 +21,7 @@ def has_theorem_8(model: SetModel, delay_steps: int) -> bool:
     They are the guaranteed model with a box, in a plane; known range and closing speed; angles whose bands are those of
     Lemma 4; and impulses that are executed exactly and without delay.
     """
-    is_planar_box = model.is_guaranteed and model.initial_set is InitialSet.BOX and len(model.axes) == 1
+    is_planar_box = model.is_guaranteed and model.starts_as_box and len(model.axes) == 1
     if not is_planar_box or delay_steps or model.execution_error_relative > 0.0:
         return False
     least, greatest = model.label_limits_m

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import is_hypothesis_test, settings
 
+from sim.scenario import of_model
+
 if TYPE_CHECKING:
     from sim import Scenario
 
@@ -107,14 +109,14 @@ def brief() -> Scenario:
     box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
     sensor = replace(published.set_model.angle_sensor, nominal_range_m=595e3)
     model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    return replace(published, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
+    return replace(published, name="brief", **of_model(model), dispersion=box, nominal_range_m=595e3)
 
 
 @pytest.fixture(scope="session")
 def brief_file(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file of the scenario `brief`, in a separate folder."""
-    from experiments.interception.scenario_file import scenario_to_toml
+    from experiments.common.input_file import to_toml
 
     file = tmp_path_factory.mktemp("scenario") / "brief.toml"
-    file.write_text(scenario_to_toml(brief))
+    file.write_text(to_toml(brief))
     return file

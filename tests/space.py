@@ -7,6 +7,7 @@ from typing import Any
 
 from infoset import StateBox
 from sim import Scenario
+from sim.scenario import of_model
 
 
 def in_space(scenario: Scenario, **sensor: Any) -> Scenario:
@@ -14,7 +15,7 @@ def in_space(scenario: Scenario, **sensor: Any) -> Scenario:
     model = scenario.set_model
     angle_sensor = replace(model.angle_sensor, **sensor)
     spatial = replace(model, bounds=_both(model.bounds), angle_sensor=angle_sensor)
-    return replace(scenario, set_model=spatial, dispersion=_both(scenario.dispersion))
+    return replace(scenario, **of_model(spatial), dispersion=_both(scenario.dispersion))
 
 
 def _both(box: StateBox) -> StateBox:

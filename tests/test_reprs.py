@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from experiments import load_multipoint, load_observer, load_pareto, load_pursuit, load_rendezvous
+from experiments import load_multipoint, load_pareto, load_pursuit, load_rendezvous
 from rendezvous import multipoint, pareto, pursuit_evasion, reachability
 
 
@@ -24,15 +24,10 @@ def best_order() -> multipoint.BestOrder:
 
 
 def pursuit() -> pursuit_evasion.Solution:
-    return pursuit_evasion.solve(load_pursuit("geo-pursuit").game())
+    return pursuit_evasion.solve(load_pursuit("geo-pursuit").game)
 
 
 SHOWN: list[tuple[Callable[[], object], str]] = [
-    (lambda: load_multipoint("service-5"), "multipoint problem service-5"),
-    (lambda: load_observer("vehicle"), "observer problem vehicle"),
-    (lambda: load_pareto("pareto-2008"), "pareto-encounter problem pareto-2008"),
-    (lambda: load_pursuit("geo-pursuit"), "pursuit-evasion problem geo-pursuit"),
-    (lambda: load_rendezvous("approach-cone"), "reachable-rendezvous problem approach-cone"),
     (lambda: load_rendezvous("approach-cone").problem, "6 states and 3 controls in 12 periods: thrust in a box"),
     (reachable, "least terminal norm"),
     (lambda: reachable().optimal, "a set of dimension 6, least terminal norm"),

@@ -11,13 +11,13 @@ known. The angle of the line of sight is measured with an error of at most 0.15 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from infoset import AngleSensor, InformationSet, SetModel, StateBox
+from infoset import AngleSensor, InformationSet, Model, SetModel, StateBox
 
 known = StateBox(z_m=(-2e3, 2e3), x_m=(5.5e6, 6.1e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3))
 sensor = AngleSensor(
     period_s=0.5, error_at_nominal_range_rad=0.00015, error_at_zero_range_rad=0.00023, nominal_range_m=5.8e6
 )
-model = SetModel(58e3, 0.5, known, sensor, disturbance_m_s2=0.005, sections=5)
+model = SetModel(58e3, 0.5, known, sensor, disturbance_m_s2=0.005, sections=5, model=Model.PAPER)
 information = InformationSet(model)
 information
 

@@ -8,18 +8,12 @@ The published sets can lose the true state by a small amount. The sets of the mo
 computed from the sets alone, without the true state.
 """
 
-from dataclasses import replace
-
 import matplotlib.pyplot as plt
 
 from experiments import load_scenario
-from guidance import NoiseKind
-from infoset import InitialSet, Model
 from sim import simulate
 
-scenario = load_scenario("asteroid-1997")
-model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-guaranteed = replace(scenario, set_model=model, noise=NoiseKind.GAME)
+guaranteed = load_scenario("asteroid-1997", ["information_set.model=guaranteed", "noise=game"])
 results = simulate(guaranteed, runs=60)
 print(f"true state inside the set at every step: {results.truth_kept.sum()} of 60 runs")
 print(f"miss at most Phi: {results.phi_held.sum()} of 60 runs")

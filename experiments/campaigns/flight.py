@@ -20,9 +20,10 @@ from rich.progress import Progress as ProgressBars
 from experiments.campaigns.cluster import workers_of
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
+from experiments.common.input_file import to_toml
 from experiments.common.screen import LINE_EVERY_S, NOT_FINITE, number, say
 from experiments.interception.choices import study_scenario
-from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings
 from sim import Campaign, CampaignNoise, CampaignResult, Scenario
 from sim.campaign import Progress
 from sim.flights import fly_on_threads
@@ -46,7 +47,7 @@ def scenario_of(options: Flight) -> tuple[Scenario, list[str]]:
     """Return the scenario that the options describe, with the campaign's noise, and lines about it for the screen."""
     resumed = None
     if options.resume and (options.out / MANIFEST).is_file():
-        resumed = read_manifest(options.out).scenario.set_model.kind
+        resumed = read_manifest(options.out).scenario.information_set.model
     scenario, notes = study_scenario(options, resumed)
     return (scenario if options.noise is None else CampaignNoise(options.noise).applied_to(scenario)), notes
 
@@ -64,7 +65,7 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
     """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr."""
     need_free(options.out, resume=options.resume)
     note = partial(say, quiet=options.quiet)
-    files = {SCENARIO_FILE: scenario_to_toml(campaign.scenario)}
+    files = {SCENARIO_FILE: to_toml(campaign.scenario)}
     scenarios = campaign.cells or (campaign.scenario,)
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
     for line in notes:

@@ -21,6 +21,7 @@ from experiments.campaigns.sweep_report import SweepReport, default_requirement,
 from experiments.campaigns.sweep_table import TABLE, sweep_table
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
+from experiments.common.input_file import to_toml
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import (
     BeginProgress,
@@ -33,7 +34,6 @@ from experiments.common.screen import (
     show,
     some_runs,
 )
-from experiments.interception.scenario_file import scenario_to_toml
 from experiments.interception.study import study_title
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
@@ -51,7 +51,7 @@ def run(options: Report) -> None:
         with output_of(options, [*figures, "report.json", SCENARIO_FILE]) as written:
             with progress_bar(options.quiet) as begin:
                 parts = (_report_sweep if swept else _report_campaign)(folder, options, written, begin)
-                written.save(SCENARIO_FILE, scenario_to_toml(folder.manifest.scenario))
+                written.save(SCENARIO_FILE, to_toml(folder.manifest.scenario))
             show(parts, options.quiet, stdout_taken=written.stdout_taken)
 
 

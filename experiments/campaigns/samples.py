@@ -19,7 +19,7 @@ from infoset.arrays import Flags, Integers
 from sim import HitEstimate, Outcome, QuantileEstimate, estimate_hits, estimate_quantiles
 from sim.statistics import level_name, shows
 from sim.stopping_rule import QUANTITIES
-from sim.storage import CampaignFolder, scenario_hash
+from sim.storage import CampaignFolder, fingerprint
 
 LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
 WORST = 10
@@ -140,8 +140,8 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
         "version": library_version(),
         "kind": manifest.kind,
         "scenario": manifest.scenario.name,
-        "scenario_hash": scenario_hash(manifest.scenario),
-        "model": manifest.scenario.set_model.kind.value,
+        "scenario_hash": fingerprint(manifest.scenario),
+        "model": manifest.scenario.information_set.model.value,
         "strategy": manifest.strategy,
         "noise": manifest.noise.value,
         "range_meter": manifest.scenario.range_sensor is not None,
@@ -247,7 +247,7 @@ def sample_parts(folder: CampaignFolder, by_noise: Sequence[Sample]) -> Iterator
         ]
     yield table
     yield from notes
-    yield from set_warnings(scenario.set_model.kind, sum((sample.sets for sample in by_noise), SetCounts()))
+    yield from set_warnings(scenario.information_set.model, sum((sample.sets for sample in by_noise), SetCounts()))
     yield from game_notes(folder)
     if folder.manifest.stopped_after is not None:
         yield (

@@ -1,7 +1,6 @@
 """The keys of a scenario file that a sweep varies, each over a range of values in the unit of the file.
 
-A cell is made by the reader of scenario files: the scenario is written as a file, which is read with other values. A
-cell is therefore valid exactly when a file with its values is, and has the same error messages.
+A cell is valid exactly when a file with its values is, and has the same error messages.
 """
 
 from __future__ import annotations
@@ -9,18 +8,13 @@ from __future__ import annotations
 import itertools
 import math
 import re
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from decimal import Context, Decimal, InvalidOperation
-from typing import Any, Literal
+from typing import Literal
 
 from experiments.common.display_units import split_unit
-from experiments.common.errors import InputError, shown
-from experiments.common.toml_form import ENDS, similar_key
-from experiments.common.toml_values import NUMBER, number_text
-from experiments.interception.scenario_checks import LINEAR_KEYS
-from experiments.interception.scenario_file import read_scenario, scenario_to_toml
-from experiments.interception.scenario_tables import LATER_KEYS, OPTIONAL_SENSORS, SPACE_KEYS
+from experiments.common.errors import InputError, input_errors, shown
+from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
 from sim.scenario import Scenario
 from sim.storage import MOST_CELLS, Axis
 
@@ -31,24 +25,20 @@ EXAMPLE = "--vary angle_sensor.scale=1:8:8,thruster.greatest_impulse_m_s=2.5:20:
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
 
-_LATER_NUMBERS = sorted(LATER_KEYS - {("angle_sensor", "bias"), ("thruster", "impulses_s")})
-_WHOLE = (("thruster", "delay_steps"),)
-
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
     """Read the value of --vary: `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas.
 
-    Of a key that is a pair, `table.key.least` or `table.key.greatest` is varied. `one.key=other.key=FROM:TO:COUNT`
-    gives both keys the same values. `sensor.scale` is a factor of all error bounds of a sensor. Raise `InputError` if
-    the text has another form, or the scenario has no such key; the message suggests the most similar key.
+    Of a key that is an interval, `table.key.min` or `table.key.max` is varied. `one.key=other.key=FROM:TO:COUNT` gives
+    both keys the same values. `sensor.scale` is a factor of all error bounds of a sensor. Raise `InputError` if the
+    text has another form, or scenarios have no such key; the message suggests the most similar key.
     """
-    known = _known_keys(scenario)
     pieces = [piece.strip() for piece in text.split(",")]
     if len(pieces) > MOST_AXES:
         raise InputError(f"--vary: at most {MOST_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
-    axes = tuple(_axis(piece, known) for piece in pieces)
-    scaled = _error_bounds(scenario)
-    varied = [(key, tied) for axis in axes for tied in tied_keys(axis.key) for key in scaled.get(tied, {tied: 0.0})]
+    axes = tuple(_axis(piece, scenario) for piece in pieces)
+    bounds = _error_bounds(scenario)
+    varied = [(key, tied) for axis in axes for tied in tied_keys(axis.key) for key in bounds.get(tied, {tied: 0.0})]
     for key, _ in varied:
         names = [tied for other, tied in varied if other == key]
         if len(names) > 1:
@@ -65,79 +55,49 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
 
     Raise `InputError`, with the message of a scenario file, if a cell is not a valid scenario.
     """
-    known, scaled = _known_keys(scenario), _error_bounds(scenario)
-    text = scenario_to_toml(scenario)
+    bounds = _error_bounds(scenario)
     cells = []
     for values in itertools.product(*(axis.values for axis in axes)):
-        replaced = {}
+        changes: dict[str, float] = {}
         for axis, value in zip(axes, values, strict=True):
             for key in tied_keys(axis.key):
-                bounds = scaled.get(key)
-                if bounds is None:
-                    replaced[key] = str(round(value)) if known[key] else number_text(value)
-                else:
-                    products = {name: Decimal(str(bound)) * Decimal(str(value)) for name, bound in bounds.items()}
-                    replaced |= {name: number_text(float(_PLACES.plus(product))) for name, product in products.items()}
-        changes = ", ".join(f"{key} = {literal}" for key, literal in replaced.items())
-        cells.append(read_scenario(text, f"{scenario.name} with {changes}", replaced))
+                scaled = {name: value * bound for name, bound in bounds.get(key, {}).items()}
+                changes |= {name: float(f"{number:.12g}") for name, number in scaled.items()} or {key: value}
+        changes = {key: round(value) if numeric_key(Scenario, key) is int else value for key, value in changes.items()}
+        text = ", ".join(f"{key} = {value:.12g}" for key, value in changes.items())
+        cells.append(changed(scenario, changes, f"{scenario.name} with {text}"))
     return tuple(cells)
-
-
-def _known_keys(scenario: Scenario) -> dict[str, bool]:
-    """Return the keys of a scenario whose values are numbers, and whether a value must be a whole number."""
-    known: dict[str, bool] = {}
-    is_camera = scenario.set_model.angle_sensor.is_camera
-    for table, keys in _tables(scenario).items():
-        for name, value in keys.items():
-            path = f"{table}.{name}"
-            if (isinstance(value, list) and name != "impulses_s") or table == "dispersion":
-                known |= {f"{path}.{end}": False for end in ENDS}
-            if table == "dispersion":  # a start that is fixed
-                known[path] = False
-            elif isinstance(value, int | float) and not isinstance(value, bool):
-                known[path] = isinstance(value, int)
-        if scenario.is_spatial:  # bounds of y that the file takes from z
-            known |= {
-                f"{home}.{name}": False
-                for home, name in sorted(SPACE_KEYS)
-                if home == table and "_y_" in name and not (is_camera and name in LINEAR_KEYS)
-            }
-    return (
-        {"body.radius_m": False}
-        | {".".join(path): path in _WHOLE for path in _LATER_NUMBERS}
-        | known
-        | dict.fromkeys(_error_bounds(scenario), False)
-    )
 
 
 def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
     """Return the error bounds of each sensor by key, under the name of their common factor: `angle_sensor.scale`."""
+    sensors = {f"{name}_sensor": sensor for name, sensor in scenario.sensors.items()}
     return {
         f"{table}.{SCALE}": {
-            f"{table}.{name}": value for name, value in keys.items() if "error" in name and isinstance(value, float)
+            f"{table}.{name}": value
+            for name, value in vars(sensor).items()
+            if "error" in name and value
+            if isinstance(value, float)
         }
-        for table, keys in _tables(scenario).items()
-        if table in ("angle_sensor", *OPTIONAL_SENSORS)
+        for table, sensor in sensors.items()
     }
 
 
-def _tables(scenario: Scenario) -> Mapping[str, Mapping[str, Any]]:
-    values = tomllib.loads(scenario_to_toml(scenario))
-    return {table: keys for table, keys in values.items() if isinstance(keys, dict)}
-
-
-def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
+def _axis(piece: str, scenario: Scenario) -> Axis:
     *keys, written = (part.strip() for part in piece.split("="))
     key = "=".join(keys)
     if not key:
         raise InputError(f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT; for example {EXAMPLE}")
     for single in keys:
-        if single not in known:
-            raise InputError(f"--vary: {_unknown(single, known)}")
+        if single not in _error_bounds(scenario) and numeric_key(Scenario, single) is None:
+            known = [*keys_of(Scenario), *_error_bounds(scenario)]
+            guess = similar_key(single, [key for key in known if key != single])
+            remedy = f"; did you mean {guess}?" if guess else ""
+            raise InputError(f"--vary: a scenario has no numeric key {shown(single)}{remedy}")
     if len({unit_of(single) for single in keys}) > 1:
         units = ", ".join(f"{single} in {unit_of(single) or 'no unit'}" for single in keys)
         raise InputError(f"--vary: keys with the same values must have the same unit, found {units}")
-    whole = any(known[single] for single in keys)
+    whole = any(numeric_key(Scenario, single) is int for single in keys)
     parts = [part.strip() for part in written.split(":")]
     scale: Literal["linear", "log"] = "linear"
     if parts[0] == "log":
@@ -163,22 +123,8 @@ def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
             f"--vary: {key}: {count} values from {parts[0]} to {parts[1]} are not all different"
             f"{' whole numbers' if whole else ''}; give fewer values"
         )
-    return Axis(key, values, scale)
-
-
-def _unknown(key: str, known: Mapping[str, bool]) -> str:
-    names = list(known)
-    table = key.partition(".")[0]
-    is_missing = table not in {other.partition(".")[0] for other in known}
-    if is_missing and table in ("sun", *OPTIONAL_SENSORS, "target", "body"):
-        return f"the scenario has no [{table}]; add that table to its file or with --set, or vary another key"
-    if f"{key}.least" in known:
-        return f"{key} is a pair; vary {key}.least or {key}.greatest"
-    if "uncertainty.y_km.least" not in known and tuple(key.split(".")[:2]) in SPACE_KEYS:
-        return f"{key} is a key of scenarios in space; add y_km and vy_km_s to [uncertainty] and [dispersion]"
-    guess = similar_key(key, names)
-    hint = f"did you mean {guess}?" if guess else f"its numeric keys are: {', '.join(names)}"
-    return f"the scenario has no numeric key {shown(key)}; {hint}"
+    with input_errors("--vary"):
+        return Axis(key, values, scale)
 
 
 def _number(text: str, key: str) -> Decimal:
@@ -188,8 +134,6 @@ def _number(text: str, key: str) -> Decimal:
         value = None
     if value is None:
         raise InputError(f"--vary: {key}: must be a number, found {shown(text)}; for example {EXAMPLE}")
-    if problem := NUMBER.problem(value):
-        raise InputError(f"--vary: {key}: {problem}, found {shown(text)}")
     return value
 
 
@@ -226,9 +170,8 @@ def key_label(key: str) -> str:
     tables = [_parts(single)[0] for single in tied_keys(key)]
     names = [_words(single) for single in tied_keys(key)]
     if len(set(tables)) == 1:
-        label = f"{tables[0]}: {' = '.join(names)}"
-    else:
-        label = " = ".join(f"{table}: {name}" for table, name in zip(tables, names, strict=True))
+        tables, names = tables[:1], [" = ".join(names)]
+    label = " = ".join(f"{table}: {name}" if table else name for table, name in zip(tables, names, strict=True))
     unit = unit_of(key)
     label = label.replace("_", " ")
     return f"{label}, {unit}" if unit else label
@@ -243,6 +186,5 @@ def _words(key: str) -> str:
 
 def _parts(key: str) -> tuple[str, str, str]:
     """Return the table, the name, and the end of a pair or an empty text."""
-    table, _, rest = key.rpartition(".") if key.count(".") < 2 else key.partition(".")
-    name, _, end = rest.partition(".")
-    return table, name, end
+    *tables, name = key.removesuffix(".min").removesuffix(".max").split(".")
+    return " ".join(tables), name, {".min": "minimum", ".max": "maximum"}.get(key[-4:], "")

@@ -129,7 +129,7 @@ class SweepReport:
         sets = sum((sample.sets for samples in table.cells for sample in samples), SetCounts())
         yield from self._notes()
         yield f"all cells: {sets}"
-        yield from set_warnings(manifest.scenario.set_model.kind, sets)
+        yield from set_warnings(manifest.scenario.information_set.model, sets)
 
     def _notes(self) -> list[str]:
         """Return lines about keys without an effect, and about what results with random noise and game noise are."""

@@ -231,7 +231,7 @@ def above_bound(quantile: float | None, bound: float | None, log_values: bool) -
     """Return how far a quantile is above its bound, or the difference of their logarithms; None if it is not known."""
     if quantile is None or bound is None:
         return None
-    return math.log(quantile / bound) if log_values else quantile - bound
+    return math.log(quantile) - math.log(bound) if log_values else quantile - bound
 
 
 def spans_decades(values: Sequence[float]) -> bool:
@@ -314,7 +314,7 @@ def answers(table: SweepTable, noise: str) -> list[Answer]:
 
 
 def values_text(axes: Sequence[Axis], indices: Sequence[int]) -> str:
-    """Return the values at some indices of axes: `thruster.budget_m_s = 200, nominal.range_km = 5800`."""
+    """Return the values at some indices of axes: `thruster.budget_m_s = 200, nominal_range_km = 5800`."""
     return ", ".join(
         f"{axis.key} = {value_text(axis, axis.values[index])}" for axis, index in zip(axes, indices, strict=True)
     )

@@ -37,7 +37,7 @@ LONGEST_LINE = 1000
 """Longest line of a TOML file: the parser's time grows as the square of the length of a dotted key."""
 ZIP = b"PK"
 """First bytes of a record."""
-_SCENARIO_TABLES = {"nominal", "uncertainty", "dispersion", "angle_sensor", "thruster", "information_set"}
+_SCENARIO_TABLES = {"uncertainty", "dispersion", "angle_sensor", "thruster", "information_set"}
 _FEWEST_TABLES = 2
 """Number of tables of a scenario from which a file without a kind is taken for a scenario."""
 

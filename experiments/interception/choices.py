@@ -42,16 +42,16 @@ def scenario_with(options: Any) -> Scenario:
         scenario = replace(scenario, range_sensor=None)
     if model is not None:
         scenario = with_model(scenario, Model(model))
-    set_model = scenario.set_model
+    settings = scenario.information_set
     if sections is not None:
-        fewest = set_model.fewest_sections
+        fewest = settings.fewest_sections
         if not fewest <= sections <= MOST_SECTIONS:
             raise InputError(
                 f"--sections: must be from {fewest}, the scenario's information_set.fewest_sections, to "
                 f"{MOST_SECTIONS}, found {sections}; for example --sections {max(29, fewest)}"
             )
-        set_model = replace(set_model, sections=sections)
-    return replace(scenario, set_model=set_model)
+        settings = replace(settings, sections=sections)
+    return replace(scenario, information_set=settings)
 
 
 def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario, list[str]]:
@@ -63,7 +63,7 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
     """
     scenario = scenario_with(options)
     chosen = any(text.partition("=")[0].strip() == "information_set.model" for text in options.settings or ())
-    of_file, default = scenario.set_model.kind.value, resumed or Model.GUARANTEED
+    of_file, default = scenario.information_set.model.value, resumed or Model.GUARANTEED
     if chosen or options.model is not None or default.value == of_file:
         return scenario, []
     try:

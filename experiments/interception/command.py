@@ -221,9 +221,6 @@ class Replay:
     ]
     html: Html = None
     gif: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="Write an animation of the sets.")] = None
-    mp4: Annotated[
-        Path | None, typer.Option(metavar="FILE.mp4", help="Write the animation as a video; needs the program ffmpeg.")
-    ] = None
     frames: Annotated[
         int,
         typer.Option(
@@ -236,15 +233,6 @@ class Replay:
             metavar="PIXELS", min=200, max=4000, help="Width of an animation. Default: 425, or 640 for two records."
         ),
     ] = None
-    terminal: Annotated[
-        bool,
-        typer.Option(
-            "--terminal", help="Play as text in the terminal. If the output is not a terminal, print a few steps."
-        ),
-    ] = False
-    speed: Annotated[
-        float, typer.Option(metavar="STEPS_PER_S", min=0.1, max=1000.0, help="Speed of --terminal in steps per second.")
-    ] = 10.0
     out: Out = None
     times: SetTimes = None
     overwrite: Overwrite = False

@@ -219,7 +219,7 @@ def record_titles(records: Sequence[Record]) -> list[str]:
         [f"run {record.run}" for record in records],
         [f"seed {record.seed}" for record in records],
         [record.strategy for record in records],
-        [f"{record.scenario.set_model.kind.value} model" for record in records],
+        [f"{record.scenario.information_set.model.value} model" for record in records],
         [f"tie {record.scenario.tie.value}" for record in records],
         [record.scenario.name for record in records],
     )

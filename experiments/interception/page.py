@@ -80,7 +80,8 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
     return {
         "title": title,
         "outcome": outcome_title(record),
-        "facts": f"{record.strategy} strategy, {model.kind.value} model, seed {record.seed}, run {record.run}{thinned}",
+        "facts": f"{record.strategy} strategy, {model.model.value} model, seed {record.seed}, "
+        f"run {record.run}{thinned}",
         "arrival_s": scenario.nominal_arrival_s,
         "least_to_go_s": least_to_go_s(scenario),
         "marks": [[name, duration_text(time), time] for name, time in marks(scenario).items()],
@@ -146,9 +147,9 @@ def _axis_data(record: Record, axis: str, kept: Sequence[int]) -> dict[str, obje
     misses = true_predicted_misses(record)[axis]
     return {
         "axis": axis,
-        "angle_error_rad": model.angle_sensor.error_at_zero_range_rad,
+        "angle_error_rad": model.angle_sensor.constant_error_rad,
         "angle_error_slope_rad_m": model.angle_sensor.error_slope_rad_per_m,
-        "centroid_error_m": model.angle_sensor.centroid_error_m or 0.0,
+        "centroid_error_m": model.angle_sensor.centroid_error_m,
         "disturbance_m_s2": model.disturbance_m_s2,
         **{
             f"measured_{kind.quantity}": [step.measured.get(kind.name) for step in steps]

@@ -28,8 +28,8 @@ from pydantic import AfterValidator, Field
 
 from experiments.common.errors import InputError, input_errors, on_a_screen, shown
 from experiments.common.file_kinds import ZIP, read_input, use_of_content
+from experiments.common.input_file import read_text, to_toml
 from experiments.common.output import library_version, write_file
-from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from infoset import ConvexPolygons, Section
 from infoset.arrays import Floats, Integers
 from infoset.limits import LARGEST
@@ -148,8 +148,8 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
         If the file cannot be written, exists already, or no scenario file can contain the record's scenario.
     """
     file = record_path("record", Path(path))
-    toml = scenario_to_toml(record.scenario)
-    if read_scenario(toml, f"the scenario of {file}") != record.scenario:
+    toml = to_toml(record.scenario)
+    if read_text(Scenario, toml, f"the scenario of {file}") != record.scenario:
         raise InputError(
             f"{file}: the scenario {shown(record.scenario.name)} changes when it is written and read again; correct it"
         )
@@ -368,7 +368,7 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays) -> Record:
     toml, columns, *_ = [known.pop(key) for key in ("scenario", "result", "format", "schema", "version", "sha256")]
     if not isinstance(toml, str):
         raise ValueError(f"its header is wrong: scenario: must be text, found {shown(toml)}")
-    scenario = read_scenario(toml, "the scenario in it")
+    scenario = read_text(Scenario, toml, "the scenario in it")
     with input_errors("its header is wrong"):
         engagement = from_json(_Engagement, {"noise": None, **known})
     result = _result_from_json(columns, engagement.run, scenario)

@@ -63,7 +63,7 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
 def scenario_title(scenario: Scenario) -> str:
     """Return the name of a scenario, with its range meter and its model."""
     meter = "with" if scenario.range_sensor is not None else "without"
-    return f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"
+    return f"{scenario.name}, {meter} range meter, model {scenario.information_set.model.value}"
 
 
 def study_title(scenario: Scenario, strategy: str, seed: int) -> str:

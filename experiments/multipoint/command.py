@@ -19,7 +19,7 @@ class Multipoint(FileOptions):
     With --order best and --times given, the times of the file are kept and the targets are exchanged: the target that
     is visited first has the earliest time. Without --out, --json, --csv or --html no file is written.
 
-    Axes: with axes = "hill", x radially outward, y along the motion, z along the orbit's normal; otherwise inertial.
+    Axes: with orbit_rate_rad_s, x radially outward, y along the motion, z along the orbit's normal; otherwise inertial.
     """
 
     problem: ProblemName = "service-3"

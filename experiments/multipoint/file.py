@@ -1,53 +1,26 @@
-"""Problem files of kind `multipoint`: tables, checks, and the tour in SI."""
+"""Problem files of kind `multipoint`: their tables and keys, and the tour they describe."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from enum import Enum
-from typing import Annotated
+from functools import cached_property
+from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field, PlainValidator
+from pydantic import Field
 
-from experiments.common.errors import InputError, input_errors
-from experiments.common.problem_file import (
-    ProblemTables,
-    ReadProblem,
-    angle_problems,
-    duplicate_names,
-    orbit_problems,
-    problem_form,
-    rate_problems,
-)
-from experiments.common.toml_file import load_tables
-from experiments.common.toml_form import KeyPath, Known, Problem
-from experiments.common.toml_values import (
-    KILO,
-    NUMBER,
-    ZERO,
-    Degrees,
-    Eccentricity,
-    Name,
-    NotNegative,
-    Numbers,
-    Positive,
-    Table,
-    Vector,
-    key,
-    radians,
-    si,
-    wrong,
-)
+from experiments.common.input_file import read_file
+from experiments.common.problems import check_angle, check_orbit, check_rate
 from infoset.arrays import Floats
-from rendezvous.multipoint import DriftingTargets, KeplerTargets, KeplerTour, Meet, Target, TimeLimits, Tour, Visits
+from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
+from rendezvous.multipoint import DriftingTargets, KeplerTargets, KeplerTour, Meet, Target, TimeLimits, Tour
+from rendezvous.multipoint.segments import check_times
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 from rendezvous.two_body import OrbitalElements, coast
 
-KIND = "multipoint"
-MOST_TARGETS = 200
-ELEMENTS = 7
+Vector = Annotated[tuple[float, float, float], NUMBER]
 
 
 class Axes(Enum):
@@ -56,261 +29,147 @@ class Axes(Enum):
     HILL = "hill"
     INERTIAL = "inertial"
 
-    @property
-    def other(self) -> Axes:
-        """Return the other axes."""
-        return Axes.INERTIAL if self is Axes.HILL else Axes.HILL
+
+@dataclass(frozen=True, kw_only=True)
+class BodyTable:
+    """[chaser]: a state at t = 0 in Hill's axes, or at an epoch in inertial ones; there elements may stand for it."""
+
+    position_m: Vector | None = None
+    velocity_m_s: Vector | None = None
+    elements: OrbitalElements | None = None
+    epoch_s: Number = 0.0
+
+    def __post_init__(self) -> None:
+        given = [value is not None for value in (self.position_m, self.velocity_m_s, self.elements)]
+        if given not in ([True, True, False], [False, False, True]):
+            raise ValueError("must have position_m and velocity_m_s, or elements")
+
+    def state(self, mu_m3_s2: float | None) -> Floats:
+        """Return the state at its epoch, shape (6,)."""
+        if self.elements is not None and mu_m3_s2 is not None:
+            return np.concatenate(self.elements.state(mu_m3_s2))
+        return np.array([self.position_m, self.velocity_m_s]).ravel()
 
 
-KEYS = {
-    Axes.HILL: ("position_m", "velocity_m_s"),
-    Axes.INERTIAL: ("elements", "position_km", "velocity_km_s", "epoch_s"),
-}
-TOP_KEYS = {
-    Axes.HILL: ("orbit_rate_rad_s", "eccentricity", "true_anomaly_deg"),
-    Axes.INERTIAL: ("gravitational_parameter_km3_s2",),
-}
-
-
-def _elements(value: object) -> tuple[Decimal, ...]:
-    numbers = Numbers(ELEMENTS, NUMBER)(value)
-    if not (numbers[0] > 0 and 0 <= numbers[1] < 1):
-        raise wrong(
-            "must begin with a semi-major axis above 0 and an eccentricity from 0 to below 1",
-            "write [a_km, e, i_deg, raan_deg, argument_of_periapsis_deg, true_anomaly_deg, epoch_s]",
-        )
-    return numbers
-
-
-def _flag(value: object) -> bool:
-    if not isinstance(value, bool):
-        raise wrong("must be true or false")
-    return value
-
-
-Elements = Annotated[tuple[Decimal, ...], PlainValidator(_elements)]
-Time = Annotated[Decimal, PlainValidator(NUMBER)]
-
-
-class BodyTable(Table):
-    """State of a body: at t = 0 in Hill axes, or at an epoch in inertial axes."""
-
-    position_m: Vector | None = key(
-        "at t = 0: x radially outward, y along the motion, z along the orbit's normal",
-        "[0.0, 0.0, 0.0]",
-        "[100.0, 2000.0, 50.0]",
-        "[-150.0, 3500.0, -80.0]",
-        default=None,
-    )
-    velocity_m_s: Vector | None = key(
-        "velocity at t = 0 in the same axes",
-        "[0.0, 0.0, 0.0]",
-        "[0.05, -0.226, 0.02]",
-        "[-0.10, 0.339, 0.05]",
-        default=None,
-    )
-    elements: Elements | None = key(
-        'with axes = "inertial": a km, e, then i, RAAN, argument of periapsis, true anomaly in degrees, epoch s',
-        "[1.5e8, 0.02, 0.0, 0.0, 103.0, 0.0, 0.0]",
-        default=None,
-    )
-    position_km: Vector | None = key("position, in place of elements", "[7000.0, 0.0, 0.0]", default=None)
-    velocity_km_s: Vector | None = key("velocity, in place of elements", "[0.0, 7.5, 0.0]", default=None)
-    epoch_s: Time = key("epoch of position_km and velocity_km_s", "0.0", default=ZERO)
-
-
-class ChaserTable(BodyTable):
-    """[chaser]."""
-
-
+@dataclass(frozen=True, kw_only=True)
 class TargetTable(BodyTable):
-    """[[target]]."""
+    """[[target]]: a target, and its visit; `time_s` is a first guess if times are optimised."""
 
-    name: Name = key("name of the target", '"T1"', '"T2"')
-    time_s: Positive | None = key(
-        "time of the visit; a first guess if times are optimised", "1500.0", "3000.0", default=None
-    )
-    meet: Meet = key(
-        '"flyby" (same position) or "rendezvous" (same position and velocity)', '"flyby"', default=Meet.FLYBY
-    )
-    dwell_s: NotNegative = key("how long the chaser stays at a rendezvous", "0.0", default=ZERO)
+    name: Name
+    time_s: Positive | None = None
+    meet: Meet = Meet.FLYBY
+    dwell_s: NotNegative = 0.0
 
 
-class TimesTable(Table):
-    """[times]."""
+@dataclass(frozen=True, kw_only=True)
+class MultipointProblem:
+    """A problem file of kind `multipoint`.
 
-    optimise: Annotated[bool, PlainValidator(_flag)] = key("whether times are optimised", "false", default=False)
-    latest_s: Positive | None = key("latest time of the last visit; without this key: none", "4000.0", default=None)
-    least_gap_s: NotNegative = key("shortest travel time between two targets", "0.0", default=ZERO)
-    price_per_s: NotNegative = key("price of one second of the last time, added to the cost", "0.0", default=ZERO)
+    Parameters
+    ----------
+    name, description : str
+        Name of the results, and a line about the problem.
+    orbit_rate_rad_s, eccentricity, true_anomaly_rad : float
+        Mean motion of the reference orbit, which makes the axes those of Hill; its eccentricity and anomaly at t = 0.
+    gravitational_parameter_m3_s2 : float
+        Gravity of the attracting point, in place of `orbit_rate_rad_s`, which makes the axes inertial.
+    greatest_control_m_s2 : float or None
+        Bound on the control.
+    optimise_times : bool
+        Whether the times of the visits are optimised.
+    chaser : BodyTable
+        Start of the chaser.
+    target : tuple of TargetTable
+        Targets in the order of their visits, at most 200.
+    times : TimeLimits or None
+        Limits of the times.
+    """
 
+    kind: ClassVar[str] = "multipoint"
+    name: Name = "tour"
+    description: Description = ""
+    orbit_rate_rad_s: Positive | None = None
+    eccentricity: Part = 0.0
+    true_anomaly_rad: Number = 0.0
+    gravitational_parameter_m3_s2: Positive | None = None
+    greatest_control_m_s2: Positive | None = None
+    optimise_times: bool = False
+    chaser: BodyTable
+    target: Annotated[tuple[TargetTable, ...], Field(max_length=200)]
+    times: TimeLimits | None = None
 
-class MultipointTables(ProblemTables):
-    """A problem file of kind `multipoint`."""
+    def __post_init__(self) -> None:
+        if (self.orbit_rate_rad_s is None) is (self.gravitational_parameter_m3_s2 is None):
+            raise ValueError(
+                "orbit_rate_rad_s (Hill's axes) or gravitational_parameter_m3_s2 (inertial axes) is needed, not both"
+            )
+        self._check_bodies()
+        if self.optimise_times:
+            self.limits()
+        elif self.times_s is None:
+            index = [target.time_s for target in self.target].index(None)
+            raise ValueError(f"target.{index + 1}.time_s: is missing, and optimise_times is false")
+        else:
+            check_times(0.0, self.times_s, self.times_s + self.tour.dwell_s)
 
-    name: Name = key("name of the results", '"my-tour"', default="tour")
-    axes: Axes = key('"hill" or "inertial"', '"hill"')
-    orbit_rate_rad_s: Positive | None = key(
-        'mean motion of the reference orbit, with axes = "hill"', "1.13e-3", default=None
-    )
-    eccentricity: Eccentricity = key("eccentricity of the reference orbit", "0.0", default=ZERO)
-    true_anomaly_deg: Degrees = key("true anomaly of the reference orbit at t = 0", "0.0", default=ZERO)
-    gravitational_parameter_km3_s2: Positive | None = key(
-        'gravitational parameter of the attracting body, with axes = "inertial"', "398600.4418", default=None
-    )
-    greatest_control_m_s2: Positive | None = key("bound on the control; without this key: none", "0.02", default=None)
-    chaser: ChaserTable = key("initial state of the chaser", "")
-    target: Annotated[list[TargetTable], Field(min_length=1, max_length=MOST_TARGETS)] = key("the targets", "")
-    times: TimesTable = key("choice of the times", "", default=TimesTable())
+    def _check_bodies(self) -> None:
+        bodies = {"chaser": self.chaser, **{f"target.{i}": target for i, target in enumerate(self.target, start=1)}}
+        rate, mu = self.orbit_rate_rad_s, self.gravitational_parameter_m3_s2
+        if rate is not None:
+            check_rate(rate, self.eccentricity)
+            times = [time for time in (*(target.time_s for target in self.target), self.latest_s) if time is not None]
+            if times:
+                check_angle("the last of time_s and latest_s", max(times), rate)
+        elif self.eccentricity > 0.0:
+            raise ValueError("eccentricity: belongs to the reference orbit of Hill's axes")
+        for key, body in bodies.items():
+            if mu is not None:
+                with np.errstate(all="ignore"):  # elements of any size are refused here
+                    state = body.state(mu)
+                    check_orbit(key, (state[:3], state[3:]), mu)
+            elif body.elements is not None or body.epoch_s != 0.0:
+                raise ValueError(f"{key}: elements and epoch_s belong to inertial axes, not to those of Hill")
+        _ = self.tour  # raises ValueError if a target is wrong
 
+    @property
+    def axes(self) -> Axes:
+        """The axes of positions and velocities."""
+        return Axes.INERTIAL if self.orbit_rate_rad_s is None else Axes.HILL
 
-def _checks(known: Known) -> Iterator[Problem]:
-    """Check the values against each other."""
-    name = known.value("axes")
-    if name not in [axes.value for axes in Axes]:
-        return
-    axes = Axes(name)
-    yield from _axes_problems(known, axes)
-    targets = known.value("target")
-    paths = [("target", str(index)) for index in range(len(targets) if isinstance(targets, list) else 0)]
-    for path in (("chaser",), *paths):
-        yield from _body_problems(known, path, axes)
-    yield from duplicate_names(known, "target", len(paths))
-    for path in paths:
-        dwell, meet = known.number(*path, "dwell_s"), known.value(*path, "meet")
-        if dwell and meet in (None, Meet.FLYBY.value):
-            remedy = 'set meet = "rendezvous", or remove it'
-            yield Problem((*path, "dwell_s"), f"is {dwell}, but a flyby has no stay", remedy)
-    yield from _time_problems(known, paths)
-    if axes is Axes.HILL:
-        yield from rate_problems(known.number("orbit_rate_rad_s"), known.number("eccentricity"))
-        times = [*((*path, "time_s") for path in paths), ("times", "latest_s")]
-        last = max(times, key=lambda path: known.number(*path) or ZERO)
-        yield from angle_problems(last, known.number(*last), known.number("orbit_rate_rad_s"))
-    else:
-        for path in (("chaser",), *paths):
-            yield from _orbit_problems(known, path)
+    @property
+    def times_s(self) -> Floats | None:
+        """The times of the file, by target as listed; None if one is missing."""
+        times = [target.time_s for target in self.target]
+        return None if None in times else np.array(times, dtype=np.float64)
 
+    @property
+    def latest_s(self) -> float | None:
+        """The latest time of the last visit."""
+        return None if self.times is None else self.times.latest_s
 
-def _axes_problems(known: Known, axes: Axes) -> Iterator[Problem]:
-    needed, other = TOP_KEYS[axes][0], axes.other
-    if known.document.get(needed) is None:
-        yield Problem((needed,), f'is missing, and axes = "{axes.value}" needs it', "add it above the first table")
-    for name in TOP_KEYS[other]:
-        if name in known.document:
-            yield Problem((name,), f'belongs to axes = "{other.value}"', f'remove it, or write axes = "{other.value}"')
-
-
-def _body_problems(known: Known, path: KeyPath, axes: Axes) -> Iterator[Problem]:
-    table = known.value(*path)
-    if not isinstance(table, dict):
-        return
-    for name in KEYS[axes.other]:
-        if name in table:
-            remedy = f"give {' and '.join(KEYS[axes][:2])}"
-            yield Problem((*path, name), f'belongs to axes = "{axes.other.value}"', remedy)
-            return
-    needed = KEYS[axes]
-    if axes is Axes.INERTIAL:
-        needed = ("position_km", "velocity_km_s")
-        if "elements" in table:
-            for name in KEYS[axes][1:]:
-                if name in table:
-                    yield Problem((*path, name), "is given together with elements", "give one of the two")
-            return
-        if not any(name in table for name in needed):
-            yield Problem(path, "has no initial state", "add elements, or position_km and velocity_km_s")
-            return
-    for name in needed:
-        if name not in table:
-            yield Problem((*path, name), "is missing", f"add {name} = [x, y, z]")
-
-
-def _orbit_problems(known: Known, path: KeyPath) -> Iterator[Problem]:
-    """Check the orbit of a body about the attracting one."""
-    mu, elements = known.number("gravitational_parameter_km3_s2"), known.value(*path, "elements")
-    position, velocity = (known.value(*path, name) for name in ("position_km", "velocity_km_s"))
-    if mu is None:
-        return
-    name, mu_si = "elements", si(mu, 3 * KILO)
-    if isinstance(elements, list):
-        axis, eccentricity = Decimal(elements[0]), Decimal(elements[1])
-        state = OrbitalElements(si(axis, KILO), si(eccentricity), 0.0, 0.0, 0.0, 0.0).state(mu_si)
-    elif isinstance(position, list) and isinstance(velocity, list):
-        name, state = "position_km", (_si_km(position), _si_km(velocity))
-    else:
-        return
-    remedy = "choose an ellipse above the attracting body, or check the units"
-    yield from orbit_problems((*path, name), state, mu_si, remedy)
-
-
-def _si_km(values: list[object]) -> Floats:
-    return np.array([si(Decimal(str(value)), KILO) for value in values])
-
-
-def _time_problems(known: Known, paths: Sequence[KeyPath]) -> Iterator[Problem]:
-    optimise = known.value("times", "optimise") is True
-    times = [known.number(*path, "time_s") for path in paths]
-    dwell = [known.number(*path, "dwell_s") or ZERO for path in paths]
-    latest, gap = known.number("times", "latest_s"), known.number("times", "least_gap_s") or ZERO
-    if not optimise:
-        for path in paths:
-            table = known.value(*path)
-            if isinstance(table, dict) and "time_s" not in table:
-                remedy = "add it, or optimise the times: optimise = true under [times]"
-                yield Problem((*path, "time_s"), "is missing", remedy)
-        for index in range(1, len(paths)):
-            first, second = times[index - 1], times[index]
-            if first is not None and second is not None and second <= first + dwell[index - 1]:
-                text = f"must be after {first + dwell[index - 1]} s, when the chaser leaves the previous target, "
-                text += f"found {second}"
-                yield Problem((*paths[index], "time_s"), text, "list the targets in order of time")
-        last = times[-1] if times else None
-        if last is not None and latest is not None and last > latest:
-            text = f"is {latest}, before the last visit at {last} s"
-            yield Problem(("times", "latest_s"), text, "make it later, or set optimise = true under [times]")
-    stays = sum(dwell[:-1], ZERO)
-    need = len(paths) * gap + stays
-    if latest is not None and paths and (latest < need or latest <= stays):
-        text = f"is {latest}, and {len(paths)} visits with their gaps and stays take {need} s"
-        yield Problem(("times", "latest_s"), text, "make it later, or the gaps and stays shorter")
-    price, table = known.number("times", "price_per_s") or ZERO, known.value("times")
-    if optimise and price == 0 and isinstance(table, dict) and "latest_s" not in table:
-        yield Problem(
-            ("times", "latest_s"),
-            "is missing: the cost decreases to zero as the last time grows, so there is no best time",
-            "add it, or a price_per_s above 0",
-        )
-
-
-FORM = problem_form(
-    KIND,
-    MultipointTables,
-    _checks,
-    (
-        "orbit_rate_rad_s",
-        *(f"{body}.{name}" for body in ("chaser", "target") for name in KEYS[Axes.HILL]),
-        "target.time_s",
-    ),
-)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class MultipointProblem(ReadProblem[MultipointTables]):
-    """A problem as read; `times_s`, by target as listed, is None if a time is missing."""
-
-    tour: Visits
-    times_s: Floats | None
-    latest_s: float | None
-    price_per_s: float
-    greatest_control_m_s2: float | None
+    @property
+    def price_per_s(self) -> float:
+        """The price of a second of the last time, m^2/s^4."""
+        return 0.0 if self.times is None else self.times.price_per_s
 
     def limits(self) -> TimeLimits:
-        """Return the limits of the times; `InputError` if the last time has neither a limit nor a price."""
-        try:
-            return TimeLimits(self.latest_s, self.tables.times.si("least_gap_s"), self.price_per_s)
-        except ValueError as error:
-            raise InputError(f"{self.source}: {error}: latest_s or price_per_s under [times]") from None
+        """Return the limits of the times; ValueError if the last time has neither a limit nor a price."""
+        return self.times or TimeLimits()
+
+    @cached_property
+    def tour(self) -> Tour | KeplerTour:
+        """The visits that are solved."""
+        mu = self.gravitational_parameter_m3_s2
+        targets = tuple(Target(each.name, each.meet, each.dwell_s) for each in self.target)
+        states, start = np.array([each.state(mu) for each in self.target]), self.chaser.state(mu)
+        if mu is not None:
+            epochs_s = np.array([each.epoch_s for each in self.target])
+            return KeplerTour(KeplerTargets(targets, states, epochs_s, mu), coast(start, -self.chaser.epoch_s, mu))
+        assert self.orbit_rate_rad_s is not None
+        motion: LinearMotion = ClohessyWiltshire(self.orbit_rate_rad_s)
+        if self.eccentricity > 0.0:
+            motion = TschaunerHempel(EllipticOrbit(self.orbit_rate_rad_s, self.eccentricity, self.true_anomaly_rad))
+        return Tour(motion, DriftingTargets(targets, motion, states), start)
 
 
 def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) -> MultipointProblem:
@@ -321,54 +180,4 @@ def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) ->
     InputError
         If there is no such problem, or it is not sound.
     """
-    tables = load_tables(FORM, name_or_path, settings)
-    with input_errors(name_or_path):
-        tour = _hill(tables) if tables.axes is Axes.HILL else _inertial(tables)
-    times_s = [table.si("time_s") for table in tables.target if table.time_s is not None]
-    return MultipointProblem(
-        tables,
-        name_or_path,
-        tour,
-        np.array(times_s) if len(times_s) == len(tables.target) else None,
-        tables.times.si("latest_s"),
-        tables.times.si("price_per_s"),
-        tables.si("greatest_control_m_s2"),
-    )
-
-
-def _described(tables: MultipointTables) -> tuple[Target, ...]:
-    return tuple(Target(table.name, table.meet, table.si("dwell_s")) for table in tables.target)
-
-
-def _hill(tables: MultipointTables) -> Tour:
-    rate, eccentricity = tables.si("orbit_rate_rad_s"), tables.si("eccentricity")
-    motion: LinearMotion = ClohessyWiltshire(rate)
-    if eccentricity > 0.0:
-        motion = TschaunerHempel(EllipticOrbit(rate, eccentricity, tables.si("true_anomaly_deg")))
-    initial = np.array([_relative(table) for table in tables.target])
-    return Tour(motion, DriftingTargets(_described(tables), motion, initial), _relative(tables.chaser))
-
-
-def _inertial(tables: MultipointTables) -> KeplerTour:
-    mu = tables.si("gravitational_parameter_km3_s2")
-    states, epochs = zip(*(_absolute(table, mu) for table in tables.target), strict=True)
-    targets = KeplerTargets(_described(tables), np.array(states), np.array(epochs), mu)
-    try:
-        targets.states(np.arange(len(states)), targets.epoch_s)
-        chaser, epoch_s = _absolute(tables.chaser, mu)
-        return KeplerTour(targets, coast(chaser, -epoch_s, mu))
-    except ValueError as error:
-        raise ValueError(f"{error}; check the units of states and of gravitational_parameter_km3_s2") from None
-
-
-def _relative(body: BodyTable) -> Floats:
-    return np.array(body.si_numbers("position_m", "velocity_m_s"))
-
-
-def _absolute(body: BodyTable, mu: float) -> tuple[Floats, float]:
-    """Return the inertial state at the epoch, and the epoch."""
-    if body.elements is not None:
-        axis, eccentricity, *angles, epoch = body.elements
-        orbit = OrbitalElements(si(axis, KILO), si(eccentricity), *(radians(angle) for angle in angles))
-        return np.concatenate(orbit.state(mu)), si(epoch)
-    return np.array(body.si_numbers("position_km", "velocity_km_s")), body.si("epoch_s")
+    return read_file(MultipointProblem, name_or_path, settings)

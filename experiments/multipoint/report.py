@@ -11,6 +11,7 @@ import numpy as np
 from experiments.common.display_units import Unit, time_unit
 from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, trajectories_csv
+from experiments.common.problems import head
 from experiments.common.screen import Part, number_table
 from experiments.multipoint.command import BEST, GIVEN
 from experiments.multipoint.file import Axes, MultipointProblem
@@ -163,7 +164,7 @@ def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
     problem, path = report.problem, report.scene.path
     return {
-        **problem.head,
+        **head(problem),
         "units": f"m, s; axes: {report.scene.axes_text}",
         "order_chosen": report.search.order,
         "times_chosen": report.search.times,

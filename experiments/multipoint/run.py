@@ -8,7 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from experiments.common.errors import InputError, input_errors
+from experiments.common.input_file import to_toml
 from experiments.common.output import TRAJECTORIES, output_of, to_json
+from experiments.common.problems import need_finite
 from experiments.common.screen import figure_files, progress_bar, show
 from experiments.multipoint.command import BEST, GIVEN, Multipoint
 from experiments.multipoint.file import MultipointProblem, load_multipoint
@@ -25,14 +27,14 @@ Progress = Callable[[float], None]
 def run(options: Multipoint) -> None:
     """Solve the problem, write the files and print the tables."""
     problem = load_multipoint(options.problem, options.settings)
-    search = Search(options.order, options.times or (BEST if problem.tables.times.optimise else GIVEN))
+    search = Search(options.order, options.times or (BEST if problem.optimise_times else GIVEN))
     _check(problem, search)
     with (
         output_of(options, ("problem.toml", "results.json", TRAJECTORIES, *figure_files(*FIGURES))) as written,
         progress_bar(options.quiet) as begin,
     ):
         report = _solve(problem, search, begin(search.title))
-        written.save("problem.toml", problem.toml)
+        written.save("problem.toml", to_toml(problem))
         written.save("results.json", to_json(report_json(report)), "--json")
         if written.wants("--csv"):
             written.save(TRAJECTORIES, trajectories(report.scene), "--csv")
@@ -57,21 +59,13 @@ def _check(problem: MultipointProblem, search: Search) -> None:
             "some minutes; list fewer targets, or list them in a good order"
         )
     if search.times == BEST:
-        problem.limits()
+        with input_errors(f"{problem.name}: --times best"):
+            problem.limits()
         return
     if times_s is None:
-        raise InputError(f"{problem.source}: --times given: needs time_s of every target; add it, or use --times best")
-    if search.order == GIVEN:
-        leave_s = times_s + problem.tour.dwell_s
-        early = np.flatnonzero(times_s[1:] <= leave_s[:-1])
-        if len(early):
-            at = int(early[0]) + 1
-            raise InputError(
-                f"{problem.source}: target #{at + 1}.time_s: must be after {leave_s[at - 1]:g} s, when the chaser "
-                f"leaves {targets[at - 1].name}, found {times_s[at]:g}; list the targets in order of time"
-            )
+        raise InputError(f"{problem.name}: --times given: needs time_s of every target; add it, or use --times best")
     if problem.latest_s is not None and times_s.max() > problem.latest_s:
-        raise InputError(f"{problem.source}: times.latest_s: is before the last time_s; make it later, or remove it")
+        raise InputError(f"{problem.name}: times.latest_s: is before the last time_s; make it later, or remove it")
 
 
 def _large(number: int) -> str:
@@ -79,17 +73,17 @@ def _large(number: int) -> str:
 
 
 def _solve(problem: MultipointProblem, search: Search, progress: Progress) -> Report:
-    with input_errors(problem.source):
+    with input_errors(problem.name):
         best = _best(problem, search, progress)
         path, peak = best.path, greatest_control(best.path.control, best.path.breaks())
-    problem.need_finite(path.cost, best.objective, path.costate_start, path.arrival_states, path.time_gradient)
+    need_finite(problem, path.cost, best.objective, path.costate_start, path.arrival_states, path.time_gradient)
     bound = problem.greatest_control_m_s2
     if bound is not None and peak > bound:
         raise InputError(
-            f"{problem.source}: greatest_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
+            f"{problem.name}: greatest_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
             f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
         )
-    return Report(problem, search, Scene(problem.tables.axes, problem.tour, best.order, path), best, peak)
+    return Report(problem, search, Scene(problem.axes, problem.tour, best.order, path), best, peak)
 
 
 def _best(problem: MultipointProblem, search: Search, progress: Progress) -> BestOrder:

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from experiments.common.errors import InputError, shown
-from experiments.common.toml_values import LARGEST
 from experiments.observer.command import MOST_STEPS, Errors
 from experiments.observer.file import ObserverProblem
 from infoset import Zonotope
 from infoset.arrays import Floats
+from infoset.limits import LARGEST
 from infoset.observer_sets import Set, polytope_of
 
 LARGEST_CSV_BYTES = 10_000_000
@@ -45,25 +45,26 @@ def data_of(problem: ObserverProblem, file: Path | None, errors: Errors, seed: i
     Raise `InputError` if the file cannot be read, or does not fit the system.
     """
     if file is not None:
-        return read_csv(file, len(problem.c), problem.b.shape[1])
+        return read_csv(file, len(problem.system.C), problem.system.inputs)
     if problem.measured is not None:
-        inputs = _padded(problem.inputs, len(problem.measured), problem.b.shape[1])
+        inputs = _padded(problem.inputs, len(problem.measured), problem.system.inputs)
         return Data(problem.measured, inputs, None, f"measurements of {problem.name}")
     return simulate(problem, errors, seed)
 
 
 def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
     """Return measurements of a random motion, with errors at their bounds or within them."""
-    generator = np.random.default_rng(seed)
-    inputs = _padded(problem.inputs, problem.steps, problem.b.shape[1])
-    states = [_point(problem.initial, errors, generator)]
+    generator, system = np.random.default_rng(seed), problem.system
+    a, b, c = np.array(system.A), np.reshape(system.B, (len(system.A), system.inputs)), np.array(system.C)
+    inputs = _padded(problem.inputs, problem.simulation.steps, system.inputs)
+    states = [_point(problem.initial.shape, errors, generator)]
     for step, u in enumerate(inputs[:-1], start=1):
-        w = _point(problem.disturbance, errors, generator)
-        states.append(problem.a @ states[-1] + problem.b @ u + problem.offset + w)
-        need_size(f"{problem.source}: simulation, step {step}", states[-1])
+        w = _point(problem.disturbance_set, errors, generator)
+        states.append(a @ states[-1] + b @ u + (system.offset or 0.0) + w)
+        need_size(f"{problem.name}: simulation, step {step}", states[-1])
     true = np.array(states)
-    measured = true @ problem.c.T + _signs(errors, (len(true), len(problem.c)), generator) * problem.half_width
-    measured[[step for step in problem.missing if step < len(measured)]] = np.nan
+    measured = true @ c.T + _signs(errors, (len(true), len(c)), generator) * problem.noise.half_width
+    measured[[step for step in problem.simulation.missing if step < len(measured)]] = np.nan
     return Data(measured, inputs, true, f"simulated, {errors.value} errors, seed {seed}")
 
 
@@ -161,7 +162,7 @@ def _numbers(file: Path, line: int, row: list[str], header: list[str], wanted: l
         except ValueError:
             number = math.inf
         is_missing = not text and name.startswith("y")
-        if not is_missing and not abs(number) <= float(LARGEST):
+        if not is_missing and not abs(number) <= LARGEST:
             raise InputError(
                 f"--data: {file}: line {line}, {name}: must be a number of at most {LARGEST:g} in size, found "
                 f"{shown(text)}; an empty cell of y is a missing measurement; an input of zero is written 0"

@@ -22,7 +22,7 @@ _MOST_OUTLINES = 60
 def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
     yield draw_bounds(report)
-    if len(report.problem.a) == 2:
+    if len(report.problem.names) == 2:
         yield draw_sets(report)
 
 
@@ -61,7 +61,7 @@ def draw_bounds(report: Report) -> Figure:
         width.set_ylim(bottom=0.0)
         for axes in (panel, width):
             axes.tick_params(labelbottom=index == len(names) - 1)
-            if report.problem.step_s is None:
+            if report.problem.system.step_s is None:
                 axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     for axes in grid[-2:]:
         axes.set_xlabel(title)

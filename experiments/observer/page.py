@@ -14,7 +14,7 @@ def observer_page(report: Report) -> str:
     """Return the page as HTML."""
     time, title = times(report)
     problem, data = report.problem, report.data
-    about = [problem.tables.description] if problem.tables.description else []
+    about = [problem.description] if problem.description else []
     about.append(f"{len(report.estimates)} steps; {data.origin}. Step with the arrow keys or the slider.")
     if report.contradicted:
         about.append(f"The measurements contradict the model at step {int(report.inconsistency.step)}.")

@@ -9,6 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from experiments.common.output import Cell, to_csv
+from experiments.common.problems import head
 from experiments.common.screen import Part, number_table
 from experiments.observer.data import Data
 from experiments.observer.file import ObserverProblem
@@ -55,7 +56,7 @@ def report_json(report: Report) -> dict[str, object]:
     for step, state in zip(steps, () if report.data.states is None else report.data.states, strict=False):
         step["state"] = state
     return {
-        **problem.head,
+        **head(problem),
         "data": report.data.origin,
         "states": problem.names,
         "steps": steps,
@@ -82,7 +83,7 @@ def _step_json(estimate: Estimate) -> dict[str, object]:
 
 def report_csv(report: Report) -> str:
     """Return the bounds of each step as CSV."""
-    states = range(1, len(report.problem.a) + 1)
+    states = range(1, len(report.problem.names) + 1)
     kinds = ["", "smoothed_"] if report.smoothed is not None else [""]
     ends = [f"x{state}_{kind}{end}" for kind in kinds for state in states for end in ("lower", "upper")]
     true = [] if report.data.states is None else [f"x{state}" for state in states]
@@ -101,7 +102,7 @@ def report_csv(report: Report) -> str:
 def times(report: Report) -> tuple[Floats, str]:
     """Return the times of the steps, and the title of their axis."""
     steps = np.array([estimate.step for estimate in report.estimates], dtype=float)
-    step_s = report.problem.step_s
+    step_s = report.problem.system.step_s
     return (steps, "step") if step_s is None else (steps * step_s, "time, s")
 
 
@@ -128,7 +129,7 @@ def report_parts(report: Report) -> Iterator[Part]:
     problem, count = report.problem, len(report.estimates)
     missing = int(np.isnan(report.data.measured).any(axis=1).sum())
     gaps = f", {missing} with missing measurements" if missing else ""
-    yield f"{problem.name}: {len(problem.a)} states, {count} steps{gaps}; {report.data.origin}"
+    yield f"{problem.name}: {len(problem.names)} states, {count} steps{gaps}; {report.data.origin}"
     if count > _SHOWN_STEPS:
         yield f"bounds of the last {_SHOWN_STEPS} steps:"
     yield _bounds_table(problem.names, report.estimates)

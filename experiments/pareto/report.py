@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments.common.hill_axes import AXES
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, trajectories_csv
+from experiments.common.problems import head
 from experiments.common.screen import Part, number, number_table
 from experiments.pareto.file import TERMINAL, ParetoProblem
 from infoset.arrays import Floats
@@ -41,7 +42,7 @@ def report_json(report: Report, samples: int) -> dict[str, object]:
     problem, solution = report.problem, report.solution
     encounter = problem.encounter
     return {
-        **problem.head,
+        **head(problem),
         "units": {
             "axes": AXES,
             "costate_at_meeting": "m/s^3 of the position's three, m/s^2 of the velocity's",

@@ -8,14 +8,16 @@ from collections.abc import Callable
 import numpy as np
 
 from experiments.common.errors import InputError, input_errors, shown
+from experiments.common.input_file import to_toml
 from experiments.common.output import TRAJECTORIES, output_of, to_json
+from experiments.common.problems import need_finite
 from experiments.common.screen import figure_files, progress_bar, show
-from experiments.common.toml_values import LARGEST
 from experiments.pareto.command import Pareto
 from experiments.pareto.file import TERMINAL, ParetoProblem, load_pareto
 from experiments.pareto.page import pareto_page
 from experiments.pareto.report import Report, report_json, report_parts, trajectories
 from infoset.arrays import Floats
+from infoset.limits import LARGEST
 from rendezvous.pareto import (
     BoundCheck,
     EncounterSolution,
@@ -46,7 +48,7 @@ def run(options: Pareto) -> None:
         progress_bar(options.quiet) as begin,
     ):
         report = _solve(problem, preferred, begin("meetings and coalitions"))
-        written.save("problem.toml", problem.toml)
+        written.save("problem.toml", to_toml(problem))
         written.save("results.json", to_json(report_json(report, options.samples)), "--json")
         if written.wants("--csv"):
             written.save(TRAJECTORIES, trajectories(report, options.samples), "--csv")
@@ -84,9 +86,9 @@ def _preferred(text: str, problem: ParetoProblem) -> Floats:
 
 def _solve(problem: ParetoProblem, preferred: Floats | None, progress: Callable[[float], None]) -> Report:
     encounter = problem.encounter
-    with input_errors(problem.source):
+    with input_errors(problem.name):
         solution = solve_encounter(encounter)
-    problem.need_finite(solution.meeting_state(), solution.cost_squared())
+    need_finite(problem, solution.meeting_state(), solution.cost_squared())
     selections = _selections(problem, solution, preferred)
     progress(0.2)
     bounds = _bounds(problem, solution)
@@ -116,7 +118,7 @@ def _selections(problem: ParetoProblem, solution: EncounterSolution, preferred: 
         "least_greatest_excess": least_greatest_excess(solution),
     }
     if preferred is not None:
-        with input_errors(f"{problem.source}: --prefer"):
+        with input_errors(f"{problem.name}: --prefer"):
             selections["preferred"] = nearest_to(solution, preferred)
     return selections
 
@@ -126,7 +128,7 @@ def _bounds(problem: ParetoProblem, solution: EncounterSolution) -> tuple[BoundC
     bound, encounter = problem.greatest_control_m_s2, problem.encounter
     if bound is None:
         return ()
-    where = f"{problem.source}: greatest_control_m_s2"
+    where = f"{problem.name}: greatest_control_m_s2"
     with input_errors(where):
         checks = [check_bound(solution.plan(index), bound, encounter.common) for index in range(len(solution.costs))]
     worst = max(range(len(checks)), key=lambda index: checks[index].least_peak_m_s2)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -11,16 +12,20 @@ from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.errors import InputError, shown
-from experiments.common.options import choice
+from experiments.common.input_file import changed, keys_of, numeric_key, similar_key, to_toml
 from experiments.common.output import Cell, output_of, to_csv, to_json
-from experiments.common.screen import figure_files, progress_bar, say_warnings, show
+from experiments.common.problems import head
+from experiments.common.screen import figure_files, progress_bar, show
 from experiments.pursuit.command import ROWS, PursuitMap
-from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
+from experiments.pursuit.file import PursuitProblem, load_pursuit
 from experiments.pursuit.report import STATUS_WORDS, counted
-from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus, capture_map
+from rendezvous.pursuit_evasion import STATUSES, CaptureMap, Game, PointStatus, capture_map
+from rendezvous.two_body import OrbitalElements
 
 FIGURE = "figure-map"
 MOST_VALUES, MOST_POINTS = 2000, 100_000
+RATIOS = ("phase_deg", "thrust_ratio", "mass_ratio")
+"""Parameters besides the keys of a file: lead of the evader in true longitude, its thrust and mass by the pursuer's."""
 COLUMNS = "phase_deg=-30:30:61"
 COLUMNS_OF_STATES = "mass_ratio=0.5:1.5:21"
 PHASE_BY_THRUST = 12.0
@@ -50,18 +55,17 @@ def run(options: PursuitMap) -> None:
     if points > MOST_POINTS:
         raise InputError(f"--x and --y: {points} points are over {MOST_POINTS}; choose fewer")
     with output_of(options, ("problem.toml", "results.json", "map.csv", *figure_files(FIGURE))) as written:
-        say_warnings(problem.warnings(), options.quiet)
         began_s = perf_counter()
         with progress_bar(options.quiet) as begin:
             solved = capture_map(
-                lambda column, row: problem.game({x.parameter: column, y.parameter: row}),
+                lambda column, row: game_at(problem, {x.parameter: column, y.parameter: row}),
                 x.values,
                 y.values,
                 follow_all=options.certify,
                 progress=begin("map"),
             )
         elapsed_s = perf_counter() - began_s
-        written.save("problem.toml", problem.toml)
+        written.save("problem.toml", to_toml(problem))
         written.save("results.json", to_json(_summary(problem, x, y, solved, elapsed_s)), "--json")
         written.save("map.csv", to_csv(*_table(x, y, solved)), "--csv")
         if options.out is not None:
@@ -83,11 +87,44 @@ def run(options: PursuitMap) -> None:
     show(lines, options.quiet, stdout_taken=written.stdout_taken)
 
 
+def game_at(problem: PursuitProblem, values: Mapping[str, float]) -> Game:
+    """Return the game with other values of parameters, those of `RATIOS` last.
+
+    Raises
+    ------
+    ValueError
+        If the values define no game.
+    InputError
+        If `phase_deg` is varied, and a player has no orbit.
+    """
+    keys = {key: value for key, value in values.items() if key not in RATIOS}
+    try:
+        problem = changed(problem, keys, problem.name) if keys else problem
+    except InputError as error:
+        raise ValueError(str(error)) from None
+    pursuer, evader = problem.pursuer, problem.evader
+    if "phase_deg" in values:
+        if pursuer.orbit is None or evader.orbit is None:
+            raise InputError("phase_deg: both players must have the table orbit; vary other keys instead")
+        lead_rad = _true_longitude_rad(pursuer.orbit) - _true_longitude_rad(evader.orbit)
+        anomaly_rad = evader.orbit.true_anomaly_rad + lead_rad + math.radians(values["phase_deg"])
+        evader = replace(evader, orbit=replace(evader.orbit, true_anomaly_rad=anomaly_rad))
+    if "thrust_ratio" in values:
+        evader = replace(evader, thrust_N=values["thrust_ratio"] * pursuer.thrust_N)
+    if "mass_ratio" in values:
+        evader = replace(evader, mass_kg=values["mass_ratio"] * pursuer.mass_kg)
+    return replace(problem, evader=evader).game
+
+
+def _true_longitude_rad(orbit: OrbitalElements) -> float:
+    return orbit.raan_rad + orbit.argument_of_perigee_rad + orbit.true_anomaly_rad
+
+
 def _columns(problem: PursuitProblem) -> str:
     """Return the default columns."""
-    if problem.tables.pursuer.position_km is not None or problem.tables.evader.position_km is not None:
+    if problem.pursuer.orbit is None or problem.evader.orbit is None:
         return COLUMNS_OF_STATES
-    game = problem.game()
+    game = problem.game
     gravity_m_s2 = game.gravity.parameter_m3_s2 / math.hypot(*game.pursuer.position_m) ** 2
     half = math.degrees(PHASE_BY_THRUST * game.pursuer.acceleration_m_s2 / gravity_m_s2)
     # One digit, for round ticks.
@@ -99,7 +136,10 @@ def read_axis(option: str, text: str) -> Axis:
     """Read KEY=FROM:TO:N; raise `InputError` if it has another form, an unknown parameter, or a value out of range."""
     example = f"for example {option} {COLUMNS if option == '--x' else ROWS}"
     key, _, span = text.partition("=")
-    choice(option, key, parameter_names())
+    if key not in RATIOS and numeric_key(PursuitProblem, key) is None:
+        guess = similar_key(key, [*RATIOS, *keys_of(PursuitProblem)])
+        hint = f"did you mean {guess}?" if guess else f"choose {', '.join(RATIOS)} or a key of the file"
+        raise InputError(f"{option}: there is no parameter {shown(key)}; {hint}")
     parts = span.split(":")
     try:
         if len(parts) != 3:
@@ -116,7 +156,7 @@ def read_axis(option: str, text: str) -> Axis:
 
 def _summary(problem: PursuitProblem, x: Axis, y: Axis, solved: CaptureMap, elapsed_s: float) -> dict[str, object]:
     return {
-        **problem.head,
+        **head(problem),
         "elapsed_s": elapsed_s,
         "x": x,
         "y": y,

@@ -75,10 +75,10 @@ def draw_map(solved: CaptureMap, column: str, row: str) -> Figure:
 
 
 def axis_name(parameter: str) -> str:
-    """Return the axis label of a parameter: `evader: inclination, deg` for `evader.inclination_deg`."""
+    """Return the axis label of a parameter: `evader orbit: inclination, deg` for `evader.orbit.inclination_deg`."""
     owner, _, key = parameter.rpartition(".")
     words = _RATIOS.get(key) or ", ".join(filter(None, split_unit(key)))
-    return f"{owner}: {words}" if owner else words
+    return f"{owner.replace('.', ' ')}: {words}" if owner else words
 
 
 def _draw_levels(axes: Any, solved: CaptureMap, hours: Any) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.output import STATE_COLUMNS, Cell, trajectories_csv
+from experiments.common.problems import head
 from experiments.common.screen import Part, number, number_table
 from experiments.pursuit.file import PursuitProblem
 from infoset.arrays import Floats
@@ -80,10 +81,8 @@ class Report:
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
     problem, solution, certificate = report.problem, report.solution, report.certificate
-    warnings = list(problem.warnings())
     return {
-        **problem.head,
-        **({"warnings": warnings} if warnings else {}),
+        **head(problem),
         "elapsed_s": report.elapsed_s,
         "verdict": solution.verdict,
         **_capture_json(solution.capture),

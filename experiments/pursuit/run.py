@@ -6,8 +6,9 @@ from collections.abc import Callable
 from time import perf_counter
 
 from experiments.common.errors import InputError, input_errors
+from experiments.common.input_file import to_toml
 from experiments.common.output import TRAJECTORIES, output_of, to_json
-from experiments.common.screen import figure_files, progress_bar, say, say_warnings, show
+from experiments.common.screen import figure_files, progress_bar, say, show
 from experiments.pursuit.command import Pursuit
 from experiments.pursuit.evader import EvaderPolicy, evader_policy
 from experiments.pursuit.file import PursuitProblem, load_pursuit
@@ -28,28 +29,27 @@ def run(options: Pursuit) -> None:
     problem = load_pursuit(options.problem, options.settings)
     evader = None if options.feedback is None else evader_policy(options.feedback, options.seed)
     names = FIGURES[:-1] if evader is None else FIGURES
-    with output_of(options, ("problem.toml", "results.json", TRAJECTORIES, *figure_files(*names))) as written:
-        say_warnings(problem.warnings(), options.quiet)
-        with progress_bar(options.quiet) as begin:
-            report = _solve(problem, options, evader, begin)
-            solution = report.solution
-            has_trajectory = solution.capture is not None or solution.fallback is not None
-            wanted = " and ".join(option for option in ("--html", "--csv") if option in written.files)
-            if wanted and not has_trajectory:
-                raise InputError(
-                    f"{wanted}: there is no trajectory to show, the result is {solution.verdict.value}; omit {wanted}"
-                )
-            written.save("results.json", to_json(report_json(report)), "--json")
-            if options.html is not None:
-                claim = saddle_point(report.certificate)
-                written.deliver("--html", pursuit_page(problem.name, problem.tables.description, solution, claim))
-            if written.wants("--csv") and has_trajectory:
-                written.save(TRAJECTORIES, trajectories(solution), "--csv")
-            if options.out is not None:
-                from experiments.pursuit.figures import draw_all
+    files = ("problem.toml", "results.json", TRAJECTORIES, *figure_files(*names))
+    with output_of(options, files) as written, progress_bar(options.quiet) as begin:
+        report = _solve(problem, options, evader, begin)
+        solution = report.solution
+        has_trajectory = solution.capture is not None or solution.fallback is not None
+        wanted = " and ".join(option for option in ("--html", "--csv") if option in written.files)
+        if wanted and not has_trajectory:
+            raise InputError(
+                f"{wanted}: there is no trajectory to show, the result is {solution.verdict.value}; omit {wanted}"
+            )
+        written.save("results.json", to_json(report_json(report)), "--json")
+        if options.html is not None:
+            claim = saddle_point(report.certificate)
+            written.deliver("--html", pursuit_page(problem.name, problem.description, solution, claim))
+        if written.wants("--csv") and has_trajectory:
+            written.save(TRAJECTORIES, trajectories(solution), "--csv")
+        if options.out is not None:
+            from experiments.pursuit.figures import draw_all
 
-                written.save("problem.toml", problem.toml)
-                written.draw(FIGURES, draw_all(report), begin("figures"))
+            written.save("problem.toml", to_toml(problem))
+            written.draw(FIGURES, draw_all(report), begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
@@ -64,8 +64,8 @@ def _check_feedback(options: Pursuit) -> None:
 
 def _solve(problem: PursuitProblem, options: Pursuit, evader: EvaderPolicy | None, begin: Begin) -> Report:
     began_s, progress = perf_counter(), begin("solve")
-    with input_errors(problem.source, "; correct the problem"):
-        solution = solve(problem.game(), all_directions=options.certify)
+    with input_errors(problem.name, "; correct the problem"):
+        solution = solve(problem.game, all_directions=options.certify)
     progress(0.5)
     certificate = None if solution.capture is None else certify(solution, all_directions=options.certify)
     progress(1.0)

@@ -46,7 +46,7 @@ def reachability_page(report: Report) -> str:
     ]
     miss = report.solution.optimal.miss
     about = [
-        *filter(None, [rendezvous.tables.description]),
+        *filter(None, [rendezvous.description]),
         f"axes: {AXES}",
         f"least terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; trajectories of the nonlinear model",
     ]

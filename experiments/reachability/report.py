@@ -12,14 +12,16 @@ import numpy as np
 from experiments.common.display_units import Unit, length_unit
 from experiments.common.errors import InputError
 from experiments.common.hill_axes import AXES
-from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, library_version, trajectories_csv
-from experiments.reachability.file import KIND, Rendezvous
+from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, trajectories_csv
+from experiments.common.problems import head
+from experiments.reachability.file import Rendezvous
 from infoset.arrays import Floats
 from infoset.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
     FeedbackPlan,
     Flight,
+    NonlinearMotion,
     NoRobustPlanError,
     Route,
     SetKind,
@@ -190,7 +192,8 @@ def _report(rendezvous: Rendezvous, request: Request, progress: Progress) -> Rep
             sequence = np.random.SeedSequence(entropy=request.seed, spawn_key=(run,))
             noisy.append(_fly(rendezvous, np.random.default_rng(sequence)))
             progress(0.7 + 0.2 * (run + 1) / request.noisy_flights)
-    robustness = None if rendezvous.disturbance is None else _robustness(rendezvous, rendezvous.disturbance)
+    effect = rendezvous.disturbance_effect
+    robustness = None if effect is None else _robustness(rendezvous, effect)
     progress(1.0)
     return Report(
         rendezvous,
@@ -225,11 +228,14 @@ def _members(rendezvous: Rendezvous, solution: Solution, request: Request) -> tu
     return fly_members(rendezvous, [*controls], np.array([*controls.values()])) if controls else ()
 
 
-def fly_members(rendezvous: Rendezvous, names: Sequence[str], controls: Floats) -> tuple[Member, ...]:
-    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model."""
+def fly_members(
+    rendezvous: Rendezvous, names: Sequence[str], controls: Floats, truth: NonlinearMotion | None = None
+) -> tuple[Member, ...]:
+    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model; `truth` replaces the latter."""
     problem = rendezvous.problem
     linear = problem.run(controls)
-    nonlinear = rendezvous.truth.fly(problem.initial, rendezvous.acceleration_m_s2 * controls, rendezvous.period_s)
+    pushes = rendezvous.acceleration_m_s2 * controls
+    nonlinear = (truth or rendezvous.truth).fly(problem.initial, pushes, rendezvous.period_s)
     between = replace(problem, between=rendezvous.instants).excess(controls)
     rows = zip(names, controls, linear, nonlinear, between.tolist(), strict=True)
     return tuple(Member(*row) for row in rows)
@@ -306,10 +312,8 @@ def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`; key ``units`` has the units of the states."""
     solution, rendezvous = report.solution, report.rendezvous
     return {
-        "version": library_version(),
-        "kind": KIND,
-        "problem": rendezvous.name,
-        "problem_hash": rendezvous.hash,
+        **head(rendezvous),
+        "kind": rendezvous.kind,
         "units": {
             "period_s": rendezvous.period_s,
             "axes": AXES,

@@ -10,13 +10,20 @@ from rich.table import Table
 
 from experiments.common.errors import InputError
 from experiments.common.hill_axes import AXES
+from experiments.common.input_file import to_toml
 from experiments.common.options import choice, read_number
 from experiments.common.output import TRAJECTORIES, output_of, to_csv, to_json
 from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, show
 from experiments.reachability.command import Reach
 from experiments.reachability.file import load_rendezvous
 from experiments.reachability.page import reachability_page
-from experiments.reachability.printed_tables import COLUMNS, Comparison, compare_published, is_published
+from experiments.reachability.printed_tables import (
+    CHOICES,
+    COLUMNS,
+    TableComparison,
+    compare_published,
+    is_published,
+)
 from experiments.reachability.report import (
     MOST_SAMPLES,
     SAMPLES,
@@ -51,7 +58,7 @@ def run(options: Reach) -> None:
         comparisons = compare_published(rendezvous, report.solution) if published else ()
         results = report_json(report)
         tracks = trajectories(report) if written.wants("--csv") else ""
-        written.save("problem.toml", rendezvous.toml)
+        written.save("problem.toml", to_toml(rendezvous))
         written.save("results.json", to_json(results), "--json")
         if comparisons:
             written.save(TABLES, to_csv(COLUMNS, [row for comparison in comparisons for row in comparison.rows]))
@@ -127,7 +134,7 @@ def _feedback(report: Report) -> Iterator[str]:
         yield f"with disturbances, with feedback: {bound}"
 
 
-def _tables(report: Report, comparisons: Sequence[Comparison]) -> Iterator[Part]:
+def _tables(report: Report, comparisons: Sequence[TableComparison]) -> Iterator[Part]:
     sets, periods = report.solution.sets, range(1, report.solution.problem.periods + 1)
     counts = [[sets.counts(kind, t) for kind in (SetKind.FORWARD, SetKind.TUBE)] for t in periods]
     if any(count is not None for row in counts for count in row):
@@ -164,7 +171,7 @@ def _members_table(report: Report) -> Table:
     return table
 
 
-def _published_table(comparisons: Sequence[Comparison]) -> Table:
+def _published_table(comparisons: Sequence[TableComparison]) -> Table:
     titles = (
         "largest difference\nof a control, u",
         f"nonlinear miss\nas printed, {_NORM}",
@@ -173,7 +180,8 @@ def _published_table(comparisons: Sequence[Comparison]) -> Table:
     )
     table = number_table("paper", "our control", *titles, left=2)
     for comparison in comparisons:
-        misses = (comparison.table.nonlinear_miss, comparison.printed.nonlinear_miss, comparison.ours.nonlinear_miss)
+        printed = comparison.table.numbers[-1].value
+        misses = (printed, comparison.printed.nonlinear_miss, comparison.ours.nonlinear_miss)
         row = [f"{comparison.largest_difference:.5f}", *(f"{miss:.4g}" for miss in misses)]
-        table.add_row(f"table {comparison.table.number}", comparison.table.ours, *row)
+        table.add_row(comparison.name, CHOICES[comparison.name], *row)
     return table

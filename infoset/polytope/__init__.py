@@ -9,7 +9,7 @@ from infoset.polytope._affine_hull import (
     null_space_basis,
     relative_interior,
 )
-from infoset.polytope.operations import cut, intersection, linear_image, minkowski_sum, product, projection, shadow
+from infoset.polytope.operations import product, shadow
 from infoset.polytope.polytope import Polytope
 
 __all__ = [
@@ -19,13 +19,8 @@ __all__ = [
     "RelativeInterior",
     "UnboundedPolytopeError",
     "UncertainHullError",
-    "cut",
-    "intersection",
-    "linear_image",
-    "minkowski_sum",
     "null_space_basis",
     "product",
-    "projection",
     "relative_interior",
     "shadow",
 ]

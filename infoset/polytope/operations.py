@@ -1,12 +1,10 @@
-"""Polytopes in few dimensions from their support vectors alone, and functions that have become methods."""
+"""Polytopes in few dimensions from their support vectors alone, and products."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
 from infoset._set_arguments import need_set
@@ -15,44 +13,6 @@ from infoset.polytope.polytope import Polytope
 
 _MOST_ROUNDS = 200
 _FLAT = 1e-7
-
-
-def linear_image(polytope: Polytope, matrix: ArrayLike, shift: ArrayLike = 0.0) -> Polytope:
-    """Return `polytope.affine_map(matrix, shift)`. Deprecated."""
-    _warn("linear_image", "affine_map")
-    return polytope.affine_map(matrix, shift)
-
-
-def minkowski_sum(first: Polytope, second: Polytope) -> Polytope:
-    """Return `first.minkowski_sum(second)`. Deprecated."""
-    _warn("minkowski_sum", "minkowski_sum")
-    return first.minkowski_sum(second)
-
-
-def intersection(*polytopes: Polytope) -> Polytope:
-    """Return the intersection; an empty one raises an EmptyPolytopeError. Deprecated."""
-    _warn("intersection", "intersection")
-    return polytopes[0].intersection(*polytopes[1:]).needed()
-
-
-def cut(polytope: Polytope, normals: ArrayLike, offsets: ArrayLike) -> Polytope:
-    """Return `polytope.cut(normals, upper=offsets)`; an empty set raises an EmptyPolytopeError. Deprecated."""
-    _warn("cut", "cut")
-    return polytope.cut(normals, upper=offsets).needed()
-
-
-def projection(polytope: Polytope, axes: Sequence[int]) -> Polytope:
-    """Return `polytope.project(axes)`. Deprecated."""
-    _warn("projection", "project")
-    return polytope.project(axes)
-
-
-def _warn(old: str, new: str) -> None:
-    warnings.warn(
-        f"the function {old} is deprecated and will be removed: use the method {new} of Polytope",
-        DeprecationWarning,
-        stacklevel=3,
-    )
 
 
 def shadow(

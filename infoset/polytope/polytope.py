@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from functools import cached_property
 from typing import Any
 
@@ -27,7 +26,6 @@ from infoset.polytope._affine_hull import EmptyPolytopeError, least_relaxation
 from infoset.polytope._measures import largest_ball, nearest_difference, simplices_of, volume_of
 from infoset.polytope._scaling import LocalAxes, described, tightened, without_far
 from infoset.polytope.arrays import PolytopeArrays
-from infoset.renamed import renamed
 
 _FLAT_WIDTH = 1e-12
 _EPS = float(np.finfo(np.float64).eps)
@@ -418,18 +416,6 @@ class Polytope(PolytopeArrays):
 
     def __le__(self, other: Polytope) -> bool:
         return self.is_subset(other) if isinstance(other, Polytope) else NotImplemented
-
-    support = renamed("support", "support_function")
-    bounds = property(renamed("bounds", "bounding_box"))
-    box = classmethod(renamed("box", "from_box"))
-
-    @classmethod
-    def from_halfspaces(cls, *arguments: Any, **options: Any) -> Polytope:
-        """Return `from_constraints(...).needed()`: an empty set raises an EmptyPolytopeError. Deprecated."""
-        warnings.warn(
-            "from_halfspaces is deprecated and will be removed: use from_constraints", DeprecationWarning, stacklevel=2
-        )
-        return cls.from_constraints(*arguments, **options).needed()
 
 
 def _bent(reach: Floats, rows: Floats) -> Floats:

@@ -37,7 +37,7 @@ class Gravity:
     """
 
     parameter_m3_s2: float
-    planet_radius_m: float = 0.0
+    planet_radius_m: float
     j2: float = 0.0
     equatorial_radius_m: float = 0.0
 

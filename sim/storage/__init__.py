@@ -2,7 +2,7 @@
 
 from sim.storage.campaign_folder import CampaignFolder, Damage, need_arrow
 from sim.storage.campaign_writer import CampaignWriter, need_free
-from sim.storage.codec import scenario_hash
+from sim.storage.codec import fingerprint
 from sim.storage.files import (
     DamagedError,
     DiskFullError,
@@ -27,8 +27,8 @@ __all__ = [
     "MissingLibraryError",
     "OccupiedError",
     "StorageError",
+    "fingerprint",
     "need_arrow",
     "need_free",
     "read_manifest",
-    "scenario_hash",
 ]

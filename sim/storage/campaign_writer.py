@@ -141,11 +141,6 @@ def _continued(stored: Manifest, wanted: Manifest, path: Path) -> Manifest:
             f"{path}: the {stored.kind} in this folder has {stored.runs} runs, more than {option} {wanted.runs}; give "
             f"{option} {stored.runs} or more"
         )
-    if stored.axes and stored.order == "cells" and wanted.chunks_a_cell != stored.chunks_a_cell:
-        raise ManifestError(
-            f"{path}: an earlier version wrote the sweep in this folder; its {stored.runs} runs per cell cannot be "
-            f"extended to {wanted.runs}; choose another folder"
-        )
     # Once the number of runs may depend on the results, it may in all later sessions.
     extended = bool(stored.axes) and (stored.is_watched or wanted.is_watched or wanted.runs > stored.runs)
     return replace(stored, runs=wanted.runs, until=wanted.until, stopped_after=None, cell_runs=(), extended=extended)

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from infoset.limits import ADDED_LATER, COUNT, NUMBER, WHOLE
+from infoset.limits import COUNT, NUMBER, WHOLE
 from sim.chunk import CampaignNoise
 from sim.scenario import Scenario
-from sim.storage.codec import from_json, scenario_hash, to_json
+from sim.storage.codec import fingerprint, from_json, to_json
 from sim.storage.files import ManifestError, reporting, write_whole
 
 FORMAT = "infoset-campaign"
@@ -100,9 +100,9 @@ class Manifest:
     runs: int
     until: str | None = None
     stopped_after: int | None = None
-    cell_runs: tuple[int, ...] = field(default=(), metadata=ADDED_LATER)
-    require: str | None = field(default=None, metadata=ADDED_LATER)
-    extended: bool = field(default=False, metadata=ADDED_LATER)
+    cell_runs: tuple[int, ...] = ()
+    require: str | None = None
+    extended: bool = False
     scenario: Scenario
     seed: int
     noise: CampaignNoise
@@ -110,7 +110,6 @@ class Manifest:
     guarantee: bool
     chunk: int
     axes: tuple[Axis, ...] = ()
-    order: Literal["cells", "rounds"] = field(default="cells", metadata=ADDED_LATER)
     cells_hash: str = ""
     versions: Mapping[str, str]
     made_by: Mapping[str, str] = field(default_factory=dict)
@@ -162,16 +161,13 @@ class Manifest:
 
     def runs_of(self, index: int) -> tuple[int, range]:
         """Return the cell and the numbers of the runs of a chunk."""
-        if self.order == "cells":
-            cell, number = divmod(index, self.chunks_a_cell)
-        else:
-            number, cell = divmod(index, self.cells)
+        number, cell = divmod(index, self.cells)
         first = number * self.chunk
         return cell, range(first, min(first + self.chunk, self.runs))
 
     def index_of(self, cell: int, number: int) -> int:
         """Return the number of the chunk that is the `number`-th of a cell, from 0."""
-        return cell * self.chunks_a_cell + number if self.order == "cells" else number * self.cells + cell
+        return number * self.cells + cell
 
     def values_of(self, cell: int) -> dict[str, float]:
         """Return the varied values of a cell of a sweep, by key."""
@@ -199,7 +195,7 @@ class Manifest:
             "version": self.versions.get("infoset", ""),
             "kind": self.kind,
             "name": self.scenario.name,
-            "scenario_hash": scenario_hash(self.scenario),
+            "scenario_hash": fingerprint(self.scenario),
             **to_json(self),
         }
         return {**value, "sha256": checksum(value)}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from guidance import NoiseKind, TieRule
 from sim.chunk import Chunk
 from sim.columns import Column, columns_of, values_of
-from sim.results import OLD_OUTCOMES, Outcome, Results
+from sim.results import Results
 
 SCHEMA_VERSION = 2
 M_PER_KM = 1e3
@@ -146,9 +146,7 @@ def fault(content: bytes, wanted: Mapping[str, str], rows: int, *, with_cell: bo
         return "belongs to another campaign"
     if metadata.num_rows != rows:
         return f"has {metadata.num_rows} rows instead of {rows}"
-    # A file written before a nullable column was added lacks it.
-    fields = [field for field in schema(with_cell=with_cell) if field.name in columns.names or not field.nullable]
-    if not columns.equals(pa.schema(fields)):
+    if not columns.equals(schema(with_cell=with_cell)):
         return "has other columns than a campaign"
     return None
 
@@ -160,19 +158,7 @@ def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
     """
     wanted = _some(columns, with_cell=with_cell)
     try:
-        names = {*wanted.names, *(["outcome"] if "set_emptied" in wanted.names else [])}
-        table = pq.ParquetFile(file).read(columns=list(names), use_threads=False)
-        for field in wanted:
-            if field.name not in table.column_names:
-                table = table.append_column(field.name, pa.nulls(len(table), field.type))
-        if "outcome" in names:
-            texts = table.column("outcome")
-            for old, outcome in OLD_OUTCOMES.items():
-                texts = pc.if_else(pc.equal(texts, old), outcome.value, texts)
-            table = table.set_column(table.column_names.index("outcome"), "outcome", texts)
-        if "set_emptied" in wanted.names:
-            emptied = pc.coalesce(table.column("set_emptied"), pc.equal(texts, Outcome.SET_EMPTY.value))
-            table = table.set_column(table.column_names.index("set_emptied"), "set_emptied", emptied)
+        table = pq.ParquetFile(file).read(columns=wanted.names, use_threads=False)
         return table.select(wanted.names).cast(wanted).replace_schema_metadata(wanted.metadata)
     except (pa.ArrowException, KeyError) as error:
         raise ValueError(str(error)) from None

@@ -14,6 +14,7 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from infoset import InitialSet, Model, RateSensor, Recovery
 from sim import Record, fly_one
+from sim.scenario import of_model
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]
@@ -298,11 +299,11 @@ def test_odd_engagements_are_drawn_to_their_end(open_page: Open, kind: str) -> N
     model = scenario.set_model
     if kind == "lost":  # from then on there is no section and no interval
         recovery = replace(model, recovery=Recovery.NONE)
-        record = fly_one(replace(scenario, noise=NoiseKind.GAME, set_model=recovery), 2)
+        record = fly_one(replace(scenario, noise=NoiseKind.GAME, **of_model(recovery)), 2)
         assert record.steps[-1].predicted_miss_m is None
     else:
-        sound = replace(model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-        record = fly_one(replace(scenario, set_model=sound, rate_sensor=RateSensor(1.0, 2e-6)))
+        sound = replace(model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+        record = fly_one(replace(scenario, **of_model(sound), rate_sensor=RateSensor(1.0, 2e-6)))
     if kind == "one step":
         record = replace(record, steps=record.steps[:1])
     opened = open_page(interception_page([record]), 800)

@@ -49,9 +49,8 @@ class Solved:
             "least_sum_of_costs": least_sum_of_costs(self.encounter),
             "least_greatest_excess": least_greatest_excess(self.encounter),
         }
-        tables = self.report.rendezvous.tables.model_copy(update={"name": name, "description": description})
-        rendezvous = replace(self.report.rendezvous, tables=tables)
-        axes = load_multipoint("service-3").tables.axes
+        rendezvous = replace(self.report.rendezvous, name=name, description=description)
+        axes = load_multipoint("service-3").axes
         return {
             "pareto": pareto_page(name, self.encounter, selections),
             "multipoint": multipoint_page(name, Scene(axes, self.tour, (0, 1, 2), self.path), 0.02),
@@ -64,7 +63,7 @@ class Solved:
 def solved() -> Solved:
     visits = load_multipoint("service-3")
     assert visits.times_s is not None
-    game = solve(load_pursuit("leo-pursuit").game())
+    game = solve(load_pursuit("leo-pursuit").game)
     return Solved(
         solve_encounter(load_pareto("pareto-2008").encounter),
         visits.tour,

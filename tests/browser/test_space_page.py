@@ -17,6 +17,7 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from infoset import InitialSet, Model
 from sim import Body, Record, fly_one
+from sim.scenario import of_model
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]
@@ -188,11 +189,13 @@ def test_two_long_flights_have_the_same_steps() -> None:
 def long_flight() -> Record:
     """A flight of 1200 steps with four impulses, a cut-off and images in a window."""
     scenario = load_scenario("asteroid-1997-space", ["angle_sensor.period_s=1.0"])
-    scenario = replace(scenario, body=Body(40.0), set_model=replace(scenario.set_model, step_s=1.0 / 12.0, sections=5))
+    scenario = replace(
+        scenario, body=Body(40.0), **of_model(replace(scenario.set_model, step_s=1.0 / 12.0, sections=5))
+    )
     sensor = replace(scenario.set_model.angle_sensor, period_s=1.0 / 12.0, first_image_s=90.0, last_image_s=2.0)
-    model = replace(scenario.set_model, angle_sensor=sensor, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    model = replace(scenario.set_model, angle_sensor=sensor, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
     thruster = replace(scenario.thruster, impulses_s=(60.0, 30.0, 15.0, 8.0), last_impulse_s=8.0)
-    return fly_one(replace(scenario, set_model=model, thruster=thruster, range_sensor=None))
+    return fly_one(replace(scenario, **of_model(model), thruster=thruster, range_sensor=None))
 
 
 def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screenshots: Path) -> None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 
-_STEPS = "--set guidance.step_s={0} --set angle_sensor.period_s={0}"
+_STEPS = "--set step_s={0} --set angle_sensor.period_s={0}"
 REDUCED = (
     (r"^infoset experiment\b(?!.* --runs)", "infoset experiment --runs 2"),
     (r"--runs \d+", "--runs 2"),
@@ -50,7 +50,7 @@ SLOW = (
     r"^infoset (pursuit leo-pursuit|multipoint asteroid-tour)\b",
     r"^infoset multipoint .*--(order|times) best\b",
     r"^infoset reach\b",
-    r"^infoset replay .*--(gif|mp4)\b",
+    r"^infoset replay .*--gif\b",
     # Figures take seconds; quick lines draw those of `experiment` and `replay`.
     r"^infoset (pareto|multipoint|pursuit)\b.* --out\b",
     r"^infoset engage (?!.* --record\b).* --out\b",

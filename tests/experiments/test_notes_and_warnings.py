@@ -15,6 +15,8 @@ from experiments.interception.scenario_file import scenario_warnings
 from guidance import Thruster
 from sim.closed_form import possible_miss_of
 from sim.requirement import parse_requirement
+from sim.scenario import of_model
+from tests.built_in import problem_text, scenario_text
 from tests.experiments.command_line import Command
 
 
@@ -62,12 +64,12 @@ def test_a_schedule_without_impulses_names_the_key_to_change(thruster: dict[str,
         engine.impulse_steps(100.0, 10.0)
 
 
-def test_a_template_is_printed_on_stdout(infoset: Command, tmp_path: Path) -> None:
+@pytest.mark.parametrize("noun", ["scenarios", "problems"])
+def test_a_new_file_is_printed_on_stdout(noun: str, infoset: Command, tmp_path: Path) -> None:
     """It was written into a file called '-'."""
-    for command in (("scenarios", "new"), ("problems", "new", "multipoint")):
-        code, out, err = infoset(*command, "-")
-        assert (code, err) == (0, "")
-        assert "schema = 1" in out
+    code, out, err = infoset(noun, "new", "-", *(("--like", "service-2") if noun == "problems" else ()))
+    assert (code, err) == (0, "")
+    assert out == (problem_text("service-2") if noun == "problems" else scenario_text("own-scenario"))
     assert not [*tmp_path.iterdir()]
 
 
@@ -82,7 +84,7 @@ def test_the_closed_form_is_not_that_of_a_camera_that_loses_images() -> None:
     scenario = load_scenario("dart-2022")
     lossy = replace(scenario.set_model.angle_sensor, miss_probability=0.5)
     with pytest.raises(ValueError, match="loses no image"):
-        possible_miss_of(replace(scenario, set_model=replace(scenario.set_model, angle_sensor=lossy)))
+        possible_miss_of(replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=lossy))))
 
 
 def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,7 +95,7 @@ def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str], monkeyp
     assert capsys.readouterr().err == "progress: patient 50 %, kalman 0 %\n"
 
 
-LONG_STEPS = ("--set", "guidance.step_s=30", "--set", "angle_sensor.period_s=30")
+LONG_STEPS = ("--set", "step_s=30", "--set", "angle_sensor.period_s=30")
 """A third of the steps of haiv-2013."""
 
 

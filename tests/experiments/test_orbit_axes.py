@@ -43,13 +43,10 @@ def test_output_and_pages_state_the_axes(
 
 
 @pytest.mark.parametrize("command", ["reach", "multipoint", "pareto", "pursuit"])
-def test_help_and_templates_state_the_axes(infoset: Infoset, tmp_path: Path, command: str) -> None:
+def test_help_states_the_axes(infoset: Infoset, command: str) -> None:
     code, out, _ = infoset(command, "--help")
     assert code == 0
     assert HILL in " ".join(out.split())
-    assert infoset("problems", "new", command, "mine.toml")[0] == 0
-    template = " ".join((tmp_path / "mine.toml").read_text().replace("#", " ").split())
-    assert ("z along the planet's axis" if command == "pursuit" else HILL) in template
 
 
 @pytest.mark.parametrize(
@@ -76,16 +73,16 @@ def test_the_papers_axes() -> None:
 @pytest.mark.parametrize(
     ("arguments", "key"),
     [
-        (("reach", "rendezvous-2021", "--set", "orbit.semi_major_axis_km={}"), "orbit.semi_major_axis_km"),
+        (("reach", "rendezvous-2021", "--set", "orbit.semi_major_axis_km={}"), "orbit: semi_major_axis_m"),
         (("multipoint", "service-2", "--set", "orbit_rate_rad_s={rate}"), "orbit_rate_rad_s"),
         (("pareto", "pareto-2008", "--set", "orbit_rate_rad_s={rate}"), "orbit_rate_rad_s"),
-        (("pursuit", "leo-pursuit", "--set", "pursuer.semi_major_axis_km={}"), "pursuer.semi_major_axis_km"),
+        (("pursuit", "leo-pursuit", "--set", "pursuer.orbit.semi_major_axis_km={}"), "pursuer.orbit"),
         (
             (
                 *("multipoint", "asteroid-tour", "--set", "gravitational_parameter_km3_s2=398600.4418"),
-                *("--set", "chaser.elements=[{}, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"),
+                *("--set", "chaser.elements.semi_major_axis_km={}"),
             ),
-            "chaser.elements",
+            "chaser",
         ),
     ],
 )

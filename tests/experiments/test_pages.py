@@ -30,6 +30,7 @@ from guidance import NoiseKind
 from infoset import Convention, InitialSet, Model, RateSensor, Recovery
 from rendezvous.pursuit_evasion import solve
 from sim import Outcome, Record, fly_one
+from sim.scenario import of_model
 
 MOST_BYTES = 6_000_000
 
@@ -79,17 +80,17 @@ def flown(name: str) -> Record:
     scenario = load_scenario("asteroid-1997")
     model = scenario.set_model
     if name == "guaranteed":
-        sound = replace(model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-        return fly_one(replace(scenario, set_model=sound, rate_sensor=RateSensor(1.0, 2e-6)))
+        sound = replace(model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+        return fly_one(replace(scenario, **of_model(sound), rate_sensor=RateSensor(1.0, 2e-6)))
     if name == "space":
         space = load_scenario("asteroid-1997-space")
         sensor = replace(space.set_model.angle_sensor, convention=Convention.CONE)
-        sound = replace(space.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX, angle_sensor=sensor)
-        return fly_one(replace(space, set_model=sound, rate_sensor=RateSensor(1.0, 2e-6)))
+        sound = replace(space.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX, angle_sensor=sensor)
+        return fly_one(replace(space, **of_model(sound), rate_sensor=RateSensor(1.0, 2e-6)))
     if name == "game":
         return fly_one(replace(scenario, noise=NoiseKind.GAME))
     recovery = Recovery.NONE if name == "lost" else Recovery.WIDENED
-    return fly_one(replace(scenario, noise=NoiseKind.GAME, set_model=replace(model, recovery=recovery)), 2)
+    return fly_one(replace(scenario, noise=NoiseKind.GAME, **of_model(replace(model, recovery=recovery))), 2)
 
 
 @pytest.mark.parametrize("name", ["game", "guaranteed", "lost", "recovered", "space"])
@@ -121,8 +122,8 @@ def test_a_record_of_another_librarys_sets_is_refused(record: Record) -> None:
 def test_what_was_before_holds_what_is_after(kind: Model) -> None:
     scenario = load_scenario("asteroid-1997")
     initial = InitialSet.BOX if kind is Model.GUARANTEED else InitialSet.RECTANGLE
-    model = replace(scenario.set_model, kind=kind, initial_set=initial)
-    flown = fly_one(replace(scenario, set_model=model))
+    model = replace(scenario.set_model, model=kind, initial_set=initial)
+    flown = fly_one(replace(scenario, **of_model(model)))
     for each in list(replayed(flown))[:-1:20]:
         before = {section.label_m: section.polygon for section in each.before}
         for section in each.measured:
@@ -209,11 +210,11 @@ def test_colours_that_stand_together_can_be_told_apart_by_the_colour_blind(theme
 def _visits() -> str:
     problem = load_multipoint("service-5")
     path = problem.tour.fly((0, 2, 1, 3, 4), np.array([1800.0, 3600.0, 6000.0, 8700.0, 11000.0]))
-    return multipoint_page("visits", Scene(problem.tables.axes, problem.tour, (0, 2, 1, 3, 4), path))
+    return multipoint_page("visits", Scene(problem.axes, problem.tour, (0, 2, 1, 3, 4), path))
 
 
 def _pursuit() -> str:
-    return pursuit_page("pursuit", "", solve(load_pursuit("geo-pursuit").game()))
+    return pursuit_page("pursuit", "", solve(load_pursuit("geo-pursuit").game))
 
 
 @pytest.mark.parametrize("draw", [_visits, _pursuit])

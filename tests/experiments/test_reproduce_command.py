@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -10,24 +11,27 @@ from typing import Any
 
 import pytest
 
-from experiments.common.published_number import (
-    CUT_OR_ROUNDED,
+from experiments.common.printed_numbers import (
     Band,
+    Comparison,
     Origin,
+    Ours,
+    Paper,
+    PrintedNumber,
     Progress,
-    PublishedNumber,
-    Reference,
     Reproduction,
     Verdict,
     last_digit,
+    read_paper,
 )
-from experiments.interception.scenario_file import load_scenario, scenario_hash
+from experiments.interception.scenario_file import load_scenario
 from experiments.pareto import published as pareto
 from experiments.pareto.file import load_pareto
 from experiments.reproduced_numbers import PAPERS, reproduce_paper
+from sim.storage.codec import fingerprint
 
 Infoset = Callable[..., tuple[int, str, str]]
-REFERENCE = Reference("pareto")
+X = PrintedNumber("table 1", "x (m)", "1.25")
 
 
 def silent(_done: float) -> None:
@@ -46,11 +50,12 @@ def encounter() -> Reproduction:
     return reproduce_paper("pareto", silent)
 
 
-def only(*numbers: PublishedNumber) -> Callable[[str, Progress], Reproduction]:
+def only(*numbers: Comparison) -> Callable[[str, Progress], Reproduction]:
     """In place of the papers: one with these numbers."""
 
     def reproduced(name: str, _progress: Progress) -> Reproduction:
-        return Reproduction(name, "a paper", (("problem", "0" * 16),), numbers, ("A remark.",))
+        paper = Paper(name, "a paper", ("A remark.",), {})
+        return Reproduction(paper, (("problem", "0" * 16),), numbers)
 
     return reproduced
 
@@ -63,53 +68,71 @@ def test_the_last_digit_of_what_is_printed(text: str, unit: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ours", "options", "verdict"),
+    ("ours", "known", "verdict"),
     [
-        (1.254, {}, Verdict.AGREED),
-        (1.2551, {}, Verdict.DISAGREED),
-        (1.2551, {"unexplained": True}, Verdict.NOT_EXPLAINED),
-        (1.254, {"unexplained": True}, Verdict.AGREED),
-        (1.9, {"other": 1.254}, Verdict.EXPLAINED),
-        (1.254, {"other": 1.251}, Verdict.AGREED),
-        (1.9, {"other": 1.8}, Verdict.DISAGREED),
-        (1.9, {"other": 1.8, "unexplained": True}, Verdict.NOT_EXPLAINED),
-        (1.9, {"other": -1.251, "corrected": "-1.25"}, Verdict.MISPRINT),
-        (-1.251, {"other": 1.9, "corrected": "-1.25"}, Verdict.DISAGREED),
-        (None, {"other": 1.251}, Verdict.DISAGREED),
-        (1.2551, {"beyond": 0.01}, Verdict.AGREED),
-        (-1.251, {"corrected": "-1.25"}, Verdict.MISPRINT),
-        (1.251, {"corrected": "-1.25"}, Verdict.DISAGREED),
-        (1.9, {"corrected": "1.9", "unexplained": True}, Verdict.NOT_EXPLAINED),
-        (2.1, {"corrected": "1.9", "unexplained": True}, Verdict.DISAGREED),
-        (None, {"unexplained": True}, Verdict.DISAGREED),
-        (math.nan, {"unexplained": True}, Verdict.DISAGREED),
-        (math.inf, {"unexplained": True}, Verdict.DISAGREED),
+        (Ours(1.254), {}, Verdict.AGREED),
+        (Ours(1.2551), {}, Verdict.DISAGREED),
+        (Ours(1.2551), {"unexplained": math.inf}, Verdict.NOT_EXPLAINED),
+        (Ours(1.269), {"unexplained": 2.0}, Verdict.NOT_EXPLAINED),
+        (Ours(1.271), {"unexplained": 2.0}, Verdict.DISAGREED),
+        (Ours(1.254), {"unexplained": math.inf}, Verdict.AGREED),
+        (Ours(1.9, other=1.254), {}, Verdict.EXPLAINED),
+        (Ours(1.254, other=1.251), {}, Verdict.AGREED),
+        (Ours(1.9, other=1.8), {}, Verdict.DISAGREED),
+        (Ours(1.9, other=1.8), {"unexplained": math.inf}, Verdict.NOT_EXPLAINED),
+        (Ours(1.9, other=-1.251), {"corrected": "-1.25"}, Verdict.MISPRINT),
+        (Ours(-1.251, other=1.9), {"corrected": "-1.25"}, Verdict.DISAGREED),
+        (Ours(None, other=1.251), {}, Verdict.DISAGREED),
+        (Ours(1.2551, beyond=0.01), {}, Verdict.AGREED),
+        (Ours(-1.251), {"corrected": "-1.25"}, Verdict.MISPRINT),
+        (Ours(1.251), {"corrected": "-1.25"}, Verdict.DISAGREED),
+        (Ours(1.4), {"agrees": (1.0, 1.4)}, Verdict.AGREED),
+        (Ours(1.41), {"agrees": (1.0, 1.4)}, Verdict.DISAGREED),
+        (Ours(None), {"unexplained": math.inf}, Verdict.DISAGREED),
+        (Ours(math.nan), {"unexplained": math.inf}, Verdict.DISAGREED),
+        (Ours(math.inf), {"unexplained": math.inf}, Verdict.DISAGREED),
+        (Ours(1.256), {"tolerance": 1.0}, Verdict.AGREED),
+        (Ours(1.256), {"tolerance": 0.5}, Verdict.DISAGREED),
     ],
 )
-def test_verdicts(ours: float | None, options: dict[str, Any], verdict: Verdict) -> None:
-    assert REFERENCE.number("table 1", "x (m)", "1.25", ours, **options).verdict is verdict
+def test_verdicts(ours: Ours, known: dict[str, Any], verdict: Verdict) -> None:
+    assert Comparison(replace(X, **known), ours).verdict is verdict
 
 
 @pytest.mark.parametrize(("printed", "verdict"), [("5.7", Verdict.AGREED), ("5.9", Verdict.DISAGREED)])
 def test_one_printed_run_must_lie_among_ours(printed: str, verdict: Verdict) -> None:
-    spread = Band(0.1, 5.8)
-    number = PublishedNumber("interception", "one run", "miss (m)", printed, 1.5, spread, spread=spread)
+    number = Comparison(replace(X, printed=printed), Ours(1.5, spread=Band(0.1, 5.8)))
     assert number.verdict is verdict
 
 
-def test_a_paper_that_cuts_off_leaves_a_whole_digit() -> None:
-    cut = Reference("pareto", CUT_OR_ROUNDED).number("section 3", "alpha_0 (m)", "36.7", 36.756)
-    assert cut.verdict is Verdict.AGREED
-    assert REFERENCE.number("section 3", "alpha_0 (m)", "36.7", 36.756).verdict is Verdict.DISAGREED
+@pytest.mark.parametrize("name", PAPERS)
+def test_the_file_of_a_paper(name: str) -> None:
+    """No name stands twice, digits are numbers, and a number that may differ has the reason."""
+    paper = read_paper(name)
+    assert paper.title
+    numbers = [number for numbers in paper.tables.values() for number in numbers]
+    assert len({(number.source, number.name) for number in numbers}) == len(numbers)
+    for number in numbers:
+        assert last_digit(number.printed) > 0.0
+        assert number.corrected is None or last_digit(number.corrected) > 0.0
+        assert number.note or (number.corrected is None and number.unexplained == 0.0), number.name
+
+
+def test_every_number_of_a_file_needs_one_of_ours() -> None:
+    paper = Paper("pareto", "a paper", (), {"table 1": (X, X)})
+    assert [each.ours.value for each in paper.compare({"table 1": [1.25, None]})] == [1.25, None]
+    with pytest.raises(ValueError, match="shorter"):
+        paper.compare({"table 1": [1.25]})
+    with pytest.raises(KeyError, match="table 1"):
+        paper.compare({})
 
 
 def test_the_pareto_numbers_follow_from_start_velocities_within_their_rounding(encounter: Reproduction) -> None:
-    found = [each for each in encounter.numbers if each.source.startswith("section 3, x(0)")]
+    found = [each for each in encounter.numbers if each.number.source.startswith("section 3, x(0)")]
     assert len(found) == 9
-    assert all(each.ours is not None and abs(each.ours - float(each.printed)) < 0.5e-4 for each in found)
+    assert all(abs((each.ours.value or math.inf) - each.number.value) < 0.5e-4 for each in found)
     assert encounter.count(Verdict.DISAGREED) == 0
-    off = [each for each in encounter.numbers if each.verdict is Verdict.NOT_EXPLAINED]
-    assert len(off) == 3
+    assert encounter.count(Verdict.NOT_EXPLAINED) == 3
     assert len(encounter.numbers) > 140
 
 
@@ -117,11 +140,11 @@ def test_the_printed_start_velocities_alone_do_not_give_the_last_digits(monkeypa
     monkeypatch.setattr(pareto, "_STEPS", 0)
     rounded = reproduce_paper("pareto", silent)
     assert rounded.count(Verdict.DISAGREED) > 40
-    table = [each for each in rounded.numbers if each.source == "table" and "e" not in each.printed]
+    table = [each for each in rounded.numbers if each.number.source == "table" and "e" not in each.number.printed]
     # Theory: but for 4e-4 m they give the table's positions.
     for each in table:
-        assert each.ours is not None
-        assert each.ours in Band.of_digits(each.printed, 0.5, 4e-4), each.name
+        assert each.ours.value is not None
+        assert each.ours.value in Band.of_digits(each.number.printed, 0.5, 4e-4), each.number.name
 
 
 def test_json_of_one_paper(infoset: Infoset, tmp_path: Path) -> None:
@@ -132,7 +155,7 @@ def test_json_of_one_paper(infoset: Infoset, tmp_path: Path) -> None:
     assert found["version"] == version("infoset")
     (paper,) = found["papers"]
     assert paper["paper"] == "pareto"
-    assert paper["problems"] == [{"name": "pareto-2008", "hash": load_pareto("pareto-2008").hash}]
+    assert paper["problems"] == [{"name": "pareto-2008", "hash": fingerprint(load_pareto("pareto-2008"))}]
     assert sum(paper["verdicts"].values()) == len(paper["numbers"])
     by_name = {each["name"]: each for each in paper["numbers"]}
     first = by_name["first, x_3(10) (m)"]
@@ -148,7 +171,7 @@ def test_json_of_one_paper(infoset: Infoset, tmp_path: Path) -> None:
 
 
 def test_json_alone_and_quiet(infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    right = REFERENCE.number("table 1", "x (m)", "1.25", 1.2501)
+    right = Comparison(X, Ours(1.2501))
     monkeypatch.setattr("experiments.reproduced_numbers.reproduce_paper", only(right))
     code, out, err = infoset("--json", "-")
     assert code == 0
@@ -162,9 +185,7 @@ def test_json_alone_and_quiet(infoset: Infoset, tmp_path: Path, monkeypatch: pyt
 def test_a_number_that_should_agree_and_does_not(
     ours: float | None, infoset: Infoset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right, wrong = (
-        REFERENCE.number("table 1", name, "1.25", value) for name, value in (("x (m)", 1.25), ("y (m)", ours))
-    )
+    right, wrong = Comparison(X, Ours(1.25)), Comparison(replace(X, name="y (m)"), Ours(ours))
     monkeypatch.setattr("experiments.reproduced_numbers.reproduce_paper", only(right, wrong))
     code, out, err = infoset("--paper", "reachability", "--json", "-", "-q")
     assert code == 1
@@ -179,14 +200,14 @@ def test_printed_numbers_other_computations_and_our_spread_are_apart(
     infoset: Infoset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each origin has its own table with its own titles, and no digit is cut on a screen of 60 columns."""
-    spread = Band(0.067, 4.98)
-    run = PublishedNumber("pareto", "one run", "random, miss (m)", "4.3", 1.5, spread, unexplained=True, spread=spread)
-    numbers = (
-        REFERENCE.number("table 1", "a rather long name of a number (m^2/s^3)", "-1.2345678901e-7", -1.2345678901e-7),
-        run,
-        Reference("pareto", origin=Origin.OTHER).number("figure 4", "miss (m)", "1.2", 1.21),
-        Reference("pareto", origin=Origin.EXACT).number("cubic spline", "I", "41.076923077", 41.0769230769),
-    )
+    long, digits = "a rather long name of a number (m^2/s^3)", "-1.2345678901e-7"
+    rows = [
+        (PrintedNumber("table 1", long, digits), Ours(float(digits))),
+        (PrintedNumber("one run", "random, miss (m)", "4.3"), Ours(1.5, spread=Band(0.067, 4.98))),
+        (PrintedNumber("figure 4", "miss (m)", "1.2", origin=Origin.OTHER), Ours(1.21)),
+        (PrintedNumber("cubic spline", "I", "41.076923077", origin=Origin.EXACT), Ours(41.0769230769)),
+    ]
+    numbers = [Comparison(number, ours) for number, ours in rows]
     monkeypatch.setattr("experiments.reproduced_numbers.reproduce_paper", only(*numbers))
     monkeypatch.setenv("COLUMNS", "60")
     code, out, _ = infoset("--paper", "pareto")
@@ -240,7 +261,7 @@ def test_reachability_tables_stand_as_the_theory_says() -> None:
         Verdict.NOT_EXPLAINED: 3,
         Verdict.DISAGREED: 0,
     }
-    by_name = {(each.source, each.name): each for each in found.numbers}
+    by_name = {(each.number.source, each.number.name): each for each in found.numbers}
     # Misprints of tables 1 to 3.
     for source, name in (
         ("table 1", "linear x5(3) (m/s)"),
@@ -254,22 +275,23 @@ def test_reachability_tables_stand_as_the_theory_says() -> None:
         ("table 3", "linear x3(2) (m)"),
     ):
         assert by_name[source, name].verdict is Verdict.MISPRINT, name
-    controls = [each for each in found.numbers if each.source == "table 1" and each.name.startswith("u")]
+    controls = [each for each in found.numbers if each.number.source == "table 1" and each.number.name[0] == "u"]
     assert [each.verdict for each in controls] == [Verdict.AGREED] * 12
     for table in (1, 2, 3):
         miss = by_name[f"table {table}", "nonlinear, norm of x(4)"]
         assert miss.verdict is Verdict.NOT_EXPLAINED
-        assert miss.ours is not None
-        assert miss.ours < 3.0
+        assert miss.ours.value is not None
+        assert miss.ours.value < 3.0
     assert by_name["table 2", "linear x2(2) (m)"].band.highest > -1343.0
     assert by_name["table 1", "linear x1(2) (m)"].band == Band.of_digits("937.24", 0.5)
 
 
 def test_numbers_of_another_model_have_a_column(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> None:
+    circle = replace(X, note="a circle")
     numbers = (
-        REFERENCE.number("table 1", "x (m)", "1.25", 1.9, other=1.2512, note="a circle"),
-        REFERENCE.number("table 1", "y (m)", "1.25", 1.25),
-        REFERENCE.number("table 1", "z (m)", "1.25", 1.9, other=1.35, corrected="1.35", note="a circle"),
+        Comparison(circle, Ours(1.9, other=1.2512)),
+        Comparison(replace(X, name="y (m)"), Ours(1.25)),
+        Comparison(replace(circle, name="z (m)", corrected="1.35"), Ours(1.9, other=1.35)),
     )
     monkeypatch.setattr("experiments.reproduced_numbers.reproduce_paper", only(*numbers))
     code, out, _ = infoset("--paper", "pareto")
@@ -294,7 +316,7 @@ def test_the_whole_run(infoset: Infoset) -> None:
     assert all(each["verdicts"]["disagreed"] == 0 for each in papers.values())
     assert [each["verdicts"]["not explained"] for each in papers.values()] == [2, 3, 0, 3, 0]
     single = load_scenario("asteroid-1997-single")
-    assert papers["interception"]["problems"][0] == {"name": single.name, "hash": scenario_hash(single)}
+    assert papers["interception"]["problems"][0] == {"name": single.name, "hash": fingerprint(single)}
     unexplained = [each for each in papers["interception"]["numbers"] if each["verdict"] == "not explained"]
     assert [each["printed"] for each in unexplained] == ["244.7", "521.7"]
     misses = [each for each in papers["interception"]["numbers"] if each["printed"] in {"4.3", "9.5"}]

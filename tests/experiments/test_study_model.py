@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from experiments import load_scenario
-from experiments.interception.scenario_file import scenario_template, scenario_to_toml
+from experiments.common.input_file import to_toml
 from infoset import Model
 from sim import Scenario
 from sim.storage import read_manifest
@@ -22,13 +22,12 @@ VARY = (
     "thruster.greatest_impulse_m_s=2:8:2,thruster.least_impulse_m_s=0.1:0.2:2,angle_sensor.scale=1:2:2",
 )
 """Three keys, which have no figure."""
-OLD = Path(__file__).parents[1] / "data" / "first-format"
 
 
 def model_of(command: str, out: str, tmp_path: Path) -> str:
     """Model that a command reports."""
     if command in ("campaign", "sweep"):
-        return read_manifest(tmp_path / "runs").scenario.set_model.kind.value
+        return read_manifest(tmp_path / "runs").scenario.information_set.model.value
     return str(json.loads(out)["model"])
 
 
@@ -71,9 +70,8 @@ def test_experiment_and_engage_keep_the_model_of_the_file(infoset: Infoset, brie
 
 def test_a_new_scenario_has_the_guaranteed_model(infoset: Infoset, tmp_path: Path) -> None:
     assert infoset("scenarios", "new", "mine.toml")[0] == 0
-    assert load_scenario(tmp_path / "mine.toml").set_model.kind is Model.GUARANTEED
-    assert 'model = "guaranteed"' in scenario_template()
-    assert load_scenario("asteroid-1997").set_model.kind is Model.PAPER
+    assert load_scenario(tmp_path / "mine.toml").information_set.model is Model.GUARANTEED
+    assert load_scenario("asteroid-1997").information_set.model is Model.PAPER
 
 
 @pytest.mark.parametrize("command", ["campaign", "compare", "experiment"])
@@ -81,12 +79,12 @@ def test_a_scenario_outside_the_conditions_of_the_model_is_refused(
     infoset: Infoset, brief: Scenario, tmp_path: Path, command: str
 ) -> None:
     """`--model guaranteed` was a traceback here."""
-    text = scenario_to_toml(brief).replace("vx_km_s = [-58.0, -57.5]", "vx_km_s = [-130.0, -57.5]", 1)
+    text = to_toml(brief).replace("vx_m_s = [-58000.0, -57500.0]", "vx_m_s = [-130e3, -57.5e3]", 1)
     (tmp_path / "wide.toml").write_text(text)
     others = ("--runs", 2, *(("--out", "runs") if command == "campaign" else ()))
     code, _, err = infoset(command, "wide.toml", *others, "--model", "guaranteed")
     assert code == 2
-    assert err.startswith("error: brief with --model guaranteed: uncertainty.vx_km_s: must differ from")
+    assert err.startswith("error: brief with --model guaranteed: SetModel: the guaranteed model needs a closing speed")
     code, _, err = infoset(command, "wide.toml", *others)
     if command == "experiment":
         assert code == 0
@@ -100,11 +98,11 @@ def test_a_resumed_folder_keeps_its_model(infoset: Infoset, brief_file: Path, tm
     assert infoset(*asked, "--runs", 4, "--model", "paper")[0] == 0
     code, out, err = infoset(*asked, "--runs", 8, "--resume")
     assert (code, "model: " in err) == (0, False)
-    assert read_manifest(tmp_path / "runs").scenario.set_model.kind is Model.PAPER
+    assert read_manifest(tmp_path / "runs").scenario.information_set.model is Model.PAPER
     assert "8 runs" in out
     code, _, err = infoset(*asked, "--runs", 8, "--resume", "--model", "guaranteed")
     assert code == 2
-    assert 'scenario.set_model.kind: "paper" in the folder, "guaranteed" now' in err
+    assert 'scenario.information_set.model: "paper" in the folder, "guaranteed" now' in err
     code, _, err = infoset(*asked, "--runs", 8, "--resume", "--set", "information_set.model=guaranteed")
     assert code == 2
 
@@ -113,17 +111,9 @@ def test_a_folder_of_another_model_than_the_file_is_resumed(
     infoset: Infoset, brief: Scenario, brief_file: Path, tmp_path: Path
 ) -> None:
     asked = ("campaign", "mine.toml", "--chunk", 4, "--out", "runs")
-    text = scenario_to_toml(brief)
+    text = to_toml(brief)
     (tmp_path / "mine.toml").write_text(text.replace('"paper"', '"guaranteed"').replace('"rectangle"', '"box"'))
     assert infoset(*asked, "--runs", 4, "--model", "paper")[0] == 0
     code, _, err = infoset(*asked, "--runs", 8, "--resume")
     assert code == 0
     assert "model: paper, the model of the resumed folder; the scenario file has guaranteed\n" in err
-
-
-@pytest.mark.parametrize("kind", ["campaign", "sweep"])
-def test_a_report_of_an_old_folder(infoset: Infoset, kind: str) -> None:
-    code, out, err = infoset("report", OLD / kind)
-    assert (code, err) == (0, "")
-    assert "intercepted" not in out
-    assert "set-lost" not in out

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from experiments.cli import main
+from experiments.common.input_file import to_toml
 from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import scenario_to_toml
 from sim import Scenario
 from sim.storage import CampaignFolder
 
@@ -33,7 +33,7 @@ Infoset = Callable[..., Left]
 @pytest.fixture
 def file(brief: Scenario, tmp_path: Path) -> Path:
     path = tmp_path / "brief.toml"
-    path.write_text(scenario_to_toml(brief))
+    path.write_text(to_toml(brief))
     return path
 
 

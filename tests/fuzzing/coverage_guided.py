@@ -275,7 +275,7 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
         return type(axis)(axis.key, axis.values[:3], axis.scale)
 
     def mutate(content: bytes, draw: random.Random) -> bytes:
-        pieces = (b"log:", b"nan", b"1e-400:1e15:3", b"1e999", b"_", b"9" * 30, b":2", b",", b".least", b"0.0", b"-")
+        pieces = (b"log:", b"nan", b"1e-400:1e15:3", b"1e999", b"_", b"9" * 30, b":2", b",", b".min", b"0.0", b"-")
         text = content
         for _ in range(draw.choice((1, 2))):
             at = draw.randrange(len(text) + 1)
@@ -284,7 +284,7 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
 
     vary = EXAMPLE.removeprefix("--vary ")
     texts = [f"v{vary}", "vinformation_set.sections=log:5:50:3", "vthruster.budget_m_s=log:1:1000:4", "rmiss_m p99<10"]
-    texts += ["vuncertainty.x_km.least=5000:5300:2", "rmiss_m p99 ci<0.5", "rimpulse_m_s p50", "xphase_deg=-60:60:61"]
+    texts += ["vuncertainty.x_km.min=5000:5300:2", "rmiss_m p99 ci<0.5", "rimpulse_m_s p50", "xphase_deg=-60:60:61"]
     return parse, mutate, [text.encode() for text in [*texts, "sevader.thrust_N=5", "spursuer.mass_kg=2e3"]]
 
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from hypothesis import strategies as st
 
-from experiments.common.problem_file import EARTH_M3_S2, EARTH_RADIUS_M
-from experiments.pareto.file import COMPONENTS
+from experiments.common.problems import EARTH_M3_S2, EARTH_RADIUS_M
+from experiments.pareto.file import TERMINAL
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset.model import InitialSet, Model, Recovery
 from infoset.sensors import Bias, Convention, ErrorShape
@@ -80,6 +80,7 @@ def _angles_in_space(draw: st.DrawFn, error: float) -> Values:
 def _cameras(draw: st.DrawFn, error: float, threshold_m: float) -> Values:
     """Keys of a camera in place of the linear bound."""
     return {
+        "nominal_range_km": None,
         "error_at_nominal_range_rad": None,
         "error_at_zero_range_rad": None,
         "error_at_nominal_range_y_rad": None,
@@ -148,13 +149,13 @@ def scenarios(draw: st.DrawFn) -> str:
         "body": {"radius_m": range_km * draw(sizes(1e-9, 1e2))},
     }
     tables: dict[str, Values] = {
-        "nominal": {"range_km": range_km, "closing_speed_km_s": speed},
         "uncertainty": box,
         "dispersion": box,
         "angle_sensor": {
             "period_s": step_s,
             "error_at_nominal_range_rad": error,
             "error_at_zero_range_rad": min(error * slope, 0.9),
+            "nominal_range_km": range_km,
             **(draw(_angles_in_space(error)) if is_spatial else {}),
             **draw(st.just(NOTHING) | _cameras(error, threshold_km * 1e3)),
             **measured,
@@ -167,23 +168,27 @@ def scenarios(draw: st.DrawFn) -> str:
             "pointing_error_rad": draw(st.sampled_from([0.0, 0.01])) if is_spatial else None,
             **given,
         },
-        "guidance": {
-            "step_s": step_s,
-            "strategy": draw(st.sampled_from(strategy_names())),
-            "range_threshold_km": threshold_km,
-        },
         "information_set": {
             "model": (Model.GUARANTEED if guaranteed else Model.PAPER).value,
             "initial_set": draw(st.sampled_from(InitialSet)).value,
             "sections": sections,
             "fewest_sections": draw(st.integers(1, sections)),
             "recovery": draw(st.sampled_from(Recovery)).value,
+            "range_threshold_km": threshold_km,
             "disturbance_m_s2": draw(st.just(0.0) | sizes(1e-9, 1.0)),
             "disturbance_y_m_s2": draw(st.none() | sizes(1e-9, 1.0)) if is_spatial else None,
         },
-        "noise": {"kind": draw(st.sampled_from(NoiseKind)).value, "tie": draw(st.sampled_from(TieRule)).value},
     }
-    top = {"schema": 1, "name": "any", "description": draw(st.none() | st.just("One of many."))}
+    top = {
+        "name": "any",
+        "description": draw(st.none() | st.just("One of many.")),
+        "nominal_range_km": range_km,
+        "closing_speed_km_s": speed,
+        "step_s": step_s,
+        "strategy": draw(st.sampled_from(strategy_names())),
+        "noise": draw(st.sampled_from(NoiseKind)).value,
+        "tie": draw(st.sampled_from(TieRule)).value,
+    }
     return toml(top, tables | {name: rare[name] for name in optional})
 
 
@@ -192,7 +197,7 @@ def encounters(draw: st.DrawFn) -> str:
     """One to four craft that meet within 0.01 to 3 radians of the orbit."""
     rate, intercept = draw(sizes(1e-7, 7e-4)), draw(st.booleans())
     duration_s, size = draw(sizes(1e-2, 3.0)) / rate, draw(sizes(1e-2, 1e6))
-    names = [name for name in COMPONENTS if not (intercept and name.startswith("v"))]
+    names = [name for name in TERMINAL if not (intercept and name.startswith("v"))]
     free = draw(st.lists(st.sampled_from(names), min_size=1, max_size=3, unique=True))
     craft = [
         {
@@ -205,7 +210,6 @@ def encounters(draw: st.DrawFn) -> str:
         for place in range(draw(st.integers(1, 4)))
     ]
     top = {
-        "schema": 1,
         "kind": "pareto-encounter",
         "name": "any",
         "orbit_rate_rad_s": rate,
@@ -233,10 +237,8 @@ def tours(draw: st.DrawFn) -> str:
         for place in range(draw(st.integers(1, 3)))
     ]
     top = {
-        "schema": 1,
         "kind": "multipoint",
         "name": "any",
-        "axes": "hill",
         "orbit_rate_rad_s": rate,
         "eccentricity": draw(st.sampled_from([0.0, 0.0, 0.3])),
         "true_anomaly_deg": draw(angles(-360.0, 360.0)),
@@ -251,30 +253,33 @@ def pursuits(draw: st.DrawFn) -> str:
     """Two spacecraft on orbits of any size about bodies of any mass."""
     axis_km = draw(sizes(7e3, 1e6))
     top = {
-        "schema": 1,
         "kind": "pursuit-evasion",
         "name": "any",
-        "gravitational_parameter_km3_s2": draw(sizes(5e3, 1e12)),
-        "planet_radius_km": axis_km * draw(st.sampled_from([0.0, 0.1, 0.5])),
         "capture_radius_km": axis_km * draw(st.sampled_from([0.0, 1e-6])),
     }
-    players: dict[str, Values] = {}
+    gravity = {
+        "parameter_km3_s2": draw(sizes(5e3, 1e12)),
+        "planet_radius_km": axis_km * draw(st.sampled_from([0.0, 0.1, 0.5])),
+    }
+    tables: dict[str, Values] = {"gravity": gravity}
     thrusts = {"pursuer": 20.0, "evader": draw(st.sampled_from([0.0, 2.0, 15.0]))}
     for (name, thrust), farther in zip(thrusts.items(), (1.0, 1.4), strict=True):
         mass = draw(sizes(1.0, 1e6))
-        players[name] = {
+        tables[f"{name}.orbit"] = {
             "semi_major_axis_km": axis_km * farther * draw(st.floats(1.0, 1.1)),
             "eccentricity": draw(angles(0.0, 0.1)),
             "inclination_deg": draw(angles(0.0, 180.0)),
             "raan_deg": draw(angles(0.0, 360.0)),
             "argument_of_perigee_deg": draw(angles(0.0, 360.0)),
             "true_anomaly_deg": draw(angles(0.0, 360.0)),
+        }
+        tables[name] = {
             "mass_kg": mass,
             "dry_mass_kg": mass * draw(angles(0.0, 0.9)),
             "thrust_N": thrust * mass * 1e-3 * draw(sizes(0.1, 10.0)),
             "specific_impulse_s": draw(sizes(50.0, 5e3)),
         }
-    return toml(top, players)
+    return toml(top, tables)
 
 
 @st.composite
@@ -286,7 +291,6 @@ def rendezvous(draw: st.DrawFn) -> str:
     period_s, size = draw(sizes(1e-3, 0.5)) / rate, draw(sizes(1.0, 1e6))
     position = draw(vectors(size))
     top = {
-        "schema": 1,
         "kind": "reachable-rendezvous",
         "name": "any",
         "periods": draw(st.integers(2, 3)),
@@ -340,7 +344,7 @@ def observers(draw: st.DrawFn) -> str:
         "noise": {"half_width": [size * draw(st.sampled_from([0.0, 0.1, 3.0]))] * outputs},
         "simulation": {"steps": draw(st.integers(1, 4)), "missing": [1]},
     }
-    return toml({"schema": 1, "kind": "observer", "name": "any"}, tables)
+    return toml({"kind": "observer", "name": "any"}, tables)
 
 
 KINDS: Mapping[str, tuple[str, st.SearchStrategy[str]]] = {

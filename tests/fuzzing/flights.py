@@ -15,6 +15,7 @@ from infoset.sensors import Convention
 from sim import Body, Results, Scenario, Target
 from sim.draws import Draws, corners, greatest_number_of_steps
 from sim.engagement import Engagements, Step
+from sim.scenario import of_model
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def engagement(
     )
     sensor = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
     if camera:
-        sensor = AngleSensor.camera(step_s, error * angle_rad, 0.001999 * range_m, nominal_range_m=range_m)
+        sensor = AngleSensor.camera(step_s, error * angle_rad, 0.001999 * range_m)
     thruster, disturbance = Thruster(10.0 * v, 1e-3 * v, 0.2 * v), 0.01 * slope * speed_m_s**2 / range_m
     along_y = None
     if convention is not None:
@@ -73,26 +74,28 @@ def engagement(
         along_y = 0.5 * disturbance
     guaranteed = model is Model.GUARANTEED
     return Scenario(
-        "stress",
-        "",
-        None,
-        range_m,
-        bounds,
-        SetModel(
-            speed_m_s,
-            step_s,
-            bounds,
-            sensor,
-            disturbance,
-            0.02 * range_m,
-            sections,
-            min(5, sections),
-            InitialSet.BOX if guaranteed else InitialSet.RECTANGLE,
-            model,
-            disturbance_y_m_s2=along_y,
+        name="stress",
+        description="",
+        sun=None,
+        nominal_range_m=range_m,
+        dispersion=bounds,
+        **of_model(
+            SetModel(
+                speed_m_s,
+                step_s,
+                bounds,
+                sensor,
+                disturbance_m_s2=disturbance,
+                range_threshold_m=0.02 * range_m,
+                sections=sections,
+                fewest_sections=min(5, sections),
+                initial_set=InitialSet.BOX if guaranteed else InitialSet.RECTANGLE,
+                model=model,
+                disturbance_y_m_s2=along_y,
+            )
         ),
-        None,
-        thruster,
+        range_sensor=None,
+        thruster=thruster,
     )
 
 
@@ -163,7 +166,7 @@ def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
         scenario,
         sun=None if sun is None else replace(sun, direction_rad=-sun.direction_rad, elevation_rad=-sun.elevation_rad),
         dispersion=across(scenario.dispersion),
-        set_model=replace(scenario.set_model, bounds=across(scenario.set_model.bounds)),
+        **of_model(replace(scenario.set_model, bounds=across(scenario.set_model.bounds))),
         tie=swapped.get(scenario.tie, scenario.tie),
     )
     return image, replace(
@@ -195,20 +198,22 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
         scenario,
         nominal_range_m=length * scenario.nominal_range_m,
         dispersion=box(scenario.dispersion),
-        set_model=replace(
-            model,
-            closing_speed_m_s=speed * model.closing_speed_m_s,
-            step_s=time * model.step_s,
-            bounds=box(model.bounds),
-            angle_sensor=replace(
-                sensor,
-                period_s=time * sensor.period_s,
-                nominal_range_m=length * sensor.nominal_range_m,
-                centroid_error_m=None if sensor.centroid_error_m is None else length * sensor.centroid_error_m,
-            ),
-            disturbance_m_s2=acceleration * model.disturbance_m_s2,
-            disturbance_y_m_s2=in_units(model.disturbance_y_m_s2),
-            range_threshold_m=length * model.range_threshold_m,
+        **of_model(
+            replace(
+                model,
+                closing_speed_m_s=speed * model.closing_speed_m_s,
+                step_s=time * model.step_s,
+                bounds=box(model.bounds),
+                angle_sensor=replace(
+                    sensor,
+                    period_s=time * sensor.period_s,
+                    nominal_range_m=None if sensor.nominal_range_m is None else length * sensor.nominal_range_m,
+                    centroid_error_m=length * sensor.centroid_error_m,
+                ),
+                disturbance_m_s2=acceleration * model.disturbance_m_s2,
+                disturbance_y_m_s2=in_units(model.disturbance_y_m_s2),
+                range_threshold_m=length * model.range_threshold_m,
+            )
         ),
         thruster=replace(
             engine,

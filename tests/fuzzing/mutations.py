@@ -6,7 +6,7 @@ import random
 import re
 from collections.abc import Callable
 
-_VALUES = (
+VALUES = (
     *("nan", "inf", "-inf", "-1", "0", "-0.0", "1e999999999", "1e-999999999", "1e308", "1e15", "1e-100", "1e-300"),
     *("9" * 400, "0x7fffffffffffffffff", "true", '""', '"text"', '"\\u0000\\u001b[2J"', '"\\ud800"', "[]", "{}"),
     *("[[]]", "[nan, 1]", "[1, 2]", "[2, 1]", "[1, 2, 3]", "[1e15, -1e15, 1e-100]", "{a.b.c = 1}", "1979-05-27"),
@@ -15,7 +15,7 @@ _VALUES = (
 """Values of every type of TOML, and some of none."""
 
 _LINES = (
-    *("[target]", "[[target]]", "[sun]", "[[sun]]", "[[craft]]", "[[keep_in]]", "[]", "[a.b.c]", "schema = 2"),
+    *("[target]", "[[target]]", "[sun]", "[[sun]]", "[[craft]]", "[[keep_in]]", "[]", "[a.b.c]", "kind = 2"),
     *("kind = 3", "a" * 2000 + " = 1", ".".join("a" * 400) + " = 1", "'' = 1", '"\\u001b" = 1', "= 1", "\ufeff", "\r"),
 )
 
@@ -96,7 +96,7 @@ def _rename(lines: list[str], draw: random.Random) -> str:
 def _revalue(lines: list[str], draw: random.Random) -> str:
     at = draw.choice(_keys(lines))
     name, equals, _ = lines[at].partition("=")
-    return "\n".join([*lines[:at], f"{name}{equals} {draw.choice(_VALUES)}", *lines[at + 1 :]])
+    return "\n".join([*lines[:at], f"{name}{equals} {draw.choice(VALUES)}", *lines[at + 1 :]])
 
 
 def _renumber(lines: list[str], draw: random.Random) -> str:

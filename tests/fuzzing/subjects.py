@@ -15,19 +15,18 @@ from typing import Any, TypeVar
 import numpy as np
 
 from experiments.common.file_kinds import SCENARIO, built_in_files
-from experiments.common.toml_file import read_tables
+from experiments.common.input_file import read_text, to_toml
 from experiments.interception import record_file
-from experiments.interception.scenario_file import load_scenario, read_scenario, scenario_to_toml, scenario_warnings
-from experiments.multipoint.file import load_multipoint
-from experiments.observer.file import load_observer
-from experiments.pareto.file import load_pareto
-from experiments.pursuit.file import FORM as PURSUIT
-from experiments.pursuit.file import load_pursuit
-from experiments.reachability.file import load_rendezvous
+from experiments.interception.scenario_file import load_scenario, scenario_warnings
+from experiments.multipoint.file import MultipointProblem, load_multipoint
+from experiments.observer.file import ObserverProblem, load_observer
+from experiments.pareto.file import ParetoProblem, load_pareto
+from experiments.pursuit.file import PursuitProblem, load_pursuit
+from experiments.reachability.file import Rendezvous, load_rendezvous
 from infoset import AngleSensor, StateBox
 from sim import Campaign, CampaignNoise, Record, Scenario, fly_one
+from sim.scenario import of_model
 from sim.storage import CampaignFolder
-from tests.built_in import scenario_names, scenario_text
 
 Found = TypeVar("Found")
 
@@ -42,52 +41,35 @@ def attempted(read: Callable[[], Found], refusal: type[Exception]) -> tuple[Foun
 
 @dataclass(frozen=True)
 class TextFile:
-    """A kind of file that a person writes.
+    """A kind of file that a person writes: its dataclass, the built-in ones, and its loader."""
 
-    Parameters
-    ----------
-    texts : tuple of str
-        The built-in ones.
-    read : callable
-        Reads a file and asks all of it that costs little.
-    """
-
+    owner: type
     texts: tuple[str, ...]
-    read: Callable[[str], object]
+    load: Callable[[str], Any]
+
+    def read(self, path: str) -> object:
+        """Read a file, ask all of it that costs little, and write it again."""
+        found = self.load(path)
+        assert read_text(self.owner, to_toml(found), "written again") == found
+        if isinstance(found, Scenario):
+            scenario_warnings(found)
+        return found
 
 
 def text_files() -> Mapping[str, TextFile]:
     """Return the kinds of files that people write, by name."""
-    problems: dict[str, list[str]] = {}
-    for each in built_in_files().values():
-        if each.kind != SCENARIO:
-            problems.setdefault(each.kind, []).append(each.text)
-    readers: dict[str, Callable[[str], object]] = {
-        "pareto-encounter": load_pareto,
-        "multipoint": lambda path: load_multipoint(path).tour,
-        "observer": lambda path: load_observer(path).observer(),
-        "pursuit-evasion": _read_pursuit,
-        "reachable-rendezvous": load_rendezvous,
+    readers: dict[str, tuple[type, Callable[[str], Any]]] = {
+        SCENARIO: (Scenario, load_scenario),
+        "pareto-encounter": (ParetoProblem, load_pareto),
+        "multipoint": (MultipointProblem, load_multipoint),
+        "observer": (ObserverProblem, load_observer),
+        "pursuit-evasion": (PursuitProblem, load_pursuit),
+        "reachable-rendezvous": (Rendezvous, load_rendezvous),
     }
-    kinds = {kind: TextFile(tuple(texts), readers[kind]) for kind, texts in problems.items()}
-    return {"scenario": TextFile(tuple(map(scenario_text, scenario_names())), _read_scenario), **kinds}
-
-
-def _read_scenario(path: str) -> Scenario:
-    scenario = load_scenario(path)
-    assert read_scenario(scenario_to_toml(scenario), "written again") == scenario
-    scenario_warnings(scenario)
-    return scenario
-
-
-def _read_pursuit(path: str) -> object:
-    problem = load_pursuit(path)
-    problem.warnings()
-    assert read_tables(PURSUIT, problem.toml, "written again") == problem.tables
-    try:
-        return problem.game()
-    except ValueError as error:  # what the core documents
-        return error
+    return {
+        kind: TextFile(owner, tuple(each.text for each in built_in_files().values() if each.kind == kind), load)
+        for kind, (owner, load) in readers.items()
+    }
 
 
 def small_record(scenario: str = "asteroid-1997") -> Record:
@@ -153,7 +135,7 @@ def small_campaign(folder: Path) -> CampaignFolder:
     box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
     sensor = AngleSensor(0.5, 0.00015, 0.00023, 595e3)
     model = replace(whole.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    brief = replace(whole, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
+    brief = replace(whole, name="brief", **of_model(model), dispersion=box, nominal_range_m=595e3)
     campaign = Campaign(brief, 20, folder, seed=5, noise=CampaignNoise.MIXED, chunk=12)
     return campaign.run(workers=1).folder
 

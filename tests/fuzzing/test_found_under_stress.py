@@ -12,6 +12,7 @@ from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateB
 from sim import Manoeuvre, Outcome, Scenario, Sun, Target
 from sim.draws import draw
 from sim.engagement import Engagements, Step
+from sim.scenario import of_model
 
 from .flights import engagement, fly, numbers
 
@@ -24,8 +25,28 @@ def hostile(
     """A flight from 1000 km without impulses."""
     box = StateBox((-z_m, z_m), (1e6, 1.01e6), (-vz_m_s, vz_m_s), (-speed_m_s * 1.000001, -speed_m_s * 0.999999))
     sensor = AngleSensor(step_s, at_nominal_rad, at_zero_rad, 1e6)
-    model = SetModel(speed_m_s, step_s, box, sensor, 0.0, 2e4, 5, 3, InitialSet.BOX, Model.GUARANTEED)
-    return Scenario("hostile", "", None, 1e6, box, model, None, Thruster(0.0, 1.0, 1.0))
+    model = SetModel(
+        speed_m_s,
+        step_s,
+        box,
+        sensor,
+        disturbance_m_s2=0.0,
+        range_threshold_m=2e4,
+        sections=5,
+        fewest_sections=3,
+        initial_set=InitialSet.BOX,
+        model=Model.GUARANTEED,
+    )
+    return Scenario(
+        name="hostile",
+        description="",
+        sun=None,
+        nominal_range_m=1e6,
+        dispersion=box,
+        **of_model(model),
+        range_sensor=None,
+        thruster=Thruster(0.0, 1.0, 1.0),
+    )
 
 
 def rising_error() -> Scenario:
@@ -40,7 +61,7 @@ def rate_and_manoeuvre() -> Scenario:
     scenario = hostile(1e3, 1e3, 25.0, 0.01, 0.01, vz_m_s=1.0)
     return replace(
         scenario,
-        set_model=replace(scenario.set_model, disturbance_m_s2=1e-3),
+        **of_model(replace(scenario.set_model, disturbance_m_s2=1e-3)),
         target=Target(Manoeuvre.CONSTANT, 1e-3),
         rate_sensor=RateSensor(25.0, 1e-9),
         noise=NoiseKind.GAME,

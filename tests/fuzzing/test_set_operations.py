@@ -25,9 +25,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Model, SetModel, StateBox, to_shapely
+from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
-from infoset.shapes import from_shapely
 
 some = settings(max_examples=10, deadline=None)
 few = settings(max_examples=3, deadline=None)
@@ -167,7 +166,7 @@ def test_hulls_boxes_and_reductions_are_idempotent_and_outward(
     assert lies_in(polygon, box, 0.0)
     assert lies_in(polygon, polygon.add_segment(normal))
     assert lies_in(polygon.cut(normal, *band), polygon)
-    assert vertices(from_shapely(to_shapely(polygon))) == vertices(polygon)
+    assert vertices(ConvexPolygons.from_shapely(polygon.to_shapely())) == vertices(polygon)
     assert float(polygon.margin(polygon.centroid())) >= -ROUNDING
 
 
@@ -201,9 +200,19 @@ E, STEP, RANGE = 1000.0, 2.0, 100e3
 BOUNDS = StateBox((-2e3, 3e3), (90e3, 110e3), (-40.0, 30.0), (-1010.0, -990.0))
 SENSOR = AngleSensor(STEP, 0.002, 0.003, RANGE)
 SOUND = SetModel(
-    E, STEP, BOUNDS, SENSOR, 0.05, 2e3, 5, 1, InitialSet.BOX, Model.GUARANTEED, execution_error_relative=0.02
+    E,
+    STEP,
+    BOUNDS,
+    SENSOR,
+    disturbance_m_s2=0.05,
+    range_threshold_m=2e3,
+    sections=5,
+    fewest_sections=1,
+    initial_set=InitialSet.BOX,
+    model=Model.GUARANTEED,
+    execution_error_relative=0.02,
 )
-PAPER = replace(SOUND, kind=Model.PAPER)
+PAPER = replace(SOUND, model=Model.PAPER)
 MODEL = st.sampled_from([SOUND, PAPER])
 PART = st.floats(-1.0, 1.0)
 LABEL = st.floats(91e3, 109e3)

@@ -26,11 +26,12 @@ from guidance import (
 )
 from guidance.estimate import independent_error_rad
 from guidance.scripted_noise import ScriptedNoise
-from infoset import AngleSensor, Bias, InformationSet, RangeSensor, SetModel, StateBox
+from infoset import AngleSensor, Bias, InformationSet, Model, RangeSensor, SetModel, StateBox
 from infoset.arrays import Flags, Floats
 from infoset.sensor import Sensor
 from sim.draws import draw
 from sim.engagement import Engagements
+from sim.scenario import of_model
 
 E = 6e3
 """Closing speed, m/s."""
@@ -45,7 +46,15 @@ def set_model(sensor: AngleSensor, nu: float = 0.0, width_m: float = 1e5, range_
     box = StateBox(
         (-width_m, width_m), (E * T - range_error_m, E * T + range_error_m), (-width_m / T, width_m / T), (-E, -E)
     )
-    return SetModel(E, 10.0, box, sensor, nu, range_threshold_m=10.0 * (sensor.centroid_error_m or 0.0))
+    return SetModel(
+        E,
+        10.0,
+        box,
+        sensor,
+        disturbance_m_s2=nu,
+        range_threshold_m=10.0 * sensor.centroid_error_m,
+        model=Model.PAPER,
+    )
 
 
 MODEL = set_model(AngleSensor.camera(10.0, 1e-5))
@@ -475,7 +484,7 @@ def test_a_mission_with_a_camera_a_schedule_and_a_delay(name: str) -> None:
     camera = AngleSensor.camera(0.5, 1e-4, 20.0, bias=Bias.CONSTANT, miss_probability=0.3, last_image_s=4.0)
     engine = Thruster(1e4, 0.0, 1e3, impulses_s=(75.0, 30.0, 8.0), delay_steps=2)
     scenario = replace(
-        scenario, set_model=replace(scenario.set_model, angle_sensor=camera), range_sensor=None, thruster=engine
+        scenario, **of_model(replace(scenario.set_model, angle_sensor=camera)), range_sensor=None, thruster=engine
     )
     given: list[int] = []
     flight = Engagements(scenario, draw(scenario, range(6), 1), make_strategy(name))

@@ -18,6 +18,7 @@ from guidance.least_effort import LeastEffort, balanced, unavoidable_m
 from infoset import InitialSet, Model
 from infoset.arrays import Floats
 from sim import Scenario, find_worst, lower_bound, simulate
+from sim.scenario import of_model
 
 LINES = st.lists(st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.0, 100.0)), min_size=1, max_size=30)
 
@@ -26,8 +27,8 @@ LINES = st.lists(st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats
 def guaranteed() -> Scenario:
     """The engagement of 1997 without the range sensor, in the guaranteed model."""
     asteroid = replace(load_scenario("asteroid-1997"), range_sensor=None)
-    model = replace(asteroid.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    return replace(asteroid, set_model=model, dispersion=model.bounds)
+    model = replace(asteroid.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    return replace(asteroid, **of_model(model), dispersion=model.bounds)
 
 
 @settings(deadline=None)

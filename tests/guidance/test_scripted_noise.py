@@ -13,7 +13,7 @@ from guidance import GameNoise, LineOfSight
 from guidance.game_noise import SwitchingNoise
 from guidance.noise import TieRule
 from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
-from infoset import AngleSensor, InformationSet, RangeSensor, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, InformationSet, Model, RangeSensor, RateSensor, SetModel, StateBox
 from infoset.sensor import Sensor
 
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
@@ -23,6 +23,7 @@ MODEL = SetModel(
     bounds=StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3)),
     angle_sensor=SENSOR,
     disturbance_m_s2=0.005,
+    model=Model.PAPER,
 )
 ROUNDING = 4 * np.finfo(float).eps
 

@@ -22,6 +22,7 @@ from infoset import (
     ExtremePoints,
     InformationSet,
     InformationSetView,
+    Model,
     PredictedMiss,
     RangeSensor,
     RateSensor,
@@ -35,7 +36,9 @@ BATCH = 4
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
 METER, RATE = RangeSensor(0.5, 0.05), RateSensor(0.5, 1e-6)
 BOX = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3), (-10e3, 10e3), (-100.0, 100.0))
-MODEL = SetModel(closing_speed_m_s=58e3, step_s=0.5, bounds=BOX, angle_sensor=SENSOR, disturbance_m_s2=0.005)
+MODEL = SetModel(
+    closing_speed_m_s=58e3, step_s=0.5, bounds=BOX, angle_sensor=SENSOR, disturbance_m_s2=0.005, model=Model.PAPER
+)
 KINDS = [
     (Convention.PLANE, ErrorShape.BOX),
     (Convention.PLANE, ErrorShape.DISC),

@@ -36,6 +36,7 @@ from infoset import (
     Convention,
     ErrorShape,
     InformationSet,
+    Model,
     RangeSensor,
     RateSensor,
     SetModel,
@@ -45,12 +46,13 @@ from infoset.arrays import Floats
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
+from sim.scenario import of_model
 
 BATCH = 3
 ALL = np.ones(BATCH, dtype=bool)
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
 BOX = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3), (-8e3, 6e3), (-50.0, 80.0))
-MODEL = SetModel(58e3, 0.5, BOX, SENSOR, disturbance_m_s2=0.005, disturbance_y_m_s2=0.002)
+MODEL = SetModel(58e3, 0.5, BOX, SENSOR, disturbance_m_s2=0.005, disturbance_y_m_s2=0.002, model=Model.PAPER)
 IDLE = replace(
     MODEL,
     bounds=replace(BOX, y_m=(0.0, 0.0), vy_m_s=(0.0, 0.0)),
@@ -270,7 +272,7 @@ def space(**sensor: Any) -> Scenario:
     scenario = load_scenario("asteroid-1997-space")
     model = scenario.set_model
     model = replace(model, angle_sensor=replace(model.angle_sensor, **sensor))
-    return replace(scenario, set_model=model, range_sensor=None)
+    return replace(scenario, **of_model(model), range_sensor=None)
 
 
 @pytest.mark.parametrize("name", strategy_names())
@@ -368,11 +370,15 @@ def test_an_engagement_without_uncertainty_along_y_is_the_planar_one(noise: Nois
     model, idle = plane.set_model, {"y_m": (0.0, 0.0), "vy_m_s": (0.0, 0.0)}
     space = replace(
         plane,
-        set_model=replace(
-            model,
-            bounds=replace(model.bounds, **idle),
-            angle_sensor=replace(model.angle_sensor, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0),
-            disturbance_y_m_s2=0.0,
+        **of_model(
+            replace(
+                model,
+                bounds=replace(model.bounds, **idle),
+                angle_sensor=replace(
+                    model.angle_sensor, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0
+                ),
+                disturbance_y_m_s2=0.0,
+            )
         ),
         dispersion=replace(plane.dispersion, **idle),
     )

@@ -25,7 +25,7 @@ from guidance.authority import correctable_later_m
 from guidance.estimate import MissEstimate
 from guidance.kalman import KalmanBank
 from guidance.least_squares import LeastSquaresFit
-from infoset import AngleSensor, ExtremePoints, InformationSet, PredictedMiss, RangeSensor, SetModel, StateBox
+from infoset import AngleSensor, ExtremePoints, InformationSet, Model, PredictedMiss, RangeSensor, SetModel, StateBox
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
@@ -38,6 +38,7 @@ MODEL = SetModel(
     step_s=0.5,
     bounds=StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3)),
     angle_sensor=AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3),
+    model=Model.PAPER,
 )
 
 

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from infoset import ConvexPolygons, to_shapely
-from infoset.shapes import from_shapely
+from infoset import ConvexPolygons
 
 SHAPES = [(), (3,), (2, 3), (0,)]
 
@@ -355,10 +354,10 @@ def test_from_points_of_a_degenerate_set(points: list[tuple[float, float]], want
     ],
 )
 def test_shapely_round_trip(polygon: ConvexPolygons, kind: str) -> None:
-    geometry = to_shapely(polygon)
+    geometry = polygon.to_shapely()
     assert geometry.geom_type == kind
     assert geometry.is_empty == polygon.is_empty
-    back = from_shapely(geometry)
+    back = ConvexPolygons.from_shapely(geometry)
     assert back.shape == ()
     assert back.counts == polygon.counts
     if polygon.counts:
@@ -368,12 +367,12 @@ def test_shapely_round_trip(polygon: ConvexPolygons, kind: str) -> None:
 
 def test_from_shapely_orients_and_refuses() -> None:
     clockwise = shapely.Polygon([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])
-    assert from_shapely(clockwise).area() == 1.0
+    assert ConvexPolygons.from_shapely(clockwise).area() == 1.0
     with pytest.raises(ValueError, match="not convex"):
-        from_shapely(shapely.Polygon([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)]))
+        ConvexPolygons.from_shapely(shapely.Polygon([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)]))
     with pytest.raises(ValueError, match="single segment"):
-        from_shapely(shapely.LineString([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]))
+        ConvexPolygons.from_shapely(shapely.LineString([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]))
     with pytest.raises(ValueError, match="is needed: got MultiPoint"):
-        from_shapely(shapely.MultiPoint([(0.0, 0.0), (1.0, 0.0)]))
+        ConvexPolygons.from_shapely(shapely.MultiPoint([(0.0, 0.0), (1.0, 0.0)]))
     with pytest.raises(ValueError, match="choose one with an index"):
-        to_shapely(boxes((3,)))
+        boxes((3,)).to_shapely()

@@ -23,7 +23,7 @@ from infoset import (
 E, STEP = 58e3, 0.5
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
 KNOWN = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3))
-MODEL = SetModel(E, STEP, KNOWN, SENSOR, disturbance_m_s2=0.005, range_threshold_m=5e3)
+MODEL = SetModel(E, STEP, KNOWN, SENSOR, disturbance_m_s2=0.005, range_threshold_m=5e3, model=Model.PAPER)
 
 
 def flown(model: SetModel, steps: int, seed: int = 0, batch: int = 1) -> InformationSet:
@@ -281,7 +281,7 @@ def test_a_view_follows_the_set_and_a_copy_does_not() -> None:
 @pytest.mark.parametrize("recovery", list(Recovery))
 def test_a_copy_of_a_view_goes_on_as_the_set_does(recovery: Recovery) -> None:
     """Labels have left, then comes a contradiction: what has left decides what becomes of the set."""
-    information = InformationSet(replace(MODEL, kind=Model.GUARANTEED, initial_set=InitialSet.BOX, recovery=recovery))
+    information = InformationSet(replace(MODEL, model=Model.GUARANTEED, initial_set=InitialSet.BOX, recovery=recovery))
     while not information.guaranteed_miss()[1].any():
         information.drop_below_threshold()
         information.predict()

@@ -19,6 +19,7 @@ from infoset import (
     Estimate,
     InformationSet,
     LinearObserver,
+    Model,
     SetModel,
     StateBox,
     Zonotope,
@@ -436,7 +437,9 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
         error_at_zero_range_rad=2.3e-4,
         nominal_range_m=5.8e6,
     )
-    information = InformationSet(SetModel(58e3, step_s, box, sensor, disturbance_m_s2=limit, sections=5))
+    information = InformationSet(
+        SetModel(58e3, step_s, box, sensor, disturbance_m_s2=limit, sections=5, model=Model.PAPER)
+    )
     rng = np.random.default_rng(1)
     angles = (300.0 + 20.0 * step_s * np.arange(15)) / (5.8e6 - 58e3 * step_s * np.arange(15))
     angles += rng.uniform(-1.5e-4, 1.5e-4, 15)

@@ -18,7 +18,7 @@ import shapely
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from infoset import ConvexPolygons, to_shapely
+from infoset import ConvexPolygons
 from tests.rationals import Fraction
 
 U = Fraction(1, 2**53)
@@ -717,7 +717,7 @@ ROUND = st.lists(st.integers(0, 359), min_size=4, max_size=9, unique=True).map(
 @given(ROUND, ROUND, st.floats(0.0, 6.0), st.floats(-0.5, 0.5))
 def test_shapely_agrees(first: ConvexPolygons, second: ConvexPolygons, angle: float, level: float) -> None:
     assume(first.area() > 0.1 and second.area() > 0.1)
-    left, right = to_shapely(first), to_shapely(second)
+    left, right = first.to_shapely(), second.to_shapely()
     assert first.area() == pytest.approx(left.area, rel=1e-12)
     assert first.centroid() == pytest.approx(np.array(left.centroid.coords[0]), abs=1e-12)
     c, s = math.cos(angle), math.sin(angle)

@@ -599,21 +599,6 @@ def test_operators_and_other_dimensions() -> None:
     assert len(axes.patches) == 1
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        (lambda p: p.clip((1.0, 0.0), 0.2, 0.5), lambda p: p.cut((1.0, 0.0), 0.2, 0.5)),
-        (lambda p: p.support((1.0, 0.5)), lambda p: p.support_function((1.0, 0.5))),
-        (lambda p: p.box((0.0, 1.0), (2.0, 3.0)), lambda p: p.from_box((0.0, 2.0), (1.0, 3.0))),
-    ],
-)
-def test_old_names_warn(old: Callable[[ConvexPolygons], Any], new: Callable[[ConvexPolygons], Any]) -> None:
-    square = ConvexPolygons.from_box((0.0, 0.0), (1.0, 1.0))
-    with pytest.deprecated_call():
-        got = old(square)
-    assert repr(got) == repr(new(square))
-
-
 def test_unusable_arguments_are_refused() -> None:
     square, empty = ConvexPolygons.from_box((0.0, 0.0), (1.0, 1.0)), ConvexPolygons.empty()
     with pytest.raises(ValueError, match="unbounded"):

@@ -19,7 +19,7 @@ VOCABULARY = {
     "vertices", "constraints", "area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter",
     "hausdorff_distance", "distance", "closest_point", "project", "slice", "sample", "reduce_outward", "plot",
     "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely", "to_shapely",
-    "margin", "empty", "box", "support",
+    "margin", "empty",
 }  # fmt: skip
 """The names of both classes."""
 
@@ -30,7 +30,6 @@ ONLY_POLYGONS = {
     "from_points": "from_vertices of a Polytope is a hull of points in any order; a ring has an order",
     "unchecked": "for arrays of kernels, which only polygons have",
     "add_segment": "the sum with a segment in O(n); a segment is also a Polytope of two vertices",
-    "clip": "old name",
 }
 ONLY_POLYTOPES = {
     **dict.fromkeys(["normals", "offsets", "across", "levels"], "stored facets and affine hull; polygons compute them"),
@@ -38,7 +37,6 @@ ONLY_POLYTOPES = {
     **dict.fromkeys(["relaxation", "needed"], "least relaxation of an empty set, known from linear programs"),
     "excess": "-margin; needed where no sign must change",
     "essential_vertices": "vertices that may be the same point; polygons decide this exactly",
-    **dict.fromkeys(["bounds", "from_halfspaces"], "old names"),
 }
 
 
@@ -302,5 +300,9 @@ def test_a_sum_with_a_set_of_another_class_names_the_class(sample: Any) -> None:
 
 def test_every_public_operation_is_in_the_table() -> None:
     without_arguments = {"area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter", "constraints"}
-    others = {"to_shapely", "vertices", "is_empty", "box", "support"}
+    others = {
+        "to_shapely",
+        "vertices",
+        "is_empty",
+    }
     assert VOCABULARY - without_arguments - others <= {name.split()[0] for name in OPERATIONS}

@@ -74,7 +74,7 @@ def test_bands_contain_the_truth_and_are_convex(
     # The falling bound must be positive up to the greatest distance.
     if min(sensor.error_bounds(np.array([3e7]))[..., 0].min(), sensor.error_bound(3e7)) < 0.0:
         sensor = replace(sensor, nominal_range_m=5.8e7)
-    model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, kind=Model.GUARANTEED)
+    model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
     least, greatest = model.label_limits_m
     label, elapsed_m = least + label_share * (greatest - least), 0.999 * flown * least
     x = label - elapsed_m
@@ -111,7 +111,7 @@ def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     if threshold_m >= 5e6:
         return
     model = SetModel(
-        58e3, 0.5, known, sensor, range_threshold_m=threshold_m, initial_set=InitialSet.BOX, kind=Model.GUARANTEED
+        58e3, 0.5, known, sensor, range_threshold_m=threshold_m, initial_set=InitialSet.BOX, model=Model.GUARANTEED
     )
     least, greatest = model.label_limits_m
     label = least + label_share * (greatest - least)
@@ -154,7 +154,7 @@ def test_a_direction_measured_beyond_a_right_angle_bounds_nothing_that_is_not_tr
 ) -> None:
     """Both measured angles may pass a right angle, where the cosines of the cone's bounds are negative."""
     sensor = AngleSensor(0.5, 0.1, 0.1, 5.8e6, convention=Convention.CONE)
-    model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, kind=Model.GUARANTEED)
+    model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
     angles = 1.5 + 0.07 * steep, 1.5 + 0.07 * other
     error = np.array([[np.cos(np.pi * turn)], [np.sin(np.pi * turn)]])
     label = 5.8e6

@@ -332,5 +332,3 @@ def test_the_interval_of_one_axis() -> None:
         assert np.array_equal(part.upper_m, numbers[1, number])
         assert np.array_equal(part.lower_point.omega_rad_s, numbers[3, number])
         assert np.array_equal(part.upper_point.range_m, numbers[7, number])
-    picture = whole._repr_svg_()
-    assert "from 0 to 2 m along y, from 1 to 3 m along z" in picture

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from guidance import Thruster
-from infoset import AngleSensor, RangeSensor, SetModel, StateBox
+from infoset import AngleSensor, Model, RangeSensor, SetModel, StateBox
 from sim import Scenario, Sun
+from sim.scenario import of_model
 
 
 @pytest.fixture(scope="session")
@@ -20,6 +21,7 @@ def asteroid() -> Scenario:
         angle_sensor=AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3),
         disturbance_m_s2=0.005,
         range_threshold_m=5e3,
+        model=Model.PAPER,
     )
     return Scenario(
         name="asteroid",
@@ -27,7 +29,7 @@ def asteroid() -> Scenario:
         sun=Sun(1.324948e20, 150e9, np.pi / 2),
         nominal_range_m=5801.3e3,
         dispersion=StateBox((-1e3, 1e3), (5701.3e3, 5901.3e3), (-100.0, 100.0), (-58.1e3, -57.9e3)),
-        set_model=model,
+        **of_model(model),
         range_sensor=None,
         thruster=Thruster(1000.0, 0.25, 7.5),
     )
@@ -51,6 +53,7 @@ def comet() -> Scenario:
         range_threshold_m=2e3,
         sections=17,
         fewest_sections=3,
+        model=Model.PAPER,
     )
     return Scenario(
         name="comet",
@@ -58,7 +61,7 @@ def comet() -> Scenario:
         sun=Sun(1.324948e20, 60e9, 0.3),
         nominal_range_m=1550e3,
         dispersion=StateBox((-1e3, 2e3), (1500e3, 1600e3), (-30.0, 20.0), (-20.02e3, -19.98e3)),
-        set_model=model,
+        **of_model(model),
         range_sensor=RangeSensor(1.2, 0.1),
         thruster=Thruster(600.0, 0.5, 12.0),
     )
@@ -70,4 +73,4 @@ def brief(asteroid: Scenario) -> Scenario:
     box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
     sensor = replace(asteroid.set_model.angle_sensor, nominal_range_m=595e3)
     model = replace(asteroid.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    return replace(asteroid, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
+    return replace(asteroid, name="brief", **of_model(model), dispersion=box, nominal_range_m=595e3)

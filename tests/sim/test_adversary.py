@@ -17,6 +17,7 @@ from sim.draws import corners, draw
 from sim.engagement import Engagements
 from sim.first_plans import FirstPlans
 from sim.planned_flights import PlannedTarget, Plans, PlanSpace
+from sim.scenario import of_model
 from sim.target import GivenTarget
 from tests.space import in_space
 
@@ -26,7 +27,7 @@ BUDGET = 40
 @pytest.fixture(scope="module")
 def coarse(asteroid: Scenario) -> Scenario:
     """The paper's engagement with few sections: quick to fly."""
-    return replace(asteroid, set_model=replace(asteroid.set_model, sections=9))
+    return replace(asteroid, **of_model(replace(asteroid.set_model, sections=9)))
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +36,8 @@ def worst(coarse: Scenario) -> WorstEngagement:
 
 
 def guaranteed(scenario: Scenario) -> Scenario:
-    model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    return replace(scenario, set_model=model)
+    model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    return replace(scenario, **of_model(model))
 
 
 def assert_flies_again(found: WorstEngagement) -> None:
@@ -101,7 +102,7 @@ def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.Fix
     scenario = replace(
         given,
         rate_sensor=RateSensor(3.0 * given.set_model.step_s, 1e-5),
-        set_model=replace(given.set_model, sections=9, fewest_sections=3),
+        **of_model(replace(given.set_model, sections=9, fewest_sections=3)),
     )
     found = find_worst(scenario, budget=24, seed=2)
     assert found.sets_emptied == 0
@@ -117,7 +118,7 @@ def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.Fix
 def test_with_all_sensors_in_space(convention: str, shape: str, ranging: Scenario) -> None:
     spatial = in_space(ranging, convention=Convention(convention), error_shape=ErrorShape(shape))
     model = replace(guaranteed(spatial).set_model, sections=9, fewest_sections=3)
-    scenario = replace(spatial, rate_sensor=RateSensor(1.5, 1e-4), set_model=model)
+    scenario = replace(spatial, rate_sensor=RateSensor(1.5, 1e-4), **of_model(model))
     found = find_worst(scenario, budget=24, seed=2)
     assert (found.sets_emptied, found.truth_kept) == (0, True)
     assert_possible(found, scenario)
@@ -161,7 +162,7 @@ def test_the_same_seed_finds_the_same_whatever_the_threads(worst: WorstEngagemen
 def test_engagements_that_lose_their_set_can_be_left_out(coarse: Scenario) -> None:
     """A set that believes in 58 km/s, and truths that come at 110: it is always lost."""
     fast = replace(coarse.set_model.bounds, vx_m_s=(-110.1e3, -110e3))
-    wrong = replace(coarse, set_model=replace(coarse.set_model, bounds=fast))
+    wrong = replace(coarse, **of_model(replace(coarse.set_model, bounds=fast)))
     found = find_worst(wrong, budget=10)
     assert (found.outcome, found.sets_emptied) == (Outcome.SET_EMPTY, 10)
     with pytest.raises(NothingCountsError, match="in every simulated engagement the set became empty"):
@@ -289,7 +290,7 @@ def test_targets_accelerate_at_the_bound_of_the_model_or_as_that_of_the_scenario
     fast = replace(plane, target=Target(Manoeuvre.CONSTANT, 0.02))
     assert PlanSpace.of(fast, 10).acceleration_m_s2.tolist() == [0.02]
     spatial = in_space(plane)
-    spatial = replace(spatial, set_model=replace(spatial.set_model, disturbance_y_m_s2=0.01))
+    spatial = replace(spatial, **of_model(replace(spatial.set_model, disturbance_y_m_s2=0.01)))
     assert PlanSpace.of(spatial, 10).acceleration_m_s2.tolist() == [0.01, 0.005]
     for still in (coarse, replace(coarse, target=Target(Manoeuvre.CONSTANT, 0.02))):
         assert not PlanSpace.of(still, 10).has_accelerations

@@ -14,6 +14,7 @@ from infoset import (
     AngleSensor,
     Convention,
     ErrorShape,
+    Model,
     RangeSensor,
     RateSensor,
     SetModel,
@@ -22,6 +23,7 @@ from infoset import (
 from sim import Scenario, Sun
 from sim.bound import label_grid, lower_bound, pair_at
 from sim.pair import fly_pair
+from sim.scenario import of_model
 from sim.truth_pair import Approach, TruthPair
 from tests.space import in_space
 
@@ -35,6 +37,7 @@ def toy(vz_m_s: float = 1e3, greatest_impulse_m_s: float = 0.5, z_m: float = 1e5
         step_s=1.0,
         bounds=StateBox((-z_m, z_m), (2000.0, 2000.0), (-vz_m_s, vz_m_s), (-1000.0, -1000.0)),
         angle_sensor=AngleSensor(1.0, 0.001, 0.001, 2000.0),
+        model=Model.PAPER,
     )
     return Scenario(
         name="toy",
@@ -42,7 +45,7 @@ def toy(vz_m_s: float = 1e3, greatest_impulse_m_s: float = 0.5, z_m: float = 1e5
         sun=None,
         nominal_range_m=2000.0,
         dispersion=model.bounds,
-        set_model=model,
+        **of_model(model),
         range_sensor=None,
         thruster=Thruster(1000.0, 0.0, greatest_impulse_m_s),
     )
@@ -54,7 +57,7 @@ def cosine(across_m_s: float) -> float:
 
 
 def with_disturbance(scenario: Scenario, disturbance_m_s2: float) -> Scenario:
-    return replace(scenario, set_model=replace(scenario.set_model, disturbance_m_s2=disturbance_m_s2))
+    return replace(scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=disturbance_m_s2)))
 
 
 def positions(pair: TruthPair, scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -186,7 +189,7 @@ def test_the_bound_is_of_the_least_distance_of_an_oblique_flight(slope: float) -
     z_m = (-2.0 * speed - 100.0, -2.0 * speed + 100.0)
     box = StateBox(z_m, (2000.0, 2000.0), (speed - 2.0, speed + 2.0), (-1000.0, -1000.0))
     engine = replace(scenario.thruster, budget_m_s=0.0)
-    scenario = replace(scenario, dispersion=box, set_model=replace(scenario.set_model, bounds=box), thruster=engine)
+    scenario = replace(scenario, dispersion=box, **of_model(replace(scenario.set_model, bounds=box)), thruster=engine)
     pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
     miss_m = sorted(fly_pair(scenario, pair).results.miss_m)
     assert miss_m == pytest.approx([3.0 * cosine(speed + 2.0), 3.0 * cosine(speed - 2.0)], rel=3e-6)
@@ -202,7 +205,7 @@ def oblique(z_m: float, vz_m_s: float, half_width_m_s: float = 5.0, **sensor: An
     model = scenario.set_model
     model = replace(model, bounds=box, angle_sensor=replace(model.angle_sensor, **sensor))
     engine = replace(scenario.thruster, budget_m_s=0.0)
-    return replace(scenario, dispersion=box, set_model=model, thruster=engine)
+    return replace(scenario, dispersion=box, **of_model(model), thruster=engine)
 
 
 FALLING = {"error_at_nominal_range_rad": 1e-4, "error_at_zero_range_rad": 1e-2, "nominal_range_m": 2100.0}
@@ -287,7 +290,7 @@ def test_a_rate_sensor_lowers_the_bound(asteroid: Scenario) -> None:
 
 def test_fewer_measurements_raise_the_bound(asteroid: Scenario) -> None:
     model = asteroid.set_model
-    slow = replace(asteroid, set_model=replace(model, angle_sensor=replace(model.angle_sensor, period_s=2.0)))
+    slow = replace(asteroid, **of_model(replace(model, angle_sensor=replace(model.angle_sensor, period_s=2.0))))
     often, seldom = (pair_at(each, NOMINAL_LABEL_M, -58e3) for each in (asteroid, slow))
     assert seldom.bound_m > often.bound_m
     assert (seldom.last_common_step + 1) % 4 == 0 or seldom.last_common_step == 200
@@ -344,7 +347,7 @@ def test_lower_bound_of_the_published_scenario(asteroid: Scenario) -> None:
 def test_one_label_and_one_speed(asteroid: Scenario) -> None:
     model = asteroid.set_model
     known = replace(model, bounds=replace(model.bounds, x_m=(5.8e6, 5.8e6), vx_m_s=(-58e3, -58e3)))
-    found = lower_bound(replace(asteroid, set_model=known))
+    found = lower_bound(replace(asteroid, **of_model(known)))
     assert len(found.by_label) == 1
     assert found.bound_m == pair_at(asteroid, 5.8e6, -58e3).bound_m
 
@@ -413,7 +416,7 @@ def test_two_measurements_in_space_by_hand() -> None:
     for name, bound_m in (("box", 0.5 * np.hypot(4.0, 6.0)), ("disc", 3.0)):
         scenario = in_space(toy(vz_m_s=2.0), error_shape=ErrorShape(name))
         bounds = replace(scenario.set_model.bounds, vy_m_s=(-1.0, 1.0))
-        scenario = replace(scenario, set_model=replace(scenario.set_model, bounds=bounds), dispersion=bounds)
+        scenario = replace(scenario, **of_model(replace(scenario.set_model, bounds=bounds)), dispersion=bounds)
         pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
         across_m_s = 1.5 + (np.hypot(1.0, 2.0) if name == "box" else 2.0)
         assert pair.bound_m == pytest.approx(bound_m * cosine(across_m_s), rel=3e-6)
@@ -428,7 +431,7 @@ def test_the_pair_in_space_is_admissible(shape: ErrorShape, asteroid: Scenario) 
     scenario = in_space(asteroid, error_shape=shape, **smaller)
     bounds = replace(scenario.set_model.bounds, y_m=(500.0, 900.0))
     model = replace(scenario.set_model, bounds=bounds, disturbance_y_m_s2=0.002)
-    scenario = replace(scenario, set_model=model)
+    scenario = replace(scenario, **of_model(model))
     pair = pair_at(scenario, 5411e3, -59e3)
     assert (pair.position_m[:, 2] == 5411e3).all()
     assert (pair.velocity_m_s[:, 2] == -59e3).all()
@@ -456,7 +459,7 @@ def test_an_idle_axis_leaves_the_planar_bound(asteroid: Scenario) -> None:
     scenario = in_space(asteroid, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
     bounds = replace(scenario.set_model.bounds, y_m=(0.0, 0.0), vy_m_s=(0.0, 0.0))
     model = replace(scenario.set_model, bounds=bounds, disturbance_y_m_s2=0.0)
-    pair = pair_at(replace(scenario, set_model=model), NOMINAL_LABEL_M, -58e3)
+    pair = pair_at(replace(scenario, **of_model(model)), NOMINAL_LABEL_M, -58e3)
     planar = pair_at(asteroid, NOMINAL_LABEL_M, -58e3)
     assert (pair.apart_m, pair.correction_m) == (planar.apart_m, planar.correction_m)
     assert np.array_equal(pair.position_m[:, 1:], planar.position_m)

@@ -20,6 +20,7 @@ from infoset import AngleSensor, Convention, InitialSet, Model, RangeSensor, Rat
 from sim import Scenario, Sun
 from sim.bound import lower_bound, pair_at
 from sim.coasting import coasting
+from sim.scenario import of_model
 from sim.truth_pair import Approach, TruthPair, later_impulses
 from tests.space import in_space
 
@@ -31,7 +32,7 @@ def slow_flight(range_km: float, *, cut_off_s: float | None = 2000.0, strength: 
     """2 km/s with the Sun at 60 million km across the approach; range and speed are known."""
     range_m = 1e3 * range_km
     box = StateBox((-1e4, 1e4), (range_m - 500.0, range_m + 500.0), (-0.1, 0.1), (-2000.01, -1999.99))
-    sensor = AngleSensor(200.0, 5e-6, 5e-6, range_m, centroid_error_m=5.0)
+    sensor = AngleSensor.camera(200.0, 5e-6, 5.0)
     model = SetModel(
         closing_speed_m_s=2000.0,
         step_s=200.0,
@@ -41,7 +42,7 @@ def slow_flight(range_km: float, *, cut_off_s: float | None = 2000.0, strength: 
         sections=3,
         fewest_sections=1,
         initial_set=InitialSet.BOX,
-        kind=Model.GUARANTEED,
+        model=Model.GUARANTEED,
     )
     return Scenario(
         name="slow",
@@ -49,7 +50,7 @@ def slow_flight(range_km: float, *, cut_off_s: float | None = 2000.0, strength: 
         sun=Sun(strength * SUN, 60e9, 0.5 * np.pi),
         nominal_range_m=range_m,
         dispersion=box,
-        set_model=model,
+        **of_model(model),
         range_sensor=None,
         thruster=Thruster(30.0, 1e-4, 2.0, last_impulse_s=cut_off_s),
     )
@@ -232,7 +233,7 @@ def aimed(scenario: Scenario) -> Scenario:
             for (low, high), miss in zip(_intervals(box)[1][:-1], motion.states[:-1, -1], strict=False)
         ]
         box = replace(box, vz_m_s=moved[-1], vy_m_s=moved[0] if len(moved) > 1 else None)
-    return replace(scenario, set_model=replace(scenario.set_model, bounds=box), dispersion=box)
+    return replace(scenario, **of_model(replace(scenario.set_model, bounds=box)), dispersion=box)
 
 
 def _intervals(box: StateBox) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
@@ -253,7 +254,7 @@ def skew() -> Scenario:
     model = replace(scenario.set_model, disturbance_m_s2=1e-8)
     return replace(
         scenario,
-        set_model=model,
+        **of_model(model),
         sun=Sun(6.0 * SUN, 60e9, 1.0, 0.6),
         rate_sensor=RateSensor(400.0, 2e-9),
         range_sensor=RangeSensor(600.0, 2e-4),
@@ -263,14 +264,14 @@ def skew() -> Scenario:
 def near_a_planet() -> Scenario:
     """An approach at 12 km/s from 20 000 km, 60 000 km from the Earth."""
     box = StateBox((-2e4, 1e4), (2e7, 2e7), (-5.0, 5.0), (-12e3, -12e3))
-    model = SetModel(12e3, 10.0, box, AngleSensor(10.0, 1e-4, 1e-4, 2e7), 1e-5)
+    model = SetModel(12e3, 10.0, box, AngleSensor(10.0, 1e-4, 1e-4, 2e7), disturbance_m_s2=1e-5, model=Model.PAPER)
     return Scenario(
         name="planet",
         description="",
         sun=Sun(3.986e14, 6e7, 2.5),
         nominal_range_m=2e7,
         dispersion=box,
-        set_model=model,
+        **of_model(model),
         range_sensor=None,
         thruster=Thruster(40.0, 0.0, 1.0),
     )

@@ -14,6 +14,7 @@ from infoset import InitialSet, Model, StateBox
 from sim import Scenario
 from sim.bound import lower_bound, pair_at
 from sim.pair import fly_pair
+from sim.scenario import of_model
 from sim.truth_pair import Approach
 from tests.space import in_space
 
@@ -27,10 +28,10 @@ def offset(z_m: tuple[float, float], **engine: Any) -> Scenario:
     """The 1997 sensor without gravity: known range and speed, a start far from the x axis and a weak engine."""
     published = load_scenario("asteroid-1997")
     box = StateBox(z_m, (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
-    model = replace(published.set_model, bounds=box, disturbance_m_s2=0.005, kind=Model.GUARANTEED)
+    model = replace(published.set_model, bounds=box, disturbance_m_s2=0.005, model=Model.GUARANTEED)
     model = replace(model, initial_set=InitialSet.BOX, angle_sensor=replace(model.angle_sensor, period_s=0.5))
     thruster = Thruster(**{"budget_m_s": 1000.0, "least_impulse_m_s": 1e-4, "greatest_impulse_m_s": 0.5} | engine)
-    return replace(published, sun=None, set_model=model, dispersion=box, range_sensor=None, thruster=thruster)
+    return replace(published, sun=None, **of_model(model), dispersion=box, range_sensor=None, thruster=thruster)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_in_space_a_far_start_is_a_corner_of_the_box() -> None:
     scenario = in_space(planar)
     box = replace(scenario.set_model.bounds, y_m=(-4e3, 1e3), vy_m_s=(0.0, 0.0))
     model = replace(scenario.set_model, bounds=box, disturbance_m_s2=0.0, disturbance_y_m_s2=0.0)
-    pair = pair_at(replace(scenario, set_model=model, dispersion=box), 5801.3e3, -58e3)
+    pair = pair_at(replace(scenario, **of_model(model), dispersion=box), 5801.3e3, -58e3)
     assert pair.is_single
     assert pair.position_m[0, :2].tolist() == [-4e3, 10e3]
     left_m = np.hypot(4e3, 10e3) - pair_at(planar, 5801.3e3, -58e3).correction_m

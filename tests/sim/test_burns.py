@@ -14,6 +14,7 @@ from infoset.arrays import Floats
 from sim import Results, Scenario, fly_one, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
+from sim.scenario import of_model
 from tests.space import in_space
 
 E, RANGE = 58e3, 5800e3
@@ -30,7 +31,7 @@ def known(asteroid: Scenario) -> Scenario:
         sun=None,
         nominal_range_m=RANGE,
         dispersion=box,
-        set_model=replace(model, initial_set=InitialSet.BOX, range_threshold_m=1e3, sections=1, fewest_sections=1),
+        **of_model(replace(model, initial_set=InitialSet.BOX, range_threshold_m=1e3, sections=1, fewest_sections=1)),
         thruster=Thruster(1000.0, 0.0, 500.0),
     )
 
@@ -40,7 +41,9 @@ def with_thruster(scenario: Scenario, **fields: Any) -> Scenario:
 
 
 def guaranteed(scenario: Scenario) -> Scenario:
-    return replace(scenario, set_model=replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX))
+    return replace(
+        scenario, **of_model(replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX))
+    )
 
 
 def impulses(scenario: Scenario, seed: int = 0, strategy: Strategy | None = None) -> dict[float, float]:
@@ -142,7 +145,7 @@ def situation(lower: float, upper: float, **fields: Any) -> Situation:
     point = ExtremePoints(np.zeros(1), np.zeros(1), np.array([E * 50.0]))
     box = StateBox((-1e3, 1e3), (RANGE, RANGE), (-10.0, 10.0), (-E, -E))
     information = InformationSet(
-        SetModel(E, 0.5, box, AngleSensor(0.5, 1e-4, 1e-4, RANGE), sections=1, fewest_sections=1)
+        SetModel(E, 0.5, box, AngleSensor(0.5, 1e-4, 1e-4, RANGE), sections=1, fewest_sections=1, model=Model.PAPER)
     )
     values: dict[str, Any] = {
         "time_s": 50.0,
@@ -191,7 +194,7 @@ def test_patient_gives_at_the_last_time_what_cannot_be_corrected_later(known: Sc
     """It waits for the second impulse, unless the second one is too weak for the whole miss that is possible."""
     box = StateBox((-100.0, 500.0), (RANGE, RANGE), (0.0, 0.0), (-E, -E))
     model = replace(known.set_model, bounds=box, angle_sensor=AngleSensor(0.5, 0.9, 0.9, RANGE))
-    wide = replace(known, set_model=model, dispersion=replace(box, z_m=(500.0, 500.0)))
+    wide = replace(known, **of_model(model), dispersion=replace(box, z_m=(500.0, 500.0)))
     strategy = Patient(1.0)
     strong = impulses(with_thruster(wide, impulses_s=(80.0, 40.0)), strategy=strategy)
     assert strong == pytest.approx({60.0: 200.0 / 40.0})
@@ -289,7 +292,7 @@ def test_a_run_is_the_same_in_any_batch(asteroid: Scenario) -> None:
 
 def test_an_impulse_at_a_finished_set_moves_phi(asteroid: Scenario) -> None:
     """Impulses that are given after the last label has left still move the pieces of Phi."""
-    far = replace(asteroid, set_model=replace(asteroid.set_model, range_threshold_m=300e3))
+    far = replace(asteroid, **of_model(replace(asteroid.set_model, range_threshold_m=300e3)))
     scenario = with_thruster(guaranteed(far), delay_steps=8, budget_m_s=1e4)
     late: list[bool] = []
 

@@ -36,6 +36,7 @@ from sim.closed_form import images_s, possible_miss_m, possible_miss_of
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.pair import fly_pair
+from sim.scenario import of_model
 
 SPEED_M_S, PIXEL_RAD, CENTROID_M = 6140.0, 5e-6, 12.0
 FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0
@@ -43,7 +44,7 @@ FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0
 
 def camera_scenario(**fields: Any) -> Scenario:
     """Return an engagement of one hour in a plane, with a camera; `fields` are those of the angle sensor."""
-    law = {"centroid_error_m": CENTROID_M, "nominal_range_m": 3600.0 * SPEED_M_S, **fields}
+    law = {"centroid_error_m": CENTROID_M, **fields}
     camera = AngleSensor.camera(EVERY_S, PIXEL_RAD, **law)
     box = StateBox((-1e4, 1e4), (3590.0 * SPEED_M_S, 3610.0 * SPEED_M_S), (-2.0, 2.0), (-6141.0, -6139.0))
     model = SetModel(
@@ -55,16 +56,25 @@ def camera_scenario(**fields: Any) -> Scenario:
         sections=5,
         fewest_sections=3,
         initial_set=InitialSet.BOX,
-        kind=Model.GUARANTEED,
+        model=Model.GUARANTEED,
     )
-    return Scenario("camera", "", None, 3600.0 * SPEED_M_S, box, model, None, Thruster(20.0, 0.001, 0.5))
+    return Scenario(
+        name="camera",
+        description="",
+        sun=None,
+        nominal_range_m=3600.0 * SPEED_M_S,
+        dispersion=box,
+        **of_model(model),
+        range_sensor=None,
+        thruster=Thruster(20.0, 0.001, 0.5),
+    )
 
 
 def in_space(scenario: Scenario, **fields: Any) -> Scenario:
     """Return the scenario in space, with fields of the angle sensor."""
     model, box = scenario.set_model, replace(scenario.dispersion, y_m=(-8e3, 9e3), vy_m_s=(-1.0, 2.0))
     model = replace(model, bounds=box, angle_sensor=replace(model.angle_sensor, **fields))
-    return replace(scenario, dispersion=box, set_model=model)
+    return replace(scenario, dispersion=box, **of_model(model))
 
 
 def widest_m(measured: Floats, times_s: Floats, pixel: float, centroid_m: float, constant: bool) -> float:
@@ -204,7 +214,18 @@ def measured_set(centroid_m: float, alpha_rad: Callable[[float], float]) -> Info
     at_start = (FIRST_S * SPEED_M_S, FIRST_S * SPEED_M_S)
     box = StateBox((-1e6, 1e6), at_start, (-1e3, 1e3), (-SPEED_M_S, -SPEED_M_S))
     threshold_m = max(1e3, 10.0 * centroid_m)
-    model = SetModel(SPEED_M_S, EVERY_S, box, camera, 0.0, threshold_m, 1, 1, InitialSet.BOX, Model.GUARANTEED)
+    model = SetModel(
+        SPEED_M_S,
+        EVERY_S,
+        box,
+        camera,
+        disturbance_m_s2=0.0,
+        range_threshold_m=threshold_m,
+        sections=1,
+        fewest_sections=1,
+        initial_set=InitialSet.BOX,
+        model=Model.GUARANTEED,
+    )
     information = InformationSet(model)
     while True:
         before_s = FIRST_S - information.time_s
@@ -263,7 +284,7 @@ def test_closed_form_of_a_scenario_knows_schedule_delay_and_images() -> None:
         images_s(replace(late, thruster=replace(late.thruster, last_impulse_s=2400.0)))
     line = replace(late.set_model, angle_sensor=AngleSensor(EVERY_S, 1e-5, 2e-5, 3e7))
     with pytest.raises(ValueError, match="camera"):
-        possible_miss_of(replace(late, set_model=line))
+        possible_miss_of(replace(late, **of_model(line)))
 
 
 def sound(results: Results) -> bool:
@@ -286,7 +307,7 @@ def test_engagements_with_a_camera_keep_the_truth_and_the_bound(noise: NoiseKind
     plane = replace(camera_scenario(), noise=noise, tie=TieRule.RANDOM)
     if not {"convention", "error_shape"} & set(fields):
         model = replace(plane.set_model, angle_sensor=replace(plane.set_model.angle_sensor, **fields))
-        assert sound(simulate(replace(plane, set_model=model), 16))
+        assert sound(simulate(replace(plane, **of_model(model)), 16))
     assert sound(simulate(in_space(plane, **fields), 16))
 
 
@@ -310,11 +331,11 @@ def test_a_camera_without_centroid_error_is_the_line_with_equal_errors(asteroid:
     """Bit for bit, in both models."""
     for kind in Model:
         initial = InitialSet.BOX if kind is Model.GUARANTEED else InitialSet.RECTANGLE
-        model = replace(asteroid.set_model, kind=kind, initial_set=initial)
+        model = replace(asteroid.set_model, model=kind, initial_set=initial)
         line = AngleSensor(0.5, 2e-4, 2e-4, 5801.3e3)
-        camera = AngleSensor.camera(0.5, 2e-4, nominal_range_m=5801.3e3)
+        camera = AngleSensor.camera(0.5, 2e-4)
         first, second = (
-            simulate(replace(asteroid, noise=NoiseKind.GAME, set_model=replace(model, angle_sensor=sensor)), 5)
+            simulate(replace(asteroid, noise=NoiseKind.GAME, **of_model(replace(model, angle_sensor=sensor))), 5)
             for sensor in (line, camera)
         )
         assert first.miss_m.tolist() == second.miss_m.tolist()
@@ -452,12 +473,12 @@ def test_bands_are_mirrored_for_a_negative_angle_and_empty_behind_the_target() -
 
 
 def test_the_published_model_takes_the_angle_itself() -> None:
-    model = replace(camera_scenario().set_model, kind=Model.PAPER)
+    model = replace(camera_scenario().set_model, model=Model.PAPER)
     (law,) = section_laws(model)
     for x in (1e3, 2e4, 1e7):
         bound = PIXEL_RAD + CENTROID_M / x
         assert slope_band(0.01, 0.0, 2e7 - x, x, law) == pytest.approx((0.01 - bound, 0.01 + bound), rel=1e-8)
-    results = simulate(replace(camera_scenario(), set_model=model, noise=NoiseKind.GAME), 4)
+    results = simulate(replace(camera_scenario(), **of_model(model), noise=NoiseKind.GAME), 4)
     assert np.isfinite(results.miss_m).all()
 
 
@@ -485,7 +506,7 @@ def test_extremal_errors_reach_the_possible_miss_with_any_strategy(centroid_m: f
     scenario = replace(
         scenario,
         dispersion=box,
-        set_model=replace(scenario.set_model, bounds=box),
+        **of_model(replace(scenario.set_model, bounds=box)),
         thruster=Thruster(20.0, 0.0, 5.0, last_impulse_s=300.0, delay_steps=delay_steps),
     )
     expected = possible_miss_of(scenario)

@@ -14,6 +14,7 @@ from sim import Outcome, Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
 from sim.kepler import Passage, Sight
+from sim.scenario import of_model
 from tests.long_steps import with_long_steps
 
 
@@ -36,7 +37,7 @@ def mirror(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
     mirrored = replace(
         scenario,
         sun=replace(scenario.sun, direction_rad=-scenario.sun.direction_rad),
-        set_model=replace(scenario.set_model, bounds=bounds),
+        **of_model(replace(scenario.set_model, bounds=bounds)),
         tie=swapped.get(scenario.tie, scenario.tie),
     )
     flip = np.array([-1.0, 1.0])
@@ -61,8 +62,8 @@ def test_a_mirrored_engagement_is_mirrored(
     scenario = with_long_steps(request.getfixturevalue(name), 3 if name == "comet" else 2)
     scenario = replace(scenario, noise=noise, tie=tie)
     if model is Model.GUARANTEED:
-        box = replace(scenario.set_model, kind=model, initial_set=InitialSet.BOX)
-        scenario = replace(scenario, set_model=box)
+        box = replace(scenario.set_model, model=model, initial_set=InitialSet.BOX)
+        scenario = replace(scenario, **of_model(box))
     draws = draw(scenario, range(8), 3)
     there, back = fly(scenario, draws), fly(*mirror(scenario, draws))
     np.testing.assert_allclose(back.miss_m, there.miss_m, rtol=1e-9)

@@ -15,6 +15,7 @@ from sim import Scenario, Sun, simulate
 from sim.flight_bounds import FlightBounds, flight_bounds
 from sim.gravity import on_board_model, with_gravity
 from sim.kepler import sun_and_orbit
+from sim.scenario import of_model
 
 EARTH_M3_S2 = 3.986004418e14
 
@@ -113,7 +114,7 @@ def near_earth(base: Scenario) -> Scenario:
         range_threshold_m=1e6,
         sections=15,
         fewest_sections=3,
-        kind=Model.GUARANTEED,
+        model=Model.GUARANTEED,
         initial_set=InitialSet.BOX,
         disturbance_m_s2=0.0,
     )
@@ -122,7 +123,7 @@ def near_earth(base: Scenario) -> Scenario:
         sun=Sun(EARTH_M3_S2, 1.002e10, np.radians(0.12)),
         nominal_range_m=1e10,
         dispersion=box,
-        set_model=model,
+        **of_model(model),
         range_sensor=None,
         thruster=Thruster(500.0, 0.1, 50.0),
     )

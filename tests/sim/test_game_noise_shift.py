@@ -12,6 +12,7 @@ from guidance import GameNoise, NoiseKind, TieRule
 from sim import Scenario, simulate
 from sim.bound import lower_bound, pair_at
 from sim.closed_form import possible_miss_m, possible_miss_of, worst_shift_m
+from sim.scenario import of_model
 from sim.truth_pair import TruthPair
 
 RUNS = 10
@@ -91,7 +92,7 @@ def test_only_a_schedule_has_a_shift() -> None:
     thruster = replace(asteroid.thruster, last_impulse_s=20.0)
     assert worst_shift_m(replace(asteroid, thruster=thruster)) is not None
     no_images = replace(asteroid.set_model.angle_sensor, first_image_s=10.0)
-    late = replace(asteroid, thruster=thruster, set_model=replace(asteroid.set_model, angle_sensor=no_images))
+    late = replace(asteroid, thruster=thruster, **of_model(replace(asteroid.set_model, angle_sensor=no_images)))
     assert worst_shift_m(late) is None
 
 

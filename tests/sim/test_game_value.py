@@ -14,6 +14,7 @@ from infoset import AngleSensor, InitialSet, Model, StateBox
 from infoset.sensors import RateSensor
 from sim import Scenario, Sun, lower_bound, simulate
 from sim.game_value import ValueReserve, value_reserve, why_no_value
+from sim.scenario import of_model
 from tests.space import in_space
 
 RANGE_M, SPEED_M_S = 1745e3, 58e3
@@ -26,12 +27,12 @@ def known(*, z_m: tuple[float, float] = (-1e3, 1e3), vz_m_s: float = 100.0, rang
     sensor = replace(scenario.set_model.angle_sensor, nominal_range_m=range_m)
     model = replace(scenario.set_model, bounds=box, angle_sensor=sensor, disturbance_m_s2=0.0)
     return replace(
-        scenario, sun=None, range_sensor=None, nominal_range_m=range_m, dispersion=box, set_model=model, name="known"
+        scenario, sun=None, range_sensor=None, nominal_range_m=range_m, dispersion=box, **of_model(model), name="known"
     )
 
 
 def with_box(scenario: Scenario, box: StateBox) -> Scenario:
-    return replace(scenario, dispersion=box, set_model=replace(scenario.set_model, bounds=box))
+    return replace(scenario, dispersion=box, **of_model(replace(scenario.set_model, bounds=box)))
 
 
 def with_thruster(scenario: Scenario, thruster: Thruster) -> Scenario:
@@ -69,18 +70,24 @@ def other_speed(scenario: Scenario) -> Scenario:
         ),
         (lambda scenario: with_thruster(scenario, replace(scenario.thruster, delay_steps=1)), "impulses with a delay"),
         (
-            lambda scenario: replace(scenario, set_model=replace(scenario.set_model, kind=Model.PAPER)),
+            lambda scenario: replace(
+                scenario, **of_model(replace(scenario.set_model, model=Model.PAPER, initial_set=InitialSet.BOX))
+            ),
             "model paper",
         ),
         (
-            lambda scenario: replace(scenario, set_model=replace(scenario.set_model, initial_set=InitialSet.RECTANGLE)),
+            lambda scenario: replace(
+                scenario, **of_model(replace(scenario.set_model, initial_set=InitialSet.RECTANGLE))
+            ),
             "starts in a rectangle of angle and rate",
         ),
         (
             lambda scenario: replace(
                 scenario,
-                set_model=replace(
-                    scenario.set_model, angle_sensor=replace(scenario.set_model.angle_sensor, miss_probability=0.1)
+                **of_model(
+                    replace(
+                        scenario.set_model, angle_sensor=replace(scenario.set_model.angle_sensor, miss_probability=0.1)
+                    )
                 ),
             ),
             "images that can be lost",
@@ -97,7 +104,7 @@ def test_reserve_of_a_weak_engine_by_hand() -> None:
     """All 61 impulses of 0.5 m/s correct 460 of 1100 m; the one at 5 km is below the threshold."""
     scenario = known(z_m=(900.0, 1100.0), vz_m_s=0.0)
     engine = replace(scenario.thruster, greatest_impulse_m_s=0.5, least_impulse_m_s=0.0)
-    weak = replace(scenario, thruster=engine, set_model=replace(scenario.set_model, range_threshold_m=6e3))
+    weak = replace(scenario, thruster=engine, **of_model(replace(scenario.set_model, range_threshold_m=6e3)))
     bound_m, reserve = reserve_of(weak)
     to_go_s = RANGE_M / SPEED_M_S - 0.5 * np.arange(61)
     left_m = 1100.0 - 0.5 * to_go_s.sum()
@@ -115,7 +122,7 @@ def test_reserve_of_one_impulse_by_hand() -> None:
     scenario = known(range_m=1740e3)
     sensor = AngleSensor(0.5, 1e-4, 1e-4, 1740e3)
     engine = Thruster(1e3, 2.0, 1e3, impulses_s=(10.0,))
-    one = replace(scenario, thruster=engine, set_model=replace(scenario.set_model, angle_sensor=sensor))
+    one = replace(scenario, thruster=engine, **of_model(replace(scenario.set_model, angle_sensor=sensor)))
     bound_m, reserve = reserve_of(one)
     exact_m = 1e-4 * (580e3 + (580e3 + 1740e3) * 10.0 / 20.0)
     # The tangent of the error itself makes the set wider by 1e-8 / 3.
@@ -147,8 +154,8 @@ CAMERA = AngleSensor.camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.
         lambda scenario: scenario,
         lambda scenario: with_thruster(scenario, replace(scenario.thruster, least_impulse_m_s=3.0)),
         lambda scenario: with_thruster(scenario, Thruster(500.0, 0.0, 200.0, impulses_s=(22.0, 9.0, 3.0))),
-        lambda scenario: replace(scenario, set_model=replace(scenario.set_model, disturbance_m_s2=0.5)),
-        lambda scenario: replace(scenario, set_model=replace(scenario.set_model, angle_sensor=CAMERA)),
+        lambda scenario: replace(scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=0.5))),
+        lambda scenario: replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=CAMERA))),
     ],
     ids=["published", "dead zone", "schedule", "disturbance", "camera"],
 )

@@ -21,6 +21,7 @@ from sim.draws import draw
 from sim.engagement import Engagements
 from sim.gravity import on_board_model, with_gravity
 from sim.kepler import KeplerMotion
+from sim.scenario import of_model
 from sim.target import acceleration_m_s2
 
 
@@ -40,8 +41,8 @@ def soundness() -> ModuleType:
 
 
 def guaranteed(scenario: Scenario) -> Scenario:
-    model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    return replace(scenario, set_model=model, dispersion=model.bounds)
+    model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    return replace(scenario, **of_model(model), dispersion=model.bounds)
 
 
 def median(values: np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]) -> float:
@@ -94,8 +95,8 @@ def test_soundness_costs_little(asteroid: Scenario) -> None:
     """On the same seeds: at most 15 % more median miss for random noise, 30 % for game noise."""
     for noise, most in ((NoiseKind.RANDOM, 1.15), (NoiseKind.GAME, 1.30)):
         paper = replace(asteroid, noise=noise)
-        box = replace(paper.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-        sound_miss = simulate(replace(paper, set_model=box), 400, guarantee=False).miss_m
+        box = replace(paper.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+        sound_miss = simulate(replace(paper, **of_model(box)), 400, guarantee=False).miss_m
         assert np.median(sound_miss) <= most * np.median(simulate(paper, 400).miss_m)
 
 
@@ -122,14 +123,14 @@ def test_phi_is_tight(asteroid: Scenario, two_hundred: Results) -> None:
 def test_phi_follows_impulses_fired_after_labels_have_left(asteroid: Scenario) -> None:
     """A threshold far out: labels leave eighty steps before they arrive, and what is fired meanwhile still counts."""
     early = guaranteed(replace(asteroid, noise=NoiseKind.GAME))
-    early = replace(early, set_model=replace(early.set_model, range_threshold_m=2.4e6))
+    early = replace(early, **of_model(replace(early.set_model, range_threshold_m=2.4e6)))
     assert sound(simulate(early, 100))
 
 
 def test_the_rectangle_has_no_phi(asteroid: Scenario) -> None:
     """Its sections are not convex over labels, and the proof needs that: nothing is claimed."""
     rectangle = replace(guaranteed(asteroid).set_model, initial_set=InitialSet.RECTANGLE)
-    results = simulate(replace(guaranteed(asteroid), set_model=rectangle), 20)
+    results = simulate(replace(guaranteed(asteroid), **of_model(rectangle)), 20)
     assert results.guaranteed_miss_m.count() == 0
     assert results.truth_kept.all()
 
@@ -202,7 +203,7 @@ def test_a_rate_sensor_helps_and_stays_sound(asteroid: Scenario, hundred: Result
 def test_angles_more_rarely_than_steps_stay_sound_and_miss_by_more(asteroid: Scenario, hundred: Results) -> None:
     scenario = guaranteed(asteroid)
     sensor = replace(scenario.set_model.angle_sensor, period_s=2.0)
-    rare = simulate(replace(scenario, set_model=replace(scenario.set_model, angle_sensor=sensor)), 100)
+    rare = simulate(replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=sensor))), 100)
     assert sound(rare)
     assert median(rare.guaranteed_miss_m) > median(hundred.guaranteed_miss_m)
 
@@ -255,8 +256,8 @@ def test_faulty_sensors_are_told_and_survived(
 ) -> None:
     scenario = ranging if meter else asteroid
     if model is Model.GUARANTEED:
-        box = replace(scenario.set_model, kind=model, initial_set=InitialSet.BOX)
-        scenario = replace(scenario, set_model=box)
+        box = replace(scenario.set_model, model=model, initial_set=InitialSet.BOX)
+        scenario = replace(scenario, **of_model(box))
     draws = draw(scenario, range(30), 0)
     flight = Engagements(scenario, draws, noise=Faulty(RandomNoise(draws.errors), fault))
     while flight.flying:

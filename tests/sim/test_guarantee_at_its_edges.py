@@ -22,6 +22,7 @@ from infoset.section_life import rate_band
 from sim import Outcome, Results, Scenario, Sun, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
+from sim.scenario import of_model
 
 CASES = Path(__file__).parent / "cases"
 HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
@@ -101,12 +102,12 @@ def round_scenario(number: int) -> Scenario:
         step_s,
         bounds,
         AngleSensor(step_s * int(generator.integers(1, 3)), error_rad, error_rad * one_of(0.7, 1.0, 1.5), range_m),
-        one_of(0.0, 1e-3, 0.1),
-        one_of(0.0, 0.0, 1e-3, 0.1) * range_m,
-        sections,
-        int(generator.integers(1, min(6, sections))),
-        InitialSet.BOX if model is Model.GUARANTEED or one_of(0, 1) else InitialSet.RECTANGLE,
-        model,
+        disturbance_m_s2=one_of(0.0, 1e-3, 0.1),
+        range_threshold_m=one_of(0.0, 0.0, 1e-3, 0.1) * range_m,
+        sections=sections,
+        fewest_sections=int(generator.integers(1, min(6, sections))),
+        initial_set=InitialSet.BOX if model is Model.GUARANTEED or one_of(0, 1) else InitialSet.RECTANGLE,
+        model=model,
     )
     asteroid = load_scenario("asteroid-1997")
     sensor = asteroid.range_sensor
@@ -116,7 +117,7 @@ def round_scenario(number: int) -> Scenario:
         sun=asteroid.sun if one_of(0, 1) else None,
         nominal_range_m=range_m,
         dispersion=replace(bounds, x_m=(range_m, range_m), vx_m_s=(-e, -e)) if one_of(0, 1) else bounds,
-        set_model=set_model,
+        **of_model(set_model),
         range_sensor=replace(sensor, period_s=2.0 * step_s) if one_of(0, 1) else None,
         thruster=replace(
             asteroid.thruster,
@@ -139,7 +140,7 @@ def test_round_numbers_give_no_warning_and_finite_results(first: int, number: in
         for values in (results.miss_m, results.impulse_m_s, results.truth_margin_m.filled(0.0)):
             assert np.isfinite(values).all(), case
         assert np.isfinite(results.guaranteed_miss_m.filled(0.0)).all(), case
-        assert scenario.set_model.kind is Model.PAPER or sound(results), case
+        assert scenario.information_set.model is Model.PAPER or sound(results), case
 
 
 # The band of a measured rate --------------------------------------------------------------------------------------
@@ -149,9 +150,18 @@ def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
     """A model whose error bound at zero range is half (rising) or twice that at the nominal range."""
     box = StateBox((-1e4, 1e4), (4e5, 6e5), (-300.0, 300.0), (-5e3, -5e3))
     model = SetModel(
-        5e3, 1.0, box, AngleSensor(1.0, error_rad, (0.5 if rising else 2.0) * error_rad, 5e5), 0.05, 0.0, 5, 2,
-        InitialSet.BOX, Model.GUARANTEED, execution_error_relative=0.02,
-    )  # fmt: skip
+        5e3,
+        1.0,
+        box,
+        AngleSensor(1.0, error_rad, (0.5 if rising else 2.0) * error_rad, 5e5),
+        disturbance_m_s2=0.05,
+        range_threshold_m=0.0,
+        sections=5,
+        fewest_sections=2,
+        initial_set=InitialSet.BOX,
+        model=Model.GUARANTEED,
+        execution_error_relative=0.02,
+    )
     return model, section_laws(model)[0]
 
 
@@ -160,9 +170,19 @@ SIDES = st.sampled_from([-1.0, 1.0]) | st.floats(-1.0, 1.0)
 
 @settings(max_examples=1000, deadline=None)
 @given(
-    st.floats(-0.02, 0.02), st.floats(-40.0, 40.0), st.integers(0, 6), SIDES, SIDES, st.floats(-8.0, -2.0),
-    st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(-5.0, 5.0), SIDES, st.booleans(), st.booleans(),
-)  # fmt: skip
+    st.floats(-0.02, 0.02),
+    st.floats(-40.0, 40.0),
+    st.integers(0, 6),
+    SIDES,
+    SIDES,
+    st.floats(-8.0, -2.0),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 1.0),
+    st.floats(-5.0, 5.0),
+    SIDES,
+    st.booleans(),
+    st.booleans(),
+)
 def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     slope: float, v: float, ago: int, angle_draw: float, rate_draw: float,
     log_error: float, place: float, width: float, impulse: float, push: float, rising: bool, measured: bool,
@@ -217,10 +237,20 @@ def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(a
     step_s, range_m = 19.0, 2.5e6
     box = StateBox((0.0, 0.0), (range_m, 1.2 * range_m), (-0.1, -0.1), (-58.1e3, -57.9e3))
     model = SetModel(
-        58e3, step_s, box, AngleSensor(step_s, 0.00015, 0.00023, 5.8e6), 1.0, 5e3, 29, 5,
-        InitialSet.BOX, Model.GUARANTEED,
-    )  # fmt: skip
-    scenario = replace(asteroid, sun=None, nominal_range_m=range_m, dispersion=box, set_model=model, range_sensor=None)
+        58e3,
+        step_s,
+        box,
+        AngleSensor(step_s, 0.00015, 0.00023, 5.8e6),
+        disturbance_m_s2=1.0,
+        range_threshold_m=5e3,
+        sections=29,
+        fewest_sections=5,
+        initial_set=InitialSet.BOX,
+        model=Model.GUARANTEED,
+    )
+    scenario = replace(
+        asteroid, sun=None, nominal_range_m=range_m, dispersion=box, **of_model(model), range_sensor=None
+    )
     assert sound(simulate(scenario, 50, seed=1))
 
 
@@ -237,10 +267,27 @@ def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
     at_zero_rad = error_rad * generator.uniform(0.0, 0.3)
     box = StateBox((-z_m, z_m), (0.95 * range_m, 1.05 * range_m), (-vz_m_s, vz_m_s), (-1.01 * e, -0.99 * e))
     model = SetModel(
-        e, step_s, box, AngleSensor(step_s, error_rad, at_zero_rad, range_m), 0.0, 1e4, 29, 3,
-        InitialSet.RECTANGLE, Model.PAPER,
-    )  # fmt: skip
-    scenario = Scenario("", "", None, range_m, box, model, None, Thruster(0.0, 0.1, 1.0))
+        e,
+        step_s,
+        box,
+        AngleSensor(step_s, error_rad, at_zero_rad, range_m),
+        disturbance_m_s2=0.0,
+        range_threshold_m=1e4,
+        sections=29,
+        fewest_sections=3,
+        initial_set=InitialSet.RECTANGLE,
+        model=Model.PAPER,
+    )
+    scenario = Scenario(
+        name="",
+        description="",
+        sun=None,
+        nominal_range_m=range_m,
+        dispersion=box,
+        **of_model(model),
+        range_sensor=None,
+        thruster=Thruster(0.0, 0.1, 1.0),
+    )
     draws = draw(scenario, range(6), 170)
     signs = np.where(draws.errors["angle"] >= 0.0, 1.0, -1.0)
     flight = Engagements(scenario, draws, noise=RandomNoise({**draws.errors, "angle": signs}))
@@ -333,13 +380,24 @@ def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_le
     dispersion = StateBox((4.95e5, 5.5e5), (1.09e6, 1.1e6), (1080.0, 1200.0), (-e, -e))
     # One angle only, at t = 0.
     sensor = AngleSensor(200.0, 1e-3, 1e-3, range_m)
-    model = SetModel(e, 1.0, box, sensor, 0.0, 1e3, 11, 3, InitialSet.BOX, Model.GUARANTEED)
+    model = SetModel(
+        e,
+        1.0,
+        box,
+        sensor,
+        disturbance_m_s2=0.0,
+        range_threshold_m=1e3,
+        sections=11,
+        fewest_sections=3,
+        initial_set=InitialSet.BOX,
+        model=Model.GUARANTEED,
+    )
     scenario = replace(
         asteroid,
         sun=None,
         nominal_range_m=range_m,
         dispersion=dispersion,
-        set_model=model,
+        **of_model(model),
         thruster=Thruster(0, 0.1, 1),
     )
     results = simulate(scenario, 8, seed=1)
@@ -366,7 +424,7 @@ def test_phi_is_extrapolated_from_labels_with_sections_only(
     e, x_m, error_rad = 58e3, (5010.0, 33e3), 2.3e-4
     box = StateBox((-greatest_z_m, greatest_z_m), x_m, (0.0, 0.0), (-e, -e))
     sensor = AngleSensor(0.5, error_at_33_km_rad, error_rad, x_m[1])
-    model = SetModel(e, 0.5, box, sensor, range_threshold_m=5e3, initial_set=InitialSet.BOX, kind=Model.GUARANTEED)
+    model = SetModel(e, 0.5, box, sensor, range_threshold_m=5e3, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
     information = InformationSet(model)
     information.measure_angle(measured_rad)
     information.shift(impulse_m_s)
@@ -384,7 +442,7 @@ def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_sp
     """An impulse of 10 m/s along y, turned by 0.1 rad at most, changes V_z by up to 10 sin(0.1) m/s."""
     box = StateBox((-1.0, 1.0), (1e4, 2e4), (0.0, 0.0), (-1e3, -1e3), (-1.0, 1.0), (0.0, 0.0))
     sensor = AngleSensor(1.0, 1e-3, 1e-3, 1e4)
-    model = SetModel(1e3, 1.0, box, sensor, initial_set=InitialSet.BOX, kind=Model.GUARANTEED, pointing_error_rad=0.1)
+    model = SetModel(1e3, 1.0, box, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED, pointing_error_rad=0.1)
     information = InformationSet(model)
     information.shift([10.0, 0.0])
     for section in information.sections():
@@ -413,11 +471,23 @@ def test_flights_that_gravity_slows_down_reach_their_closest_approach(direction_
         AngleSensor(step_s, 1e-4, 1e-4, start),
         range_threshold_m=0.02 * start,
         initial_set=InitialSet.BOX,
-        kind=Model.GUARANTEED,
+        model=Model.GUARANTEED,
         sections=9,
     )
     sun = Sun(parameter, distance_m, direction_rad)
-    results = simulate(Scenario("slow", "", sun, start, bounds, model, None, Thruster(1.0, 0.0, 1.0)), 4)
+    results = simulate(
+        Scenario(
+            name="slow",
+            description="",
+            sun=sun,
+            nominal_range_m=start,
+            dispersion=bounds,
+            **of_model(model),
+            range_sensor=None,
+            thruster=Thruster(1.0, 0.0, 1.0),
+        ),
+        4,
+    )
     assert sound(results)
     assert (results.miss_m < 0.2 * start).all()
 
@@ -431,7 +501,7 @@ def test_phi_of_an_exactly_known_range_and_speed(greatest_z_m: float) -> None:
     e = 1e3
     box = StateBox((-greatest_z_m, greatest_z_m), (2e4, 2e4), (0.0, 0.0), (-e, -e))
     sensor = AngleSensor(0.9, 1e-3, 1e-3, 2e4)
-    model = SetModel(e, 0.9, box, sensor, range_threshold_m=500.0, initial_set=InitialSet.BOX, kind=Model.GUARANTEED)
+    model = SetModel(e, 0.9, box, sensor, range_threshold_m=500.0, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
     information = InformationSet(model)
     while information.tracking.any():
         information.measure_angle(0.0)

@@ -14,6 +14,7 @@ from sim import Manoeuvre, Outcome, Results, Scenario, Target
 from sim.adversary import Objective, find_worst
 from sim.draws import draw
 from sim.engagement import Engagements, Step
+from sim.scenario import of_model
 from tests.space import in_space
 
 RUNS = 16
@@ -21,8 +22,8 @@ EXACT = ScriptedNoise({})
 
 
 def guaranteed(scenario: Scenario) -> Scenario:
-    model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX, sections=9)
-    return replace(scenario, set_model=model)
+    model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX, sections=9)
+    return replace(scenario, **of_model(model))
 
 
 def fly(
@@ -44,16 +45,18 @@ def without_control(asteroid: Scenario, kind: Model, x_m: tuple[float, float]) -
         sun=None,
         nominal_range_m=1e6,
         dispersion=replace(box, z_m=(-1e3, -1e3)),
-        set_model=SetModel(
-            closing_speed_m_s=10e3,
-            step_s=0.5,
-            bounds=box,
-            angle_sensor=AngleSensor(0.5, 0.2, 0.2, nominal_range_m=1e6),
-            kind=kind,
-            initial_set=InitialSet.BOX,
-            disturbance_m_s2=0.0,
-            sections=5,
-            range_threshold_m=5e3,
+        **of_model(
+            SetModel(
+                closing_speed_m_s=10e3,
+                step_s=0.5,
+                bounds=box,
+                angle_sensor=AngleSensor(0.5, 0.2, 0.2, nominal_range_m=1e6),
+                model=kind,
+                initial_set=InitialSet.BOX,
+                disturbance_m_s2=0.0,
+                sections=5,
+                range_threshold_m=5e3,
+            )
         ),
         thruster=replace(asteroid.thruster, budget_m_s=0.0),
     )
@@ -77,7 +80,7 @@ def test_the_farthest_range_has_the_greatest_miss(asteroid: Scenario) -> None:
 def test_the_disturbance_adds_to_the_miss(asteroid: Scenario) -> None:
     """0.02 m/s^2 over 100 s move by 100 m; the set adds half of a step's change of V, 5 mm/s, at the start: 0.5 m."""
     scenario = without_control(asteroid, Model.GUARANTEED, (1e6, 1e6))
-    scenario = replace(scenario, set_model=replace(scenario.set_model, disturbance_m_s2=0.02))
+    scenario = replace(scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=0.02)))
     assert fly(scenario, 1, noise=EXACT)[1] == pytest.approx([5.1005e3], rel=1e-6)
 
 
@@ -85,7 +88,7 @@ def test_in_space_the_misses_along_both_axes_are_combined(asteroid: Scenario) ->
     """The corner (-6 km + 100 s * -30 m/s, -5 km) of the rectangle of misses, as in Phi."""
     plane = without_control(asteroid, Model.GUARANTEED, (1e6, 1e6))
     box = replace(plane.set_model.bounds, y_m=(-6e3, 1e3), vy_m_s=(-30.0, 30.0))
-    scenario = replace(plane, dispersion=box, set_model=replace(plane.set_model, bounds=box))
+    scenario = replace(plane, dispersion=box, **of_model(replace(plane.set_model, bounds=box)))
     assert fly(scenario, 2, noise=EXACT)[1] == pytest.approx([np.hypot(9e3, 5e3)] * 2, rel=1e-6)
 
 
@@ -138,7 +141,7 @@ def test_where_the_set_is_lost_the_truth_counts(asteroid: Scenario) -> None:
     wrong = replace(
         asteroid,
         dispersion=fast,
-        set_model=replace(asteroid.set_model, bounds=replace(asteroid.set_model.bounds, vx_m_s=(-110.1e3, -110e3))),
+        **of_model(replace(asteroid.set_model, bounds=replace(asteroid.set_model.bounds, vx_m_s=(-110.1e3, -110e3)))),
     )
     results, any_state_m = fly(wrong, 3)
     assert set(results.outcomes) == {Outcome.SET_EMPTY}

@@ -13,6 +13,7 @@ from infoset.history import IMPULSE
 from sim import Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
+from sim.scenario import of_model
 
 
 def of_2000_steps(asteroid: Scenario) -> Scenario:
@@ -21,11 +22,11 @@ def of_2000_steps(asteroid: Scenario) -> Scenario:
         asteroid.set_model,
         step_s=0.05,
         angle_sensor=replace(asteroid.set_model.angle_sensor, period_s=0.05),
-        kind=Model.GUARANTEED,
+        model=Model.GUARANTEED,
         initial_set=InitialSet.BOX,
         sections=5,
     )
-    return replace(asteroid, set_model=model, thruster=replace(asteroid.thruster, impulses_s=(60.0, 20.0, 5.0)))
+    return replace(asteroid, **of_model(model), thruster=replace(asteroid.thruster, impulses_s=(60.0, 20.0, 5.0)))
 
 
 def test_the_history_of_a_long_flight_has_two_events_a_step(asteroid: Scenario) -> None:

@@ -25,6 +25,7 @@ from infoset.sensor import Sensor
 from sim import Scenario, Sun
 from sim.bound import lower_bound, pair_at
 from sim.pair import PairNoise, ScheduledMotion, fly_pair, middle
+from sim.scenario import of_model
 
 QUICK = 4
 """Random scenarios of the quick tests: of one label, so that there are few linear programs."""
@@ -61,7 +62,7 @@ def published_in_space() -> Scenario:
 @pytest.fixture
 def nothing_known() -> InformationSetView:
     box = StateBox((-1.0, 1.0), (900.0, 1100.0), (-1.0, 1.0), (-101.0, -99.0))
-    return InformationSet(SetModel(100.0, 1.0, box, SENSOR), 4).view()
+    return InformationSet(SetModel(100.0, 1.0, box, SENSOR, model=Model.PAPER), 4).view()
 
 
 def test_pairs_are_measured_in_the_middle_until_it_is_late(nothing_known: InformationSetView) -> None:
@@ -167,7 +168,7 @@ def random_scenario(number: int) -> Scenario:
         range_threshold_m=draws.uniform(0.1, 0.3) * speed * step_s,
         sections=15,
         initial_set=InitialSet.BOX if guaranteed else InitialSet.RECTANGLE,
-        kind=Model.GUARANTEED if guaranteed else Model.PAPER,
+        model=Model.GUARANTEED if guaranteed else Model.PAPER,
     )
     return Scenario(
         name=f"random {number}",
@@ -175,7 +176,7 @@ def random_scenario(number: int) -> Scenario:
         sun=Sun(1.3e20, draws.uniform(50e9, 200e9), draws.uniform(-np.pi, np.pi)) if draws.integers(2) else None,
         nominal_range_m=nominal,
         dispersion=box,
-        set_model=model,
+        **of_model(model),
         range_sensor=RangeSensor(2.0 * step_s, 0.05) if draws.integers(2) else None,
         thruster=Thruster(engine * draws.uniform(0.4, 1.5) * steps, 0.05 * engine, engine),
         rate_sensor=RateSensor(step_s, draws.uniform(1.0, 10.0) * hidden_m_s / nominal) if number % 4 == 3 else None,
@@ -195,7 +196,7 @@ def random_in_space(number: int) -> Scenario:
     disturbance = share[3] * model.disturbance_m_s2
     model = replace(model, bounds=box, angle_sensor=sensor, disturbance_y_m_s2=disturbance)
     sun = None if scenario.sun is None else replace(scenario.sun, elevation_rad=draws.uniform(-0.5, 0.5) * np.pi)
-    return replace(scenario, set_model=model, dispersion=box, sun=sun)
+    return replace(scenario, **of_model(model), dispersion=box, sun=sun)
 
 
 class Still:
@@ -240,10 +241,10 @@ def test_one_of_the_pair_misses_by_the_bound_in_the_scenario_of_1997(
     """
     model = published_in_space.set_model
     sensor = replace(model.angle_sensor, convention=convention, error_shape=ErrorShape(shape))
-    model = replace(model, angle_sensor=sensor, kind=kind)
+    model = replace(model, angle_sensor=sensor, model=kind)
     if kind is Model.GUARANTEED:
         model = replace(model, initial_set=InitialSet.BOX)
-    scenario = replace(published_in_space, set_model=model)
+    scenario = replace(published_in_space, **of_model(model))
     pair = pair_at(scenario, 5801.3e3, -58e3)
     apart_m, correction_m = (81.12, 38.34) if shape == "box" else (45.80, 23.17)
     reserve = (0.08 / 0.15 + (convention is Convention.GIMBAL)) * 0.5 / 58.0**2

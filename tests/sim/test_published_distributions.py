@@ -10,6 +10,7 @@ import pytest
 from guidance import NoiseKind
 from infoset import Recovery
 from sim import Scenario, simulate
+from sim.scenario import of_model
 
 pytestmark = pytest.mark.slow
 
@@ -40,7 +41,7 @@ def test_with_the_range_meter(
 ) -> None:
     """The published procedure: a set that a measurement empties stays lost."""
     model = replace(ranging.set_model, recovery=Recovery.NONE)
-    results = simulate(replace(ranging, noise=noise, set_model=model), 1000)
+    results = simulate(replace(ranging, noise=noise, **of_model(model)), 1000)
     assert np.quantile(results.miss_m, 0.5) == pytest.approx(median, rel=0.2)
     assert np.quantile(results.miss_m, 0.9) == pytest.approx(nine_in_ten, rel=0.2)
     assert np.quantile(results.impulse_m_s, 0.5) == pytest.approx(impulse, rel=0.2)
@@ -50,7 +51,7 @@ def test_with_the_range_meter(
 def test_the_number_of_sections_does_not_matter(asteroid: Scenario, noise: NoiseKind) -> None:
     def figures(sections: int) -> np.ndarray:
         model = replace(asteroid.set_model, sections=sections)
-        results = simulate(replace(asteroid, noise=noise, set_model=model), 1000)
+        results = simulate(replace(asteroid, noise=noise, **of_model(model)), 1000)
         return np.array(
             [
                 np.quantile(results.miss_m, 0.5),

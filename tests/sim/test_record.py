@@ -15,6 +15,7 @@ from infoset.sensor import Cuttable, Geometry, Measurements
 from infoset.sensors import SENSORS
 from sim import Outcome, Scenario, fly_one, lower_bound, simulate
 from sim.draws import EXECUTION, START, TARGET, TIE
+from sim.scenario import of_model
 from tests.space import in_space
 
 
@@ -27,7 +28,7 @@ class RangeAlone:
 
 def test_the_measurement_that_empties_the_set_for_good_is_kept(brief: Scenario) -> None:
     model = replace(brief.set_model, recovery=Recovery.NONE)
-    ranging = replace(brief, set_model=model, range_sensor=RangeSensor(model.step_s, 1e-3))
+    ranging = replace(brief, **of_model(model), range_sensor=RangeSensor(model.step_s, 1e-3))
     record = fly_one(ranging, noise=RangeAlone())
     first, later = record.steps[0], record.steps[1]
     assert record.result.outcomes == (Outcome.SET_EMPTY,)
@@ -94,8 +95,8 @@ class WithStreaks(Scenario):
 
 @pytest.mark.parametrize("noise", NoiseKind)
 def test_a_new_kind_of_sensor_is_one_class(brief: Scenario, noise: NoiseKind) -> None:
-    model = replace(brief.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    plain = replace(brief, noise=noise, set_model=model)
+    model = replace(brief.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    plain = replace(brief, noise=noise, **of_model(model))
     streaks = WithStreaks(**{field.name: getattr(plain, field.name) for field in fields(plain)})
     record = fly_one(streaks)
     assert [("streak" in step.measured) for step in record.steps[:4]] == [True, False, True, False]

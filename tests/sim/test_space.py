@@ -15,6 +15,7 @@ from infoset.sensor import Measurements
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements, Step
+from sim.scenario import of_model
 from tests.long_steps import with_long_steps
 from tests.space import in_space
 
@@ -29,9 +30,9 @@ def fly(scenario: Scenario, draws: Draws) -> tuple[Results, list[Step]]:
     return flight.results(np.arange(len(draws.position_m))), steps
 
 
-def of_model(scenario: Scenario, model: Model) -> Scenario:
+def in_model(scenario: Scenario, model: Model) -> Scenario:
     shape = InitialSet.BOX if model is Model.GUARANTEED else InitialSet.RECTANGLE
-    return replace(scenario, set_model=replace(scenario.set_model, kind=model, initial_set=shape))
+    return replace(scenario, **of_model(replace(scenario.set_model, model=model, initial_set=shape)))
 
 
 def equal(there: Results, back: Results) -> None:
@@ -58,12 +59,12 @@ def test_the_plane_is_a_special_case(
     name: str, strategy: str, model: Model, noise: NoiseKind, tie: TieRule, request: pytest.FixtureRequest
 ) -> None:
     # Theory, section 9, item 1: y = V_y = 0, known exactly and measured without error; one code, so equal bits.
-    planar = of_model(with_long_steps(request.getfixturevalue(name)), model)
+    planar = in_model(with_long_steps(request.getfixturevalue(name)), model)
     planar = replace(planar, noise=noise, tie=tie, strategy=strategy)
     sensor = replace(planar.set_model.angle_sensor, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
     bounds = flat(planar.set_model.bounds)
     known = replace(planar.set_model, bounds=bounds, angle_sensor=sensor, disturbance_y_m_s2=0.0)
-    spatial = replace(planar, set_model=known, dispersion=flat(planar.dispersion))
+    spatial = replace(planar, **of_model(known), dispersion=flat(planar.dispersion))
     there = simulate(planar, 6, seed=5)
     back = simulate(spatial, 6, seed=5)
     np.testing.assert_array_equal(back.miss_m, there.miss_m)
@@ -100,7 +101,9 @@ def uneven(scenario: Scenario) -> Scenario:
     model = spatial.set_model
     box = replace(model.bounds, y_m=(-7e3, 9e3), vy_m_s=(-80.0, 110.0))
     start = replace(spatial.dispersion, y_m=(-800.0, 900.0), vy_m_s=(-50.0, 60.0))
-    return replace(spatial, dispersion=start, sun=None, set_model=replace(model, bounds=box, disturbance_y_m_s2=0.007))
+    return replace(
+        spatial, dispersion=start, sun=None, **of_model(replace(model, bounds=box, disturbance_y_m_s2=0.007))
+    )
 
 
 def exchanged(scenario: Scenario) -> Scenario:
@@ -122,7 +125,7 @@ def exchanged(scenario: Scenario) -> Scenario:
         disturbance_m_s2=model.disturbance_y_m_s2,
         disturbance_y_m_s2=model.disturbance_m_s2,
     )
-    return replace(scenario, dispersion=exchanged_box(scenario.dispersion), set_model=known)
+    return replace(scenario, dispersion=exchanged_box(scenario.dispersion), **of_model(known))
 
 
 @pytest.mark.parametrize("name", ["asteroid", pytest.param("ranging", marks=pytest.mark.slow)])
@@ -131,7 +134,7 @@ def exchanged(scenario: Scenario) -> Scenario:
 def test_an_exchange_of_the_axes_changes_nothing(
     name: str, model: Model, noise: NoiseKind, tie: TieRule, request: pytest.FixtureRequest
 ) -> None:
-    scenario = replace(uneven(of_model(with_long_steps(request.getfixturevalue(name)), model)), noise=noise, tie=tie)
+    scenario = replace(uneven(in_model(with_long_steps(request.getfixturevalue(name)), model)), noise=noise, tie=tie)
     draws = draw(scenario, range(6), 3)
     there, steps = fly(scenario, draws)
     back, mirrored = fly(exchanged(scenario), exchanged_draws(draws))
@@ -147,7 +150,7 @@ def test_an_exchange_of_the_axes_and_of_the_sun_changes_nothing(asteroid: Scenar
         replace(asteroid.sun, direction_rad=angle, elevation_rad=elevation)
         for angle, elevation in ((0.7, 0.0), (0.0, 0.7))
     )
-    scenario = of_model(in_space(with_long_steps(asteroid)), Model.GUARANTEED)
+    scenario = in_model(in_space(with_long_steps(asteroid)), Model.GUARANTEED)
     draws = draw(scenario, range(6), 3)
     there, _ = fly(replace(scenario, sun=in_z), draws)
     back, _ = fly(replace(scenario, sun=in_y), exchanged_draws(draws))
@@ -163,7 +166,7 @@ def test_a_mirrored_engagement_is_mirrored(
     axes: tuple[bool, bool], model: Model, noise: NoiseKind, asteroid: Scenario
 ) -> None:
     # Mirror of both axes (theory, section 9, item 3), and of one axis, with random ties of opposite sign.
-    scenario = replace(uneven(of_model(with_long_steps(asteroid), model)), noise=noise, tie=TieRule.RANDOM)
+    scenario = replace(uneven(in_model(with_long_steps(asteroid), model)), noise=noise, tie=TieRule.RANDOM)
     draws = draw(scenario, range(6), 3)
     flips = np.array([-1.0 if flip else 1.0 for flip in axes])
 
@@ -177,7 +180,7 @@ def test_a_mirrored_engagement_is_mirrored(
     mirrored = replace(
         scenario,
         dispersion=mirror(scenario.dispersion),
-        set_model=replace(scenario.set_model, bounds=mirror(scenario.set_model.bounds)),
+        **of_model(replace(scenario.set_model, bounds=mirror(scenario.set_model.bounds))),
     )
     turned = replace(
         draws,
@@ -226,7 +229,7 @@ def test_the_diagonal_is_a_planar_engagement_times_root_two(noise: NoiseKind, as
 )
 def test_sections_are_those_of_the_two_planar_sets(model: Model, with_rates: bool, asteroid: Scenario) -> None:
     # Theory, section 9, item 6: a replay at any label is the product of the planar replays of (alpha_a, k_a).
-    scenario = uneven(of_model(asteroid, model))
+    scenario = uneven(in_model(asteroid, model))
     if with_rates:
         scenario = replace(scenario, rate_sensor=RateSensor(1.0, 3e-8))
     draws = draw(scenario, [0], 3)
@@ -290,7 +293,7 @@ def extremal(scenario: Scenario, runs: int, seed: int) -> tuple[Draws, ScriptedN
 
 @pytest.mark.parametrize("convention", list(Convention))
 def test_the_true_state_is_kept_in_every_convention(convention: Convention, asteroid: Scenario) -> None:
-    scenario = of_model(in_space(asteroid, convention=convention), Model.GUARANTEED)
+    scenario = in_model(in_space(asteroid, convention=convention), Model.GUARANTEED)
     draws, noise = extremal(scenario, 100, 7)
     flight = Engagements(scenario, draws, noise=noise)
     while flight.flying:
@@ -315,12 +318,12 @@ class Mistaken:
 @pytest.mark.parametrize("convention", [Convention.GIMBAL, Convention.CONE])
 def test_the_bands_of_the_conventions_are_needed(convention: Convention, asteroid: Scenario) -> None:
     # Theory, section 1: taken for plane angles, some true states are outside.
-    scenario = of_model(in_space(asteroid, convention=convention), Model.GUARANTEED)
+    scenario = in_model(in_space(asteroid, convention=convention), Model.GUARANTEED)
     draws, noise = extremal(scenario, 300, 8)
     flight = Engagements(scenario, draws, noise=noise)
     plane = in_space(asteroid).set_model.angle_sensor
     wrong = Engagements(
-        replace(scenario, set_model=replace(scenario.set_model, angle_sensor=plane)),
+        replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=plane))),
         draws,
         noise=Mistaken(noise, scenario.set_model.angle_sensor),
     )

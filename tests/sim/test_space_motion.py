@@ -211,7 +211,7 @@ def test_the_acceleration_of_the_scaled_motion_is_within_its_bound(wide: float, 
     """Gravity and the change of scale that it causes, for any direction of the Sun and a y axis of any width."""
     start = spatial.set_model.bounds
     box = replace(start, y_m=(-1e4 * wide, 1e4 * wide), vy_m_s=(-100.0 * wide, 100.0 * wide))
-    quiet = replace(spatial.set_model, bounds=box, kind=Model.GUARANTEED, disturbance_m_s2=0.0)
+    quiet = replace(spatial.set_model, bounds=box, model=Model.GUARANTEED, disturbance_m_s2=0.0)
     least, greatest = corners(box)
     random, worst, speed = np.random.default_rng(12), np.zeros(2), quiet.closing_speed_m_s
     for number in range(12):

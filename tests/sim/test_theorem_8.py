@@ -19,6 +19,7 @@ from sim import Scenario, find_worst, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.gravity import on_board_model
+from sim.scenario import of_model
 from sim.theorem_8 import Theorem8
 
 
@@ -27,8 +28,8 @@ def known() -> Scenario:
     """The engagement of 1997 with known range and closing speed, in the guaranteed model."""
     asteroid = replace(load_scenario("asteroid-1997"), range_sensor=None, strategy="least-effort")
     bounds = replace(asteroid.set_model.bounds, x_m=(5801.3e3, 5801.3e3), vx_m_s=(-58e3, -58e3))
-    model = replace(asteroid.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX, bounds=bounds)
-    return replace(asteroid, set_model=model, dispersion=bounds)
+    model = replace(asteroid.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX, bounds=bounds)
+    return replace(asteroid, **of_model(model), dispersion=bounds)
 
 
 def after(bound: Theorem8, first_rad: float, impulses: Sequence[tuple[float, float]] = ()) -> Theorem8:
@@ -135,7 +136,7 @@ def test_a_search_finds_no_worse_flight_and_comes_near(known: Scenario, greatest
 
 def test_it_is_unknown_where_the_theorem_says_nothing(known: Scenario) -> None:
     def of(scenario: Scenario, **model: Any) -> Any:
-        changed = replace(scenario, set_model=replace(scenario.set_model, **model))
+        changed = replace(scenario, **of_model(replace(scenario.set_model, **model)))
         return simulate(changed, 5, guarantee=False).theorem_8_miss_m.mask.all()
 
     bounds, engine = known.set_model.bounds, known.thruster
@@ -143,7 +144,7 @@ def test_it_is_unknown_where_the_theorem_says_nothing(known: Scenario) -> None:
     assert of(replace(known, strategy="symmetric-miss"))
     assert of(known, bounds=replace(bounds, x_m=(5301.3e3, 6301.3e3)))
     assert of(known, bounds=replace(bounds, vx_m_s=(-59e3, -57e3)))
-    assert of(known, kind=Model.PAPER)
+    assert of(known, model=Model.PAPER)
     assert of(known, initial_set=InitialSet.RECTANGLE)
     assert of(replace(known, thruster=replace(engine, execution_error_relative=0.01)))
     assert of(known, angle_sensor=replace(known.set_model.angle_sensor, period_s=1.0))

@@ -14,8 +14,8 @@ import pytest
 from sim import CampaignNoise, QuantileName, Requirement, Scenario, StoppingRule, Sweep
 from sim.campaign import Progress
 from sim.requirement import Decision, judge
-from sim.storage import Axis, CampaignFolder, ManifestError, read_manifest
-from sim.storage.manifest import write_manifest
+from sim.scenario import of_model
+from sim.storage import Axis, CampaignFolder, read_manifest
 
 ERRORS = (1e-5, 1.2e-4, 1.5e-4, 3e-4)
 REQUIRED = Requirement(QuantileName("miss_m", 0.8), 3.0)
@@ -50,7 +50,9 @@ class Shuffled(Executor):
 def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Sweep:
     sensor = brief.set_model.angle_sensor
     cells = tuple(
-        replace(brief, set_model=replace(brief.set_model, angle_sensor=replace(sensor, error_at_zero_range_rad=error)))
+        replace(
+            brief, **of_model(replace(brief.set_model, angle_sensor=replace(sensor, error_at_zero_range_rad=error)))
+        )
         for error in ERRORS
     )
     axis = Axis("angle_sensor.error_at_zero_range_rad", ERRORS)
@@ -149,26 +151,6 @@ def test_a_damaged_shard_is_simulated_again(asked: Sweep, flown: CampaignFolder,
     assert not CampaignFolder.read(tmp_path / "again").complete
     assert len(again.run(resume=True).redone) == 1
     assert names(again.folder) == stored == names(asked.folder)
-
-
-def test_sweeps_of_earlier_versions_are_read_and_resumed_but_not_extended(asked: Sweep, tmp_path: Path) -> None:
-    fixed = replace(asked, runs=32, until=None, most_runs=None, folder=tmp_path / "new")
-    whole = fixed.run().table
-    old = replace(fixed, folder=tmp_path / "old")
-    (tmp_path / "old").mkdir()
-    write_manifest(tmp_path / "old", replace(fixed.manifest(), order="cells"))
-    assert b"order" not in (tmp_path / "old" / "manifest.json").read_bytes()
-    assert b"cell_runs" not in (tmp_path / "old" / "manifest.json").read_bytes()
-    assert b"require" not in (tmp_path / "old" / "manifest.json").read_bytes()
-    assert b"extended" not in (tmp_path / "old" / "manifest.json").read_bytes()
-    assert old.run(resume=True).table.equals(whole)
-    assert read_manifest(tmp_path / "old").order == "cells"
-    assert read_manifest(tmp_path / "old").runs_of(1) == (0, range(16, 32))
-    assert read_manifest(tmp_path / "new").runs_of(1) == (1, range(16))
-    with pytest.raises(ManifestError, match="earlier version wrote the sweep"):
-        replace(old, runs=48).run(resume=True)
-    longer = replace(fixed, runs=48).run(resume=True)
-    assert longer.folder.table(None, 0).slice(0, 32).equals(whole.slice(0, 32))
 
 
 def test_what_does_not_fit_together(asked: Sweep) -> None:

@@ -17,6 +17,7 @@ from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements
 from sim.pair import ScheduledMotion
+from sim.scenario import of_model
 
 CASES = Path(__file__).parent / "cases"
 ULP = 2.0**-52
@@ -52,7 +53,7 @@ def test_a_truth_outside_by_a_hundred_allowances_is_reported(disturbance_m_s2: f
     """The allowance is 4 ulp of the terms of z. For z = 0 they are the greatest V times the time to go."""
     scenario = load_scenario(CASES / "exactly-known-offset.toml")
     model = replace(scenario.set_model, disturbance_m_s2=disturbance_m_s2)
-    scenario = replace(scenario, set_model=model, sun=None)
+    scenario = replace(scenario, **of_model(model), sun=None)
     # At t = 0 the set contains the first half of a step's disturbance.
     to_go_s, v_m_s = scenario.nominal_range_m / model.closing_speed_m_s, 0.5 * disturbance_m_s2 * model.step_s
     allowance_m = 4 * ULP * to_go_s * v_m_s
@@ -90,7 +91,7 @@ class Stored:
 def narrow_labels(share: float) -> Engagements:
     """Errors of 1e-12 rad, almost at their bounds: labels live within 150 ulp around that of the truth at the end."""
     scenario = load_scenario(CASES / "narrow-labels.toml")
-    scenario = replace(scenario, set_model=replace(scenario.set_model, recovery=Recovery.NONE))
+    scenario = replace(scenario, **of_model(replace(scenario.set_model, recovery=Recovery.NONE)))
     with np.load(CASES / "narrow-labels.npz") as arrays:
         stored = Stored(dict(arrays), scenario.thruster.delay_steps, share)
     position_m, velocity_m_s = stored.arrays["position"], stored.arrays["velocity"]
@@ -147,7 +148,7 @@ def test_a_guaranteed_miss_of_zero_allows_for_the_rounding_of_the_miss(
         known = StateBox((0.0, 0.0), (range_m, range_m), (0.0, 0.0), (-1.01 * speed_m_s, -0.99 * speed_m_s))
         model = replace(
             asteroid.set_model,
-            kind=Model.GUARANTEED,
+            model=Model.GUARANTEED,
             closing_speed_m_s=speed_m_s,
             bounds=known,
             initial_set=InitialSet.BOX,
@@ -157,7 +158,7 @@ def test_a_guaranteed_miss_of_zero_allows_for_the_rounding_of_the_miss(
             step_s=1.0,
         )
         scenario = replace(
-            asteroid, sun=None, nominal_range_m=range_m, dispersion=known, set_model=model, rate_sensor=rate_sensor
+            asteroid, sun=None, nominal_range_m=range_m, dispersion=known, **of_model(model), rate_sensor=rate_sensor
         )
         results = simulate(scenario, 10)
         assert results.truth_kept.all()

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from PIL import Image, ImageSequence
 
@@ -20,7 +20,6 @@ from experiments.interception.figures.sets import Plane, draw_plane, label_plane
 from infoset.arrays import Floats
 from sim import Record
 
-GIF, MP4 = ".gif", ".mp4"
 DURATION_S = 8.0
 COLOURS = 16
 
@@ -30,26 +29,25 @@ _SECOND_MM = 58.0
 
 def animate(
     records: Sequence[Record],
-    ending: str,
     most_frames: int = 40,
     width_px: int | None = None,
     progress: Callable[[float], None] = lambda _done: None,
 ) -> bytes:
-    """Return an animation of engagements, side by side, of eight seconds.
+    """Return a GIF animation of engagements, side by side, of eight seconds and 16 colours.
 
-    A ``.gif`` is written by Pillow, with 16 colours, an ``.mp4`` by ffmpeg. Frames are evenly distributed over the
-    steps, and take about 0.2 s of computing each. The default width of a frame is 425 pixels, or 640 for two records.
+    Frames are evenly distributed over the steps, and take about 0.2 s of computing each. The default width of a frame
+    is 425 pixels, or 640 for two records.
     """
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, most_frames)
     fps = max(1, round(most_frames / DURATION_S))
-    writer: AbstractMovieWriter = PillowWriter(fps=fps) if ending == GIF else FFMpegWriter(fps=fps)
+    writer = PillowWriter(fps=fps)
     traces = traces_of(records)
     in_space = any(record.scenario.is_spatial for record in records)
     width_mm, usual_px = {1: (120.0, 425), 2: (180.0, 640)}.get(len(traces), (90.0 * len(traces), 320 * len(traces)))
     width = usual_px if width_px is None else width_px
     with style(), TemporaryDirectory() as folder:
-        file = Path(folder) / f"animation{ending}"
+        file = Path(folder) / "animation.gif"
         figure = new_figure(height_mm=86.0 + _SECOND_MM + 4.0 * in_space, width_mm=width_mm)
         gap = 0.0 if len(traces) == 1 else 16.0 if in_space else 8.0
         margins = (18.0, 5.0, 11.0, 8.0 + 4.0 * in_space)
@@ -73,7 +71,7 @@ def animate(
                     line.set_xdata(clock.at(record, [time, time]))
                 writer.grab_frame()
                 progress((index + 1) / len(chosen))
-        return _few_colours(file) if ending == GIF else file.read_bytes()
+        return _few_colours(file)
 
 
 def _frame_times(records: Sequence[Record], clock: Clock, most: int) -> Floats:

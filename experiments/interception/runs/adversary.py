@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
+from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, say_warnings, show
 from experiments.interception.choices import study_scenario
@@ -19,7 +20,7 @@ from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import steps_csv
 from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, need_times, read_times
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, summary_head
-from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings
 from experiments.interception.study import scenario_title
 from sim import Scenario
 from sim.adversary import Objective, WorstEngagement
@@ -60,7 +61,7 @@ def run(options: Adversary) -> None:
         if records:
             need_times(options.times, times_s, records)
         summary = {**summary_head(scenario, warnings), **_summary(scenario, worst, chosen, options, elapsed_s)}
-        written.save("scenario.toml", scenario_to_toml(scenario))
+        written.save("scenario.toml", to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         for record in records:
             written.save("steps.csv", steps_csv([record]))
@@ -76,7 +77,7 @@ def _summary(
 ) -> dict[str, object]:
     return {
         "seed": chosen.seed,
-        "model": scenario.set_model.kind.value,
+        "model": scenario.information_set.model.value,
         "range_meter": scenario.range_sensor is not None,
         "elapsed_s": elapsed_s,
         "strategy": chosen.strategy,

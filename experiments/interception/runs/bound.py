@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
+from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import (
     BeginProgress,
@@ -26,7 +27,7 @@ from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Bound
 from experiments.interception.runs.game_value import GameValue, WorstOfStrategy, value_of
 from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, summary_head
-from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings
 from guidance import Strategy
 from sim import BoundError, Scenario
 from sim.bound import LowerBound, lower_bound, pair_at
@@ -57,12 +58,12 @@ def run(options: Bound) -> None:
         value = value_of(scenario, lower, worst)
         summary = {
             **summary_head(scenario, warnings),
-            "model": scenario.set_model.kind.value,
+            "model": scenario.information_set.model.value,
             "elapsed_s": perf_counter() - began_s,
             **_summary(scenario, lower, nominal, worst),
             "value": value.summary(),
         }
-        written.save("scenario.toml", scenario_to_toml(scenario))
+        written.save("scenario.toml", to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         if options.out is not None:
             from experiments.interception.figures.bound import draw_bound
@@ -207,7 +208,7 @@ def _parts(
         searched = strategy.searched.misses().values()
         values = (strategy.pairs_m, *searched, strategy.over(lower), strategy.guaranteed_m)
         strategies.add_row(strategy.name, *(number(value) for value in values))
-    model = scenario.set_model.kind.value
+    model = scenario.information_set.model.value
     yield f"{scenario.name}, model {model}: no strategy can guarantee a miss below {number(lower.bound_m)} m"
     yield (
         f"at the range {nominal.label_m / M_PER_KM:.1f} km and closing speed {-nominal.vx_m_s / M_PER_KM:g} km/s, the "

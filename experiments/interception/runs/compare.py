@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from time import perf_counter
 
+from experiments.common.input_file import to_toml
 from experiments.common.output import Cell, hit_key, output_of, to_csv, to_json
 from experiments.common.screen import (
     Part,
@@ -22,7 +23,7 @@ from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Compare
 from experiments.interception.comparison import Comparison, Flight, flights, gather, summary
 from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_in_threads, summary_head
-from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings
 from experiments.interception.study import (
     QUANTILES,
     SetCounts,
@@ -54,7 +55,7 @@ def run(options: Compare) -> None:
         compared = _simulate(scenario, strategies, options.runs, options.seed, reports)
         result = {
             **summary_head(scenario, warnings),
-            "model": scenario.set_model.kind.value,
+            "model": scenario.information_set.model.value,
             "range_meter": scenario.range_sensor is not None,
             "seed": options.seed,
             "runs": options.runs,
@@ -62,7 +63,7 @@ def run(options: Compare) -> None:
             "strategies": [_summary(comparison) for comparison in compared],
             "notes": [game_note(scenario, TIES)],
         }
-        written.save("scenario.toml", scenario_to_toml(scenario))
+        written.save("scenario.toml", to_toml(scenario))
         written.save("results.json", to_json(result), "--json")
         if written.wants("--csv"):
             columns = (*COLUMNS, "miss_y_m", "miss_z_m") if scenario.is_spatial else COLUMNS
@@ -152,4 +153,4 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
     yield from ("", f"of the {some_runs(runs)}:", sets)
     yield game_note(scenario, TIES)
     yield from quantile_notes(runs, [*QUANTILES.values()])
-    yield from set_warnings(scenario.set_model.kind, total)
+    yield from set_warnings(scenario.information_set.model, total)

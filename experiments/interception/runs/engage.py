@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
 
+from experiments.common.input_file import to_toml
 from experiments.common.output import Cell, library_version, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, show
 from experiments.interception.choices import scenario_with
@@ -20,11 +21,12 @@ from experiments.interception.runs.engagement_table import (
     read_times,
 )
 from experiments.interception.runs.shared import need_finite, summary_head
-from experiments.interception.scenario_file import scenario_hash, scenario_to_toml, scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings
 from guidance import NoiseKind
 from infoset import AngleSensor, Convention
 from infoset.sensors import SENSORS
 from sim import AxisStep, Record, StepRecord, fly_one
+from sim.storage.codec import fingerprint
 
 
 def run(options: Engage) -> None:
@@ -62,9 +64,9 @@ def run(options: Engage) -> None:
                 **_summary(record, perf_counter() - began_s),
             }
         need_times(options.times, times_s, records)
-        head = {"version": library_version(), "scenario_hash": scenario_hash(scenario)}
+        head = {"version": library_version(), "scenario_hash": fingerprint(scenario)}
         summary = {**head, **summaries} if both else summaries[noises[0].value]
-        written.save("scenario.toml", scenario_to_toml(scenario if both else records[0].scenario))
+        written.save("scenario.toml", to_toml(scenario if both else records[0].scenario))
         written.save("results.json", to_json(summary), "--json")
         written.save("steps.csv", steps_csv(records), "--csv")
         for record, name in zip(records, folder_records, strict=True):

@@ -9,7 +9,7 @@ from experiments.common.errors import InputError
 from experiments.common.options import read_number
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
-from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
+from experiments.interception.published import SINGLE, printed_single_runs
 from experiments.interception.runs.shared import THEOREM_8_NAME, allowance, bound_name
 from sim import Record
 from sim.results import ending
@@ -42,9 +42,10 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
             "strategy": record.strategy,
         }
         columns.append((f"{record.noise_name}{meter}", values))
-        paper = PRINTED_SINGLE_RUN.get(record.noise_name)
-        if record.scenario.name == SINGLE and record.scenario.range_sensor is None and paper is not None:
-            columns.append(("paper", {"miss, m": number(paper[0]), "impulse, m/s": number(paper[1])}))
+        printed = printed_single_runs()
+        if record.scenario.name == SINGLE and record.scenario.range_sensor is None and record.noise_name in printed:
+            miss_m, impulse_m_s = printed[record.noise_name]
+            columns.append(("paper", {"miss, m": number(miss_m), "impulse, m/s": number(impulse_m_s)}))
     table = number_table("", *(title for title, _ in columns))
     for name in columns[0][1]:
         table.add_row(name, *(values.get(name, "") for _, values in columns))

@@ -7,6 +7,7 @@ from time import perf_counter
 
 from rich.table import Table
 
+from experiments.common.input_file import to_toml
 from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import (
     Part,
@@ -25,7 +26,7 @@ from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
 from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.own_strategy import own_strategy
-from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
+from experiments.interception.published import MANY, SINGLE, printed_single_runs
 from experiments.interception.runs.shared import (
     THEOREM_8_NAME,
     allowance,
@@ -35,7 +36,7 @@ from experiments.interception.runs.shared import (
     simulate_in_threads,
     summary_head,
 )
-from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings
 from experiments.interception.study import QUANTILES, SetCounts, game_note, hit_text, set_counts, set_warnings
 from infoset import Recovery
 from sim import Outcome, Results, Scenario
@@ -85,7 +86,7 @@ def run(options: Experiment) -> None:
             ],
             "notes": [game_note(scenario)],
         }
-        written.save("scenario.toml", scenario_to_toml(scenario))
+        written.save("scenario.toml", to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         if written.wants("--csv"):
             written.save("results.csv", _csv(curves), "--csv")
@@ -141,13 +142,13 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
     counts = sum((set_counts(curve.results.truth_kept, curve.results.set_emptied) for curve in curves), SetCounts())
     if counts.set_emptied:
         notes.append(f"an empty set {'was enlarged, and guidance continued' if enlarged else 'ended guidance'}")
-    notes += set_warnings(scenario.set_model.kind, counts)
+    notes += set_warnings(scenario.information_set.model, counts)
     notes.append(f"{game_note(scenario)}; infoset compare shows the worst of all tie rules")
     if allowed := allowance(scenario):
         notes.append(allowed)
     if scenario.name in (MANY, SINGLE):
         figures = "; ".join(
-            f"{noise} noise: miss {miss} m, impulse {fuel} m/s" for noise, (miss, fuel) in PRINTED_SINGLE_RUN.items()
+            f"{noise} noise: miss {miss} m, impulse {fuel} m/s" for noise, (miss, fuel) in printed_single_runs().items()
         )
         notes.append(f"paper (one run from z = -8 km, no range meter): {figures}")
     runs = len(curves[0].results)

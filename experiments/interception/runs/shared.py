@@ -14,13 +14,13 @@ from experiments.common.errors import InputError
 from experiments.common.output import library_version
 from experiments.common.screen import NOT_FINITE, BeginProgress, some_runs
 from experiments.interception.course import Courses
-from experiments.interception.scenario_file import scenario_hash
 from experiments.interception.study import set_counts
 from guidance import NoiseKind, Strategy
 from sim import Results, Scenario, simulate
 from sim.adversary import BudgetError, NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.gravity import on_board_model
 from sim.scenario import strategy_name
+from sim.storage.codec import fingerprint
 
 Progress = Callable[[float], None]
 
@@ -68,7 +68,7 @@ def summary_head(scenario: Scenario, warnings: Sequence[str], own: Strategy | No
     return {
         "version": library_version(),
         "scenario": scenario.name,
-        "scenario_hash": scenario_hash(scenario),
+        "scenario_hash": fingerprint(scenario),
         **({"warnings": warnings} if warnings else {}),
         **({"strategy": strategy_name(scenario, own)} if own is not None else {}),
     }

@@ -22,13 +22,15 @@ import sim
 from experiments.campaigns.flight import duration, size
 from experiments.campaigns.samples import replay_line
 from experiments.common.errors import InputError
+from experiments.common.input_file import to_toml
 from experiments.interception.own_strategy import load_strategy
-from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml, with_model
+from experiments.interception.scenario_file import load_scenario, with_model
 from guidance import NoiseKind
 from infoset import Model
 from sim import Campaign, CampaignNoise, Scenario, fly_one
 from sim.chunk import chunk_size
 from sim.storage import CampaignFolder
+from sim.storage.codec import fingerprint
 from sim.versions import install_command
 
 Infoset = Callable[..., tuple[int, str, str]]
@@ -38,7 +40,7 @@ FILES = [".lock", "manifest.json", "scenario.toml", "shards", "summary.json"]
 @pytest.fixture
 def file(brief: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
     path = tmp_path / "brief.toml"
-    path.write_text(scenario_to_toml(brief))
+    path.write_text(to_toml(brief))
     return path
 
 
@@ -57,7 +59,7 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
     assert load_scenario(folder / "scenario.toml") == brief
     found = json.loads((folder / "summary.json").read_text())
     assert found["version"] == version("infoset")
-    assert (found["scenario"], found["scenario_hash"]) == ("brief", scenario_hash(brief))
+    assert (found["scenario"], found["scenario_hash"]) == ("brief", fingerprint(brief))
     assert (found["runs"], found["seed"], found["complete"], found["redone"]) == (150, 4, True, [])
     miss = stored.table(["miss_m", "noise"])
     for sample in found["samples"]:

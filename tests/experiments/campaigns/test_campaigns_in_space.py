@@ -7,23 +7,25 @@ from pathlib import Path
 
 import pytest
 
-from experiments.interception.scenario_file import load_scenario, scenario_to_toml, with_model
+from experiments.common.input_file import to_toml
+from experiments.interception.scenario_file import load_scenario, with_model
 from guidance import NoiseKind
 from infoset import Model
 from sim import Scenario, simulate
+from sim.scenario import of_model
 from sim.storage import CampaignFolder
 from tests.experiments.command_line import Command, strict
 from tests.space import in_space
 
 pytestmark = pytest.mark.usefixtures("unrendered")
 
-SWEPT = "uncertainty.y_km.greatest=0.1:0.2:2,angle_sensor.error_at_zero_range_y_rad=0.0001:0.0004:2"
+SWEPT = "uncertainty.y_km.max=0.1:0.2:2,angle_sensor.error_at_zero_range_y_rad=0.0001:0.0004:2"
 
 
 @pytest.fixture
 def file(brief: Scenario, tmp_path: Path) -> Path:
     path = tmp_path / "space.toml"
-    path.write_text(scenario_to_toml(in_space(brief)))
+    path.write_text(to_toml(in_space(brief)))
     return path
 
 
@@ -59,7 +61,7 @@ def test_a_sweep_over_keys_of_space_is_resumed_and_reported(file: Path, infoset:
     assert infoset(*sweep, "--runs", 3)[0] == 0
     code, out, _ = infoset(*sweep, "--runs", 5, "--resume")
     assert code == 0
-    assert "uncertainty.y_km.greatest (rows) and angle_sensor.error_at_zero_range_y_rad (columns)" in out
+    assert "uncertainty.y_km.max (rows) and angle_sensor.error_at_zero_range_y_rad (columns)" in out
     scenario = with_model(load_scenario(str(file)), Model.GUARANTEED)
     model, sensor = scenario.set_model, scenario.set_model.angle_sensor
     last = replace(
@@ -68,7 +70,7 @@ def test_a_sweep_over_keys_of_space_is_resumed_and_reported(file: Path, infoset:
         angle_sensor=replace(sensor, error_at_zero_range_y_rad=0.0004),
     )
     table = CampaignFolder.read(Path("cells")).table(["cell", "miss_m", "miss_y_m"])
-    flown = simulate(replace(scenario, set_model=last, noise=NoiseKind.RANDOM, tie=scenario.tie), 5)
+    flown = simulate(replace(scenario, **of_model(last), noise=NoiseKind.RANDOM, tie=scenario.tie), 5)
     of_last = [row for row in table.to_pylist() if row["cell"] == 3]
     assert [row["miss_m"] for row in of_last] == flown.miss_m.tolist()
     assert [row["miss_y_m"] for row in of_last] == flown.lateral_miss[:, 0].tolist()
@@ -83,7 +85,7 @@ def test_a_sweep_over_keys_of_space_is_resumed_and_reported(file: Path, infoset:
         "sun.elevation_deg=0:90:2",
         "thruster.pointing_error_rad=0:0.01:2",
         "information_set.disturbance_y_m_s2=0.001:0.01:2",
-        "dispersion.vy_km_s.least=-0.01:0:2",
+        "dispersion.vy_km_s.min=-0.01:0:2",
         "angle_sensor.scale=1:2:2",
     ],
 )

@@ -17,7 +17,7 @@ import pytest
 from experiments.campaigns.cluster import PATIENCE_S, connected, is_open
 from experiments.cli import main
 from experiments.common.errors import InputError
-from experiments.interception.scenario_file import scenario_to_toml
+from experiments.common.input_file import to_toml
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import CampaignFolder
 
@@ -141,7 +141,7 @@ def test_an_open_scheduler_is_warned_of(
         raise InputError(f"asked for {given}")
 
     assert is_open(address) == warned
-    (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
+    (tmp_path / "brief.toml").write_text(to_toml(brief))
     monkeypatch.setattr("experiments.campaigns.cluster.connected", refuse)
     code, _, err = infoset("campaign", "brief.toml", "--runs", 8, "--out", "runs", "--dask", address)
     assert code == 2
@@ -210,7 +210,7 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
 def test_two_workers_give_the_same_bits_and_one_that_dies_loses_nothing(
     infoset: Infoset, brief: Scenario, processes: Processes, tmp_path: Path
 ) -> None:
-    (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
+    (tmp_path / "brief.toml").write_text(to_toml(brief))
     workers = [processes.worker(), processes.worker()]
     processes.wait_for(2)
     options = ("--model", "paper", "--noise", "mixed", "--chunk", 16, "--dask", processes.address)
@@ -240,7 +240,7 @@ def test_two_workers_give_the_same_bits_and_one_that_dies_loses_nothing(
 def test_a_scheduler_that_dies_is_one_message_and_the_campaign_goes_on_without(
     brief: Scenario, processes: Processes, tmp_path: Path
 ) -> None:
-    (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
+    (tmp_path / "brief.toml").write_text(to_toml(brief))
     processes.worker()
     processes.wait_for(1)
     asked = ["campaign", "brief.toml", "--model", "paper", "--runs", "6000", "--chunk", "16", "--out", "runs", "-q"]
@@ -270,7 +270,7 @@ def test_a_scheduler_that_dies_is_one_message_and_the_campaign_goes_on_without(
 def test_workers_of_another_version_and_no_workers_at_all(
     infoset: Infoset, brief: Scenario, processes: Processes, tmp_path: Path
 ) -> None:
-    (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
+    (tmp_path / "brief.toml").write_text(to_toml(brief))
     asked = ("campaign", "brief.toml", "--runs", 16, "--out", "runs", "--dask", processes.address)
     began_s = time.monotonic()
     code, _, err = infoset(*asked)
@@ -315,7 +315,7 @@ def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(
     for name, path in names.items():
         monkeypatch.setenv(name, str(path))
     monkeypatch.setenv("DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION", "True")
-    (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
+    (tmp_path / "brief.toml").write_text(to_toml(brief))
     asked = ("campaign", "brief.toml", "--model", "paper", "--runs", 64, "--chunk", 16, "--dask")
     found = Processes(tmp_path, "tls")
     with found.stack:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments import load_scenario
-from experiments.interception.scenario_file import scenario_to_toml
+from experiments.common.input_file import to_toml
 from sim.closed_form import possible_miss_m
 from tests.experiments.command_line import Command
 
@@ -20,12 +20,12 @@ pytestmark = pytest.mark.usefixtures("unrendered")
 BOUND_M = 25.0
 FIRST_S = 1440.0
 IDEAL = [
-    "nominal.range_km=8841.6",  # 1440 s at 6.14 km/s
+    "nominal_range_km=8841.6",  # 1440 s at 6.14 km/s
     "uncertainty.x_km=[8841.6, 8841.6]",
     "dispersion.x_km=8841.6",
     "uncertainty.vx_km_s=[-6.14, -6.14]",
     "dispersion.vx_km_s=-6.14",
-    "guidance.step_s=20",
+    "step_s=20",
     "angle_sensor.period_s=20",
     "angle_sensor.centroid_error_m=0",
     "angle_sensor.bias=random",
@@ -43,7 +43,7 @@ IDEAL = [
 def test_the_limit_of_the_chart_is_the_closed_form(infoset: Command, tmp_path: Path) -> None:
     """The noise of the game leaves the misses of the closed form possible, and the last impulse centres them."""
     file = tmp_path / "ideal.toml"
-    file.write_text(scenario_to_toml(load_scenario("dart-2022", IDEAL)))
+    file.write_text(to_toml(load_scenario("dart-2022", IDEAL)))
     axes = ("angle_sensor.pixel_error_rad=1e-6:1.7e-5:5", "thruster.last_impulse_s=angle_sensor.last_image_s=40:320:8")
     infoset(
         *("sweep", file, "--vary", axes[0], "--vary", axes[1], "--noise", "game", "--runs", "6", "--quiet"),

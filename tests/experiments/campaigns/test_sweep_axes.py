@@ -12,6 +12,7 @@ from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.common.errors import InputError
 from experiments.interception.scenario_file import load_scenario
 from sim import Scenario
+from sim.scenario import of_model
 from sim.storage import Axis
 
 
@@ -35,7 +36,7 @@ def test_the_issues_example(asteroid: Scenario) -> None:
         replace(
             cell,
             thruster=asteroid.thruster,
-            set_model=replace(cell.set_model, angle_sensor=asteroid.set_model.angle_sensor),
+            **of_model(replace(cell.set_model, angle_sensor=asteroid.set_model.angle_sensor)),
         )
         for cell in cells
     }
@@ -43,23 +44,23 @@ def test_the_issues_example(asteroid: Scenario) -> None:
 
 
 def test_units_are_those_of_the_file(asteroid: Scenario) -> None:
-    axes = sweep_axes("guidance.range_threshold_km=3:7:3,sun.direction_deg=0:90:2", asteroid)
+    axes = sweep_axes("information_set.range_threshold_km=3:7:3,sun.direction_deg=0:90:2", asteroid)
     cells = sweep_cells(asteroid, axes)
     assert [each.set_model.range_threshold_m for each in cells[::2]] == [3e3, 5e3, 7e3]
     assert cells[0].sun is not None
     assert cells[0].sun.direction_rad == 0.0
-    assert cells[1] == replace(asteroid, set_model=cells[1].set_model)
+    assert cells[1] == replace(asteroid, **of_model(cells[1].set_model))
 
 
 def test_ends_of_pairs_and_fixed_starts(asteroid: Scenario) -> None:
-    cells = sweep_cells(asteroid, sweep_axes("uncertainty.vx_km_s.least=-60:-58:2", asteroid))
+    cells = sweep_cells(asteroid, sweep_axes("uncertainty.vx_km_s.min=-60:-58:2", asteroid))
     assert [each.set_model.bounds.vx_m_s for each in cells] == [(-60e3, -57e3), (-58e3, -57e3)]
-    cells = sweep_cells(asteroid, sweep_axes("dispersion.z_km.greatest=2:3:2", asteroid))
+    cells = sweep_cells(asteroid, sweep_axes("dispersion.z_km.max=2:3:2", asteroid))
     assert [each.dispersion.z_m for each in cells] == [(-1e3, 2e3), (-1e3, 3e3)]
     cells = sweep_cells(asteroid, sweep_axes("dispersion.z_km=0:2:2", asteroid))
     assert [each.dispersion.z_m for each in cells] == [(0.0, 0.0), (2e3, 2e3)]
     fixed = cells[1]
-    cells = sweep_cells(fixed, sweep_axes("dispersion.z_km.least=-2:0:2", fixed))
+    cells = sweep_cells(fixed, sweep_axes("dispersion.z_km.min=-2:0:2", fixed))
     assert [each.dispersion.z_m for each in cells] == [(-2e3, 2e3), (0.0, 2e3)]
 
 
@@ -118,8 +119,8 @@ def test_a_factor_of_all_error_bounds_of_a_sensor(asteroid: Scenario) -> None:
     ("text", "parts"),
     [
         (
-            "thruster.budget_m_s=nominal.range_km=1:2:2",
-            ["must have the same unit, found thruster.budget_m_s in m/s, nominal.range_km in km"],
+            "thruster.budget_m_s=nominal_range_km=1:2:2",
+            ["must have the same unit, found thruster.budget_m_s in m/s, nominal_range_km in km"],
         ),
         (
             "angle_sensor.scale=1:2:2,angle_sensor.error_at_zero_range_rad=1e-4:2e-4:2",
@@ -128,16 +129,15 @@ def test_a_factor_of_all_error_bounds_of_a_sensor(asteroid: Scenario) -> None:
         ("angle_sensor.scale=1:2:2,angle_sensor.scale=1:2:2", ["--vary: angle_sensor.scale is named twice"]),
         ("angle_sensor.scale=0:4:3", ["--vary: angle_sensor.scale must be greater than 0"]),
         ("thruster.budget_m_s=thruster.budget_m_s=1:2:2", ["is named twice"]),
-        ("rate_sensor.scale=1:2:2", ["has no [rate_sensor]; add that table"]),
+        ("rate_sensor.scale=1:2:2", ["has no numeric key", "rate_sensor.scale"]),
         ("thruster.scale=1:2:2", ["has no numeric key", "thruster.scale"]),
         ("", ['"" is not written as KEY=FROM:TO:COUNT']),
         ("thruster.budget_m_s", ["is not written as KEY=FROM:TO:COUNT"]),
         ("thruster.budget=1:2:2", ["did you mean thruster.budget_m_s?"]),
         ("budget_m_s=1:2:2", ["did you mean thruster.budget_m_s?"]),
-        ("zzzz=1:2:2", ["has no numeric key", "its numeric keys are:", "nominal.range_km"]),
-        ("guidance.strategy=1:2:2", ["has no numeric key"]),
-        ("uncertainty.z_km=1:2:2", ["is a pair; vary uncertainty.z_km.least or uncertainty.z_km.greatest"]),
-        ("target.acceleration_m_s2=1:2:2", ["has no [target]; add that table"]),
+        ("zzzz=1:2:2", ["has no numeric key"]),
+        ("strategy=1:2:2", ["has no numeric key"]),
+        ("target.acceleration_m_s2=1:2:2", ["target.manoeuvre: is missing"]),
         ("thruster.budget_m_s=1:2", ["must be FROM:TO:COUNT"]),
         ("thruster.budget_m_s=1:2:3:4", ["must be FROM:TO:COUNT"]),
         ("thruster.budget_m_s=lin:1:2:3", ["must be FROM:TO:COUNT"]),
@@ -145,23 +145,22 @@ def test_a_factor_of_all_error_bounds_of_a_sensor(asteroid: Scenario) -> None:
         ("thruster.budget_m_s=1:1:3", ["from a smaller to a greater value"]),
         ("thruster.budget_m_s=log:0:1:3", ["greater than 0"]),
         ("thruster.budget_m_s=inf:1:3", ['must be a number, found "inf"']),
-        ("thruster.budget_m_s=1:1e99:3", ["at most 1e+15"]),
-        ("information_set.sections=log:1e-400:1e15:3", ["0 or at least 1e-100"]),
+        ("thruster.budget_m_s=1:1e99:3", ["at most 1e+60"]),
         ("thruster.budget_m_s=1:2:1", ["count must be a whole number from 2 to 1000"]),
         ("thruster.budget_m_s=1:2:1001", ["count must be a whole number from 2 to 1000"]),
         ("thruster.budget_m_s=1:2:" + "9" * 5000, ["count must be"]),
         ("thruster.budget_m_s=" + "9" * 5000 + ":2:2", ["must be a number"]),
         ("information_set.sections=9:10:5", ["are not all different whole numbers"]),
         ("thruster.budget_m_s=1:2:2,thruster.budget_m_s=1:2:2", ["is named twice"]),
-        ("thruster.budget_m_s=1:2:1000,nominal.range_km=5800:5801:1000", ["1000000 cells are more than the limit"]),
+        ("thruster.budget_m_s=1:2:1000,nominal_range_km=5800:5801:1000", ["1000000 cells are more than the limit"]),
         (",".join(["thruster.budget_m_s=1:2:2"] * 5), ["at most 4 keys"]),
         (
             "thruster.greatest_impulse_m_s=0.1:5:3",
-            ["asteroid-1997 with thruster.greatest_impulse_m_s = 0.1: thruster."],
+            ["asteroid-1997 with thruster.greatest_impulse_m_s = 0.1: thruster: "],
         ),
         (
             "angle_sensor.error_at_zero_range_rad=0.1:2:2",
-            ["with angle_sensor.error_at_zero_range_rad = 0.1", "leaves no err"],
+            ["with angle_sensor.error_at_zero_range_rad = 0.1", "error bound must be positive"],
         ),
     ],
 )

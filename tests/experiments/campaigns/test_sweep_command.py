@@ -30,7 +30,8 @@ from experiments.campaigns.sweep_table import (
     sweep_table,
 )
 from experiments.common.figure_style import INK
-from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
+from experiments.common.input_file import to_toml
+from experiments.interception.scenario_file import load_scenario
 from experiments.interception.study import SetCounts
 from guidance import NoiseKind
 from sim import (
@@ -46,7 +47,9 @@ from sim import (
     simulate,
 )
 from sim.requirement import Decision, HitRequirement, Verdict, judge, parse_requirement, share_interval
+from sim.scenario import of_model
 from sim.storage import Axis, CampaignFolder, read_manifest
+from sim.storage.codec import fingerprint
 from tests.experiments.campaigns.figure_room import need_room
 
 pytestmark = pytest.mark.usefixtures("unrendered")
@@ -63,7 +66,7 @@ TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.greatest_impuls
 @pytest.fixture
 def file(brief: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
     path = tmp_path / "brief.toml"
-    path.write_text(scenario_to_toml(brief))
+    path.write_text(to_toml(brief))
     return path
 
 
@@ -102,7 +105,7 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
         )
         cell = replace(
             brief,
-            set_model=replace(brief.set_model, angle_sensor=sensor),
+            **of_model(replace(brief.set_model, angle_sensor=sensor)),
             thruster=replace(brief.thruster, greatest_impulse_m_s=row["thruster.greatest_impulse_m_s"]),
         )
         flown = simulate(cell, 30, seed=2)
@@ -117,7 +120,7 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
         assert row["set_emptied"] == int(flown.set_emptied.sum())
         assert row["arrived"] + row["set_empty"] + row["budget_spent"] + row["diverged"] == 30
     found = json.loads((folder / "summary.json").read_text())
-    assert (found["kind"], found["scenario_hash"], found["runs"]) == ("sweep", scenario_hash(brief), 180)
+    assert (found["kind"], found["scenario_hash"], found["runs"]) == ("sweep", fingerprint(brief), 180)
     assert [each["unit"] for each in found["axes"]] == ["rad", "m/s"]
     assert [each["at"] for each in found["answers"]] == [f"thruster.greatest_impulse_m_s = {each}" for each in (2, 8)]
     assert all(each["met"] in out for each in found["answers"])
@@ -275,7 +278,7 @@ def verdict(value: float | None, decision: Decision, bound: float = 10.0) -> Ver
 
 
 def test_limits_are_interpolated_between_neighbouring_decided_cells_only() -> None:
-    axis = Axis("guidance.step_s", (1.0, 2.0, 4.0))
+    axis = Axis("step_s", (1.0, 2.0, 4.0))
     met, missed, undecided = verdict(5.0, MET), verdict(15.0, NOT_MET), verdict(10.5, OPEN)
     assert limits(axis, (met, missed, met)) == [Limit(1.5, 1.0, 2.0), Limit(3.0, 2.0, 4.0)]
     (limit,) = limits(Axis("a", (1.0, 100.0), "log"), (met, missed))
@@ -308,8 +311,8 @@ def test_the_limit_of_hits_along_the_radius_is_the_quantile_of_the_miss(brief: S
 
 def test_the_limit_of_hits_is_that_of_a_fine_sweep(tmp_path: Path) -> None:
     """An interpolated probability gave 1.4e-5 rad, just above the last cell that meets the requirement."""
-    short = ["nominal.range_km=8841.6", "uncertainty.x_km=[8831.6, 8851.6]", "dispersion.x_km=[8836.6, 8846.6]"]
-    quick = ["guidance.step_s=20", "angle_sensor.period_s=20", "thruster.greatest_impulse_m_s=1"]
+    short = ["nominal_range_km=8841.6", "uncertainty.x_km=[8831.6, 8851.6]", "dispersion.x_km=[8836.6, 8846.6]"]
+    quick = ["step_s=20", "angle_sensor.period_s=20", "thruster.greatest_impulse_m_s=1"]
     scenario = load_scenario("dart-2022", [*short, *quick])
     coarse, fine = (
         limit_of_hits(
@@ -354,7 +357,7 @@ def test_limits_hold_the_true_limit_of_an_exponential_dependence() -> None:
 
 
 def test_answers_in_words() -> None:
-    axis = Axis("guidance.step_s", (1.0, 2.0, 4.0))
+    axis = Axis("step_s", (1.0, 2.0, 4.0))
     met, missed, undecided = verdict(5.0, MET), verdict(15.0, NOT_MET), verdict(10.5, OPEN)
     assert answer(axis, (met, missed, missed)).met == (
         "met at 1 s, not met from 2 to 4 s; limit between the decided cells 1 and 2 s, by interpolation about 1.5 s"
@@ -635,7 +638,7 @@ def test_limits_of_the_runs_that_do_not_fit(
 
 def test_keys_as_labels() -> None:
     assert key_label("angle_sensor.error_at_zero_range_rad") == "angle sensor: error at zero range, rad"
-    assert key_label("uncertainty.vx_km_s.least") == "uncertainty: vx least, km/s"
+    assert key_label("uncertainty.vx_km_s.min") == "uncertainty: vx minimum, km/s"
     assert key_label("information_set.sections") == "information set: sections"
     assert key_label("thruster.last_impulse_s") == "thruster: last impulse before arrival, s"
     assert key_label("angle_sensor.first_image_s") == "angle sensor: first image before arrival, s"
@@ -735,7 +738,7 @@ def made_table(axes: Sequence[Axis], required: Requirement | HitRequirement, val
             Axis("thruster.greatest_impulse_m_s", tuple(np.geomspace(0.1, 100.0, 15)), "log"),
         ),
         (
-            Axis("nominal.range_km", tuple(np.linspace(5701.31, 5901.39, 8))),
+            Axis("nominal_range_km", tuple(np.linspace(5701.31, 5901.39, 8))),
             Axis("thruster.budget_m_s", (1.0, 1.01, 2.0, 2000.0)),
         ),
         (

@@ -10,12 +10,14 @@ from typing import Any
 
 import pytest
 
+from experiments.common.input_file import to_toml
 from experiments.common.screen import number
 from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml, with_model
+from experiments.interception.scenario_file import load_scenario, with_model
 from infoset import ErrorShape, Model
 from sim import Scenario
 from sim.adversary import find_worst
+from sim.storage.codec import fingerprint
 from tests.experiments.command_line import Command
 from tests.space import in_space
 
@@ -64,7 +66,7 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert list(found) == KEYS
     scenario = with_model(load_scenario("asteroid-1997"), Model.GUARANTEED)
     assert found["version"] == version("infoset")
-    assert (found["scenario"], found["scenario_hash"]) == (scenario.name, scenario_hash(scenario))
+    assert (found["scenario"], found["scenario_hash"]) == (scenario.name, fingerprint(scenario))
     assert (found["seed"], found["evaluations"], found["record"]) == (5, BUDGET, "worst.npz")
     assert (found["strategy"], found["model"], found["range_meter"]) == ("symmetric-miss", "guaranteed", True)
     worst = find_worst(scenario, budget=BUDGET, seed=5)
@@ -117,7 +119,7 @@ def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path)
 
 def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Scenario, tmp_path: Path) -> None:
     file = tmp_path / "space.toml"
-    file.write_text(scenario_to_toml(in_space(brief, error_shape=ErrorShape.DISC)))
+    file.write_text(to_toml(in_space(brief, error_shape=ErrorShape.DISC)))
     code, out, _ = infoset("adversary", file, "--budget", BUDGET, "--record", "worst.npz", "--json", "worst.json")
     assert code == 0
     assert "initial y, z, x, km" in out
@@ -180,7 +182,7 @@ def test_the_worst_in_a_folder_as_engage_writes_it(infoset: Command, tmp_path: P
     rows = (tmp_path / "worst" / "steps.csv").read_text().splitlines()
     assert len(rows) == 1 + len(record.steps)
     assert rows[1].startswith("worst-found,0,")
-    assert scenario_hash(load_scenario(tmp_path / "worst" / "scenario.toml")) == found["scenario_hash"]
+    assert fingerprint(load_scenario(tmp_path / "worst" / "scenario.toml")) == found["scenario_hash"]
     code, _, err = infoset("adversary", *options)
     assert code == 2
     assert "worst: is not empty" in err

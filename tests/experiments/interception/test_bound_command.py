@@ -13,13 +13,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.common.input_file import to_toml
 from experiments.common.screen import number
 from experiments.interception.figures.bound import draw_bound, ripples
-from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
+from experiments.interception.scenario_file import load_scenario
 from guidance.registry import COMPARED
 from infoset import ErrorShape, StateBox
 from sim import Scenario
 from sim.bound import LowerBound, lower_bound, pair_at
+from sim.scenario import of_model
+from sim.storage.codec import fingerprint
 from tests.space import in_space
 
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
@@ -46,7 +49,7 @@ def short() -> Scenario:
     box = StateBox((-1e3, 1e3), (1740e3, 1750e3), (-100.0, 100.0), (-58e3, -57.5e3))
     model = replace(published.set_model, bounds=box)
     nominal = replace(model, angle_sensor=replace(model.angle_sensor, nominal_range_m=1745e3))
-    return replace(published, name="short", set_model=nominal, dispersion=box, nominal_range_m=1745e3)
+    return replace(published, name="short", **of_model(nominal), dispersion=box, nominal_range_m=1745e3)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +67,7 @@ def known(planar: LowerBound, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
     file = tmp_path / "short.toml"
-    file.write_text(scenario_to_toml(short))
+    file.write_text(to_toml(short))
     return file
 
 
@@ -80,7 +83,7 @@ def test_bound_into_a_folder(
     flown = load_scenario(folder / "scenario.toml")
     assert found["version"] == version("infoset")
     assert (found["scenario"], found["model"]) == ("short", "guaranteed")
-    assert found["scenario_hash"] == scenario_hash(flown)
+    assert found["scenario_hash"] == fingerprint(flown)
     expected = planar
     assert found["lower_bound_m"] == expected.bound_m
     assert [each["bound_m"] for each in found["by_label"]] == [each.bound_m for each in expected.by_label]
@@ -133,9 +136,9 @@ def test_bound_into_a_folder(
 
 def test_value_where_range_and_speed_are_known(infoset: Infoset, short: Scenario, tmp_path: Path) -> None:
     box = replace(short.set_model.bounds, x_m=(1745e3, 1745e3), vx_m_s=(-58e3, -58e3))
-    free = replace(short, sun=None, dispersion=box, set_model=replace(short.set_model, bounds=box))
+    free = replace(short, sun=None, dispersion=box, **of_model(replace(short.set_model, bounds=box)))
     file = tmp_path / "free.toml"
-    file.write_text(scenario_to_toml(free))
+    file.write_text(to_toml(free))
     options = (file, "--strategies", "least-effort,symmetric-miss", "--json", tmp_path / "found.json", "--overwrite")
     code, out, _ = infoset(*options, "--budget", 100)
     assert code == 0
@@ -185,7 +188,7 @@ def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path)
 def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
     spatial = in_space(short, error_shape=ErrorShape(shape))
     file = tmp_path / "space.toml"
-    file.write_text(scenario_to_toml(spatial))
+    file.write_text(to_toml(spatial))
     options = ("--strategies", "symmetric-miss", "--budget", 1, "--model", "guaranteed", "--out", tmp_path / "results")
     code, out, _ = infoset(file, *options)
     assert code == 0
@@ -332,9 +335,9 @@ def test_bound_by_one_motion(infoset: Infoset, short: Scenario, tmp_path: Path) 
     model = short.set_model
     box = replace(model.bounds, z_m=(900.0, 1100.0), vz_m_s=(0.0, 0.0))
     weak = replace(short, thruster=replace(short.thruster, greatest_impulse_m_s=0.5))
-    weak = replace(weak, set_model=replace(model, bounds=box), dispersion=box)
+    weak = replace(weak, **of_model(replace(model, bounds=box)), dispersion=box)
     file = tmp_path / "weak.toml"
-    file.write_text(scenario_to_toml(weak))
+    file.write_text(to_toml(weak))
     options = ("--strategies", "symmetric-miss", "--budget", 0, "--out", tmp_path / "results")
     code, out, _ = infoset(file, *options)
     assert code == 0

@@ -1,4 +1,4 @@
-"""Commands of single engagements and of experiments with a scenario in space: files, tables, terminal, notebooks."""
+"""Commands of single engagements and of experiments with a scenario in space: files, tables."""
 
 from __future__ import annotations
 
@@ -8,17 +8,15 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
 
+from experiments.common.input_file import to_toml
 from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario, scenario_to_toml, with_model
-from experiments.interception.terminal import frame
-from infoset import Convention, InformationSet, Model
-from sim import Scenario, fly_one, simulate
+from experiments.interception.scenario_file import load_scenario, with_model
+from infoset import Convention, Model
+from sim import Scenario, simulate
 from tests.experiments.command_line import Command, strict
 from tests.space import in_space
 
@@ -37,7 +35,7 @@ IMPULSES = ["impulse_m_s", "impulse_y_m_s", "impulse_z_m_s"]
 @pytest.fixture
 def file(brief: Scenario, tmp_path: Path) -> Path:
     path = tmp_path / "space.toml"
-    path.write_text(scenario_to_toml(in_space(brief)))
+    path.write_text(to_toml(in_space(brief)))
     return path
 
 
@@ -50,7 +48,7 @@ def test_the_files_of_engage_name_the_axis(
     brief: Scenario, tmp_path: Path, infoset: Command, convention: Convention
 ) -> None:
     file = tmp_path / "space.toml"
-    file.write_text(scenario_to_toml(in_space(brief, convention=convention)))
+    file.write_text(to_toml(in_space(brief, convention=convention)))
     code, out, err = infoset("engage", file, "--record", "r.npz", "--json", "r.json", "--csv", "r.csv")
     assert (code, err) == (0, "wrote r.json, r.csv, r.npz\n")
     record = load_record("r.npz")
@@ -91,43 +89,6 @@ def test_a_table_of_a_plane_and_of_space(file: Path, brief_file: Path, infoset: 
     assert "along" not in alone
 
 
-@pytest.mark.parametrize("width", [60, 100])
-def test_the_terminal_shows_both_planes(brief: Scenario, width: int) -> None:
-    record = fly_one(in_space(brief))
-    console = Console(file=io.StringIO(), width=width, record=True)
-    for step in (0, 10):
-        console.print(frame([record, record], step, console))
-    text = console.export_text()
-    assert text.count("X") >= 8
-    for step in (0, 10):
-        for name, axis in record.steps[step].axes.items():
-            assert axis.predicted_miss_m is not None
-            lower, upper = axis.predicted_miss_m
-            assert text.count(f"predicted miss {name}  {lower:.5g} .. {upper:.5g} m") == 2
-    for name in ("y", "z"):
-        assert len(re.findall(rf"{name} rate \S+ \.\. \S+ µrad/s", text)) == 4
-        assert len(re.findall(rf"{name} angle \S+ \.\. \S+ mrad", text)) == 4
-        assert len(re.findall(rf"│ {name} [ =+|]+ │", text)) == 4
-
-
-def test_the_terminal_shows_an_empty_set_once(brief: Scenario) -> None:
-    record = fly_one(in_space(brief))
-    step = record.steps[0]
-    empty = replace(
-        step, sections=(), axes={name: replace(axis, predicted_miss_m=None) for name, axis in step.axes.items()}
-    )
-    console = Console(file=io.StringIO(), width=70, record=True)
-    console.print(frame([replace(record, steps=(empty,))], 0, console))
-    assert console.export_text().count("the set is empty") == 1
-
-
-def test_replay_draws_and_prints_a_record_in_space(file: Path, infoset: Command) -> None:
-    infoset("engage", file, "--record", "r.npz", "--quiet")
-    code, out, _ = infoset("replay", "r.npz", "--terminal")
-    assert code == 0
-    assert "predicted miss y" in out
-
-
 def test_the_files_of_experiment_have_the_columns_of_space(file: Path, infoset: Command) -> None:
     code, _, _ = infoset("experiment", file, "--runs", 3, "--json", "x.json", "--csv", "x.csv")
     assert code == 0
@@ -165,32 +126,6 @@ def test_compare_in_space(file: Path, infoset: Command) -> None:
     for name in ("miss_y_m", "miss_z_m"):
         assert [float(row[name]) for row in first] == flown[name]
     assert len(json.loads(Path("c.json").read_text())["strategies"]) == 8
-
-
-def test_notebooks_show_both_axes(brief: Scenario) -> None:
-    scenario = in_space(brief)
-    record, information = fly_one(scenario), InformationSet(scenario.set_model)
-    page = record._repr_html_()
-    y, z = record.result.lateral_miss[0].tolist()
-    assert f"{y:.4g} m along y, {z:.4g} m along z" in page
-    for name in ("y", "z"):
-        assert f"predicted miss along {name} without further impulses" in page
-        assert f"impulses along {name}" in page
-    assert page.count("<svg") == 4
-    for picture in (
-        information._repr_svg_(),
-        information.sections()[0]._repr_svg_(),
-        record.steps[3].sections[0]._repr_svg_(),
-    ):
-        assert picture.startswith("<svg")
-        assert "plane (x, y)" in picture
-        assert "plane (x, z)" in picture
-
-
-def test_notebooks_show_a_plane_as_before(brief: Scenario) -> None:
-    page: Any = fly_one(brief)._repr_html_()
-    assert "along" not in page
-    assert page.count("<svg") == 2
 
 
 OWN = """

@@ -17,11 +17,12 @@ from matplotlib.figure import Figure
 
 from experiments.interception.comparison import Comparison, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
-from experiments.interception.scenario_file import load_scenario, scenario_hash, with_model
+from experiments.interception.scenario_file import load_scenario, with_model
 from guidance import NoiseKind, TieRule, strategy_names
 from guidance.registry import COMPARED
 from infoset import Model
 from sim import Scenario, simulate
+from sim.storage.codec import fingerprint
 from tests.experiments.command_line import Command
 
 TWO = ("--strategies", "symmetric-miss,patient")
@@ -47,7 +48,7 @@ def as_json(infoset: Infoset, *arguments: object) -> Any:
 def test_compare_as_json(infoset: Infoset, brief: Scenario, brief_file: Path, tmp_path: Path) -> None:
     found = as_json(infoset, brief_file, *TWO, "--runs", 4, "--seed", 3)
     assert found["version"] == version("infoset")
-    assert (found["scenario"], found["scenario_hash"]) == ("brief", scenario_hash(with_model(brief, Model.GUARANTEED)))
+    assert (found["scenario"], found["scenario_hash"]) == ("brief", fingerprint(with_model(brief, Model.GUARANTEED)))
     assert (found["seed"], found["runs"], found["model"], found["range_meter"]) == (3, 4, "guaranteed", True)
     strategies = found["strategies"]
     assert [(each["name"], each["noise"]) for each in strategies] == [
@@ -117,7 +118,7 @@ def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Pat
     found = json.loads((tmp_path / "out" / "results.json").read_text())
     flown = load_scenario(tmp_path / "out" / "scenario.toml")
     assert flown.range_sensor is None
-    assert found["scenario_hash"] == scenario_hash(flown)
+    assert found["scenario_hash"] == fingerprint(flown)
     worst = max(float(row["miss_m"]) for row in rows if (row["strategy"], row["noise"]) == ("patient", "game"))
     assert found["strategies"][3]["miss_m"]["max"] == worst
 

@@ -171,6 +171,6 @@ def test_failures_of_a_flight_are_said_without_a_traceback(
 def test_a_scenario_file_cannot_name_python_code(mine: Path, brief_file: Path) -> None:
     hostile = Path("hostile.toml")
     hostile.write_text(brief_file.read_text().replace('"symmetric-miss"', '"mine.py:Mine"'))
-    with pytest.raises(InputError, match=r"guidance\.strategy: must be one of"):
+    with pytest.raises(InputError, match=r"strategy: there is no"):
         load_scenario("hostile.toml")
     assert "mine" not in sys.modules

@@ -203,13 +203,6 @@ def test_nothing_is_replaced_unless_told(record: Record, tmp_path: Path) -> None
         write_record(record, tmp_path / "x")
 
 
-def test_a_scenario_that_no_file_can_hold(record: Record, tmp_path: Path) -> None:
-    odd = dataclasses.replace(record.scenario, nominal_range_m=1.0)
-    with pytest.raises(InputError, match="nominal range"):
-        write_record(dataclasses.replace(record, scenario=odd), tmp_path / "x.npz")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_what_is_no_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"there is no such file.*engage --record"):
         load_record(tmp_path / "x.npz")

@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from experiments.common.errors import InputError
 from experiments.files_command import scenarios
-from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_template
+from experiments.interception.scenario_file import load_scenario
+from sim.storage.codec import fingerprint
 from tests.built_in import scenario_names, scenario_text
 
 NAMES = list(scenario_names())
@@ -82,7 +83,7 @@ def test_show_of_an_unknown_name() -> None:
 def test_check_says_ok_with_name_and_hash(name: str) -> None:
     code, out, err = invoke("check", name)
     assert (code, err) == (0, "")
-    assert out.split() == ["ok", name, scenario_hash(load_scenario(name))]
+    assert out.split() == ["ok", name, fingerprint(load_scenario(name))]
 
 
 def wide(tmp_path: Path) -> Path:
@@ -95,7 +96,7 @@ def test_check_prints_warnings_and_still_succeeds(tmp_path: Path) -> None:
     code, out, _ = invoke("check", str(wide(tmp_path)))
     assert code == 0
     assert out.splitlines()[0].startswith("ok")
-    assert out.splitlines()[1].startswith("warning: dispersion.z_km reaches 2 km below uncertainty.z_km")
+    assert out.splitlines()[1].startswith("warning: dispersion.z_m reaches 2000 m below uncertainty.z_m")
 
 
 def test_check_as_json(tmp_path: Path) -> None:
@@ -103,11 +104,11 @@ def test_check_as_json(tmp_path: Path) -> None:
     code, out, _ = invoke("check", str(file), "--json")
     found = json.loads(out)
     assert code == 0
-    assert found.pop("warnings")[0].startswith("dispersion.z_km")
+    assert found.pop("warnings")[0].startswith("dispersion.z_m")
     assert found == {
         "version": version("infoset"),
         "name": "asteroid-1997",
-        "scenario_hash": scenario_hash(load_scenario(file)),
+        "scenario_hash": fingerprint(load_scenario(file)),
     }
 
 
@@ -118,11 +119,11 @@ def test_quiet_check_prints_nothing() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "parts"),
     [
-        ("step_s = 0.5", "step_s = -0.5", ["guidance.step_s", "greater than 0", "for example step_s = 0.5"]),
-        ("step_s = 0.5", "stp_s = 0.5", ["guidance.stp_s: is not a key of [guidance]; did you mean step_s?"]),
-        ("distance_km = 150.0e6", "distance_km = ", ["is not valid TOML", "line 9"]),
+        ("step_s = 0.5", "step_s = -0.5", ["step_s", "greater than 0"]),
+        ("step_s = 0.5", "stp_s = 0.5", ["stp_s: is not a known key; did you mean step_s?"]),
+        ("distance_km = 150.0e6", "distance_km = ", ["is not valid TOML", "line 14"]),
         ("x_km = [5301.3", "x_km = [inf", ["uncertainty.x_km", "finite"]),
-        ('"symmetric-miss"', '"[red]odd[/red]"', ["guidance.strategy", 'found "[red]odd[/red]"']),
+        ('"symmetric-miss"', '"[red]odd[/red]"', ["strategy", '"[red]odd[/red]"']),
     ],
 )
 def test_check_of_a_bad_file(old: str, new: str, parts: list[str], tmp_path: Path) -> None:
@@ -154,7 +155,7 @@ def test_new_writes_the_template_and_nothing_else(tmp_path: Path) -> None:
     code, out, _ = invoke("new", str(file))
     assert code == 0
     assert f"infoset scenarios check {file}" in out
-    assert file.read_text() == scenario_template()
+    assert file.read_text() == scenario_text("own-scenario")
     assert list(tmp_path.iterdir()) == [file]
     assert invoke("check", str(file))[0] == 0
 
@@ -172,7 +173,7 @@ def test_new_never_replaces_unless_told(tmp_path: Path) -> None:
     assert "--overwrite" in err
     assert file.read_text() == "precious"
     assert invoke("new", str(file), "--overwrite")[0] == 0
-    assert file.read_text() == scenario_template()
+    assert file.read_text() == scenario_text("own-scenario")
     assert list(tmp_path.iterdir()) == [file]
 
 

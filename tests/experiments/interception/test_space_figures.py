@@ -15,19 +15,21 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from PIL import Image, ImageSequence
 
+from experiments.common.input_file import to_toml
 from experiments.interception.course import Clock, Courses, duration_text, possible_misses, true_predicted_misses
 from experiments.interception.curves import Curve
-from experiments.interception.figures.animation import GIF, animate
+from experiments.interception.figures.animation import animate
 from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, greatest_guarantee
 from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets, planes_at
 from experiments.interception.page import interception_page
-from experiments.interception.scenario_file import load_scenario, scenario_to_toml
+from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from infoset import Convention
 from sim import Record, Results, Scenario, fly_one, simulate
+from sim.scenario import of_model
 from tests.experiments.command_line import Command
 from tests.space import in_space
 
@@ -239,7 +241,7 @@ def test_an_animation_shows_both_axes(brief: Scenario) -> None:
     records = [fly_one(replace(in_space(brief), noise=kind)) for kind in NoiseKind]
     sizes = []
     for shown in (records[:1], records):
-        with Image.open(BytesIO(animate(shown, GIF, 2))) as animation:
+        with Image.open(BytesIO(animate(shown, 2))) as animation:
             sizes.append((animation.size[0], len(list(ImageSequence.Iterator(animation)))))
     assert sizes == [(640, 2), (1280, 2)]
 
@@ -250,7 +252,7 @@ def test_an_animation_shows_both_axes(brief: Scenario) -> None:
 def test_commands_write_a_b_plane_of_each_noise_in_space_only(
     infoset: Command, brief: Scenario, tmp_path: Path, name: str, spatial: bool
 ) -> None:
-    (tmp_path / "brief.toml").write_text(scenario_to_toml(in_space(brief) if spatial else brief))
+    (tmp_path / "brief.toml").write_text(to_toml(in_space(brief) if spatial else brief))
     strategies = ("--strategies", "patient") if name == "compare" else ()
     assert infoset(name, "brief.toml", "--runs", "2", "--out", "out", *strategies)[0] == 0
     written = {file.stem for file in (tmp_path / "out").glob("figure-b-plane-*.png")}
@@ -263,7 +265,7 @@ def scheduled(record: Record) -> Record:
     sensor = replace(scenario.set_model.angle_sensor, last_image_s=4.0)
     thruster = replace(scenario.thruster, last_impulse_s=10.0)
     model = replace(scenario.set_model, angle_sensor=sensor)
-    return replace(record, scenario=replace(scenario, set_model=model, thruster=thruster))
+    return replace(record, scenario=replace(scenario, **of_model(model), thruster=thruster))
 
 
 def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) -> None:
@@ -300,7 +302,7 @@ def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.
     monkeypatch.setattr(sys.modules["sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
     monkeypatch.setattr("experiments.interception.course.MOST_COURSES", 3)
     scenario = load_scenario(name)
-    scenario = replace(scenario, set_model=replace(scenario.set_model, sections=5))
+    scenario = replace(scenario, **of_model(replace(scenario.set_model, sections=5)))
     courses = Courses(scenario, 4)
     flown = simulate(scenario, 4, observe=courses.observe)
     assert flown.to_dict() == simulate(scenario, 4).to_dict()

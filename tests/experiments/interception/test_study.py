@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from experiments import load_scenario
-from experiments.interception.scenario_file import scenario_to_toml, with_model
+from experiments.common.input_file import to_toml
+from experiments.interception.scenario_file import with_model
 from experiments.interception.study import SetCounts, hit_text, percent, set_counts, set_warnings
 from infoset import Model
 from sim import Body, Scenario, estimate_hits, quantiles, simulate
@@ -29,7 +30,7 @@ EMPTY = "set became empty: 0 of 3 runs (0 %)"
 @pytest.fixture
 def sized(brief: Scenario, tmp_path: Path) -> Path:
     file = tmp_path / "sized.toml"
-    file.write_text(scenario_to_toml(replace(brief, body=Body(10.0))))
+    file.write_text(to_toml(replace(brief, body=Body(10.0))))
     return file
 
 

@@ -10,7 +10,7 @@ from experiments.interception.page import interception_page
 from experiments.interception.record_file import load_record
 from tests.experiments.command_line import Command
 
-LEAST_EFFORT = ("--model", "guaranteed", "--set", "guidance.strategy=least-effort")
+LEAST_EFFORT = ("--model", "guaranteed", "--set", "strategy=least-effort")
 START = ("uncertainty.x_km=[5801.3,5801.3]", "uncertainty.vx_km_s=[-58,-58]", "dispersion.x_km=5801.3")
 KNOWN = tuple(word for value in (*START, "dispersion.vx_km_s=-58") for word in ("--set", value))
 

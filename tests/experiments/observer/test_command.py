@@ -19,8 +19,7 @@ from experiments.observer.report import Report
 from tests.experiments.command_line import Command, strict
 
 PUBLISHED = json.loads((Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text())
-SIX_STATES = """schema = 1
-kind = "observer"
+SIX_STATES = """kind = "observer"
 name = "six"
 [system]
 A = [[1, 0.5, 0, 0, 0, 0], [0, 1, 0.5, 0, 0, 0], [0, 0, 0.9, 0, 0, 0], [0, 0, 0, 1, 0.5, 0], [0, 0, 0, 0, 1, 0.5],
@@ -123,7 +122,7 @@ def test_an_empty_cell_is_a_missing_measurement(infoset: Command) -> None:
         ("y1,u1\n1,1\nfast,1\n", ["line 3, y1", 'found "fast"']),
         ("y1,u1\n1,\n", ["line 2, u1: must be a number"]),
         ("y1,u1\nnan,1\n", ["line 2, y1"]),
-        ("y1,u1\n1e16,1\n", ["at most 1e+15"]),
+        ("y1,u1\n1e61,1\n", ["at most 1e+60"]),
     ],
 )
 def test_wrong_data_are_refused(content: str, parts: list[str], infoset: Command) -> None:
@@ -146,52 +145,34 @@ def changed(old: str, new: str, name: str = "vehicle") -> str:
 
 
 @pytest.mark.parametrize(
-    ("text", "parts"),
+    ("setting", "told"),
     [
-        (changed("C = [[1.0, 0.0]]", "C = [[1.0]]"), ["system.C", "has 1 numbers a row, and A has 2 columns"]),
-        (changed("[[1.0, 0.5], [0.0, 1.0]]", "[[1.0, 0.5]]"), ["system.A", "has 1 rows, and A has 2 columns"]),
-        (changed("[[1.0, 0.5], [0.0, 1.0]]", "[[1.0, 0.5], [0.0]]"), ["rows of one length"]),
-        (changed("[[0.125], [0.5]]", "[[0.125]]"), ["system.B", "has 1 rows"]),
-        (changed("half_width = [3.0]", "half_width = [3.0, 1.0]"), ["noise.half_width", "C has 1 rows"]),
-        (changed("half_width = [3.0]", "half_width = [-3.0]"), ["at least 0"]),
-        (changed("upper = [10.0, 20.0]", ""), ["initial", "does not describe one set"]),
-        (changed("upper = [10.0, 20.0]", "upper = [-11.0, 20.0]"), ["initial.lower", "number 1 exceeds"]),
-        (changed("upper = [10.0, 20.0]", "upper = [10.0, 20.0]\ncenter = [0, 0]"), ["does not describe one set"]),
-        (changed("upper = [10.0, 20.0]", "upper = [10.0]"), ["initial.upper", "has 1 numbers"]),
-        (changed("steps = 40", "steps = 0"), ["simulation.steps"]),
-        (changed("[14,", "[-14,"), ["simulation.missing"]),
-        (changed('"speed, m/s"]', '"speed, m/s", "c"]'), ["system.states", "has 3 numbers"]),
-        (changed("[-0.109466733731803]", "[0, 1]", "observer-2005"), ["measurements.y", "rows of one length"]),
-        (changed("half_width = [0.2]", 'half_width = "0.2"', "observer-2005"), ["noise.half_width"]),
+        ("system.A=[[1, 2], [3]]", "state_matrix must be an array, its rows of equal length"),
+        ("system.A=[[1, 2, 3], [3, 4, 5]]", "state_matrix must have the shape (n, n)"),
+        ("system.B=[[0.125]]", "input_matrix must have 2 rows, one for each state"),
+        ("system.C=[[1]]", "output_matrix must have 2 columns, one for each state"),
+        ("system.offset=[1]", "offset must have the shape (2,)"),
+        ("system.states=['a']", "system.states must be 2 names, one for each state: got 1"),
+        ("noise.half_width=[3, 1]", "noise must"),
+        ("noise.half_width=[-1]", "noise.half_width: must be at least 0, found [-1]"),
+        ("initial.center=[0, 0]", "initial: must have lower and upper, or center and generators, or vertices"),
+        ("initial.lower=[11, 0]", "initial: the box is reversed"),
+        ("initial.upper=[10]", "initial: upper must have the shape (2,): got (1,)"),
+        ("disturbance.generators=[[1]]", "disturbance: generators must have the shape (g, 2): got (1, 1)"),
+        ("measurements.y=[[1, 2], []]", "measurements.y must be an array, its rows of equal length"),
+        ("measurements.u=[[1, 2]]", "measurements.u must have 1 numbers a row: got 2"),
+        ("simulation.missing=[3, -1]", "simulation.missing: number 2 must be at least 0, found [3, -1]"),
     ],
 )
-def test_wrong_problems_are_refused(text: str, parts: list[str], infoset: Command) -> None:
-    Path("bad.toml").write_text(text)
-    err = infoset.refused("observe", "bad.toml")
-    assert [part for part in parts if part not in err] == []
-
-
-@pytest.mark.parametrize(
-    ("setting", "problem"),
-    [
-        ("system.A=[[1,'a'],[0,1]]", "system.A: row 1: number 2 of the array must be a number, found"),
-        ("system.A=[[1,2],3]", "system.A: row 2: must be an array of 1 to 6 numbers, found"),
-        ("system.A=[[1,2],[3]]", "system.A: must have rows of one length, found"),
-        ("system.A=[[1,2,3],[3,4,5]]", "system.A: has 2 rows, and A has 3 columns;"),
-        ("system.A=[[1,2]]", "system.A: has 1 rows, and A has 2 columns;"),
-        ("system.offset=[1,'a']", "system.offset: number 2 of the array must be a number, found"),
-        ("system.states=['a','']", "system.states: text 2 of the array must not be empty, found"),
-        ("initial.lower=[1,true]", "initial.lower: number 2 of the array must be a number, found"),
-        ("noise.half_width=[-1]", "noise.half_width: number 1 of the array must be at least 0, found"),
-        ("noise.half_width=['1']", 'number 1 of the array must be a number, found ["1"]; write it without quotes'),
-        ("simulation.missing=3", "simulation.missing: must be an array of at most 10000 steps, found 3"),
-        ("simulation.missing=[3,1.5]", "simulation.missing: number 2 of the array must be a whole number, found"),
-    ],
-)
-def test_a_wrong_element_is_named_in_one_line(setting: str, problem: str, infoset: Command) -> None:
+def test_wrong_problems_are_refused(setting: str, told: str, infoset: Command) -> None:
     err = infoset.refused("observe", "vehicle", "--set", setting)
-    assert problem in err
+    assert told in err
     assert err.count("\n") == 1
+
+
+def test_sets_have_a_coordinate_for_each_state(infoset: Command) -> None:
+    Path("bad.toml").write_text(changed("[[0.05, 0.2]]", "[[0.05]]").replace("center = [0.0, 0.0]", "center = [0.0]"))
+    assert "disturbance must have 2 coordinates, one for each state: got 1" in infoset.refused("observe", "bad.toml")
 
 
 def test_a_contradiction_is_reported(infoset: Command) -> None:
@@ -226,7 +207,7 @@ def observed(name: str) -> Report:
 
 def test_printed_bounds_are_zero_within_rounding_and_smoothed_ones_are_printed_too(infoset: Command) -> None:
     Path("flat.toml").write_text(
-        'schema = 1\nkind = "observer"\n[system]\nA = [[1.0, 0.0], [0.0, 1.0]]\nC = [[1.0, 0.0]]\n[initial]\n'
+        'kind = "observer"\n[system]\nA = [[1.0, 0.0], [0.0, 1.0]]\nC = [[1.0, 0.0]]\n[initial]\n'
         "lower = [-0.3, -1.0]\nupper = [0.5, 1.0]\n[noise]\nhalf_width = [0.1]\n[measurements]\n"
         "y = [[0.1], [0.1], [0.2]]\n"
     )
@@ -245,7 +226,7 @@ def test_inputs_after_the_last_measurement_are_warned_of(infoset: Command) -> No
     Path("short.toml").write_text(changed("steps = 40", "steps = 20"))
     code, _, err = infoset("observe", "short.toml")
     assert code == 0
-    assert "short.toml: measurements.u has 32 rows, and there are 20 steps: the later rows are not used" in err
+    assert "vehicle: measurements.u has 32 rows, and there are 20 steps: the later rows are not used" in err
     assert "warning" not in infoset("observe", "vehicle")[2]
 
 
@@ -254,7 +235,7 @@ def test_simulated_errors_are_within_their_bounds(errors: Errors) -> None:
     problem = load_observer("vehicle")
     data = simulate(problem, errors, 5)
     assert data.states is not None
-    off = np.abs(data.measured - data.states @ problem.c.T).ravel()
+    off = np.abs(data.measured - data.states @ np.transpose(problem.system.C)).ravel()
     assert np.isnan(off).sum() == 9
     known = off[~np.isnan(off)]
     assert known.max() <= 3.0 + 1e-12
@@ -278,12 +259,6 @@ def test_values_can_be_set(infoset: Command) -> None:
     wide = infoset.json("observe", "observer-2005", "--set", "noise.half_width=[0.4]")
     narrow = infoset.json("observe", "observer-2005")
     assert wide["final"]["upper"][0] > narrow["final"]["upper"][0]
-
-
-def test_a_new_file_is_sound(infoset: Command) -> None:
-    assert infoset("problems", "new", "observe", "mine.toml", "-q")[0] == 0
-    assert infoset("problems", "check", "mine.toml", "-q")[0] == 0
-    assert infoset("observe", "mine.toml", "-q")[0] == 0
 
 
 def test_an_empty_line_of_a_file_of_one_column_is_a_missing_measurement(infoset: Command) -> None:
@@ -310,7 +285,7 @@ def test_steps_of_a_file_may_begin_with_any_number(infoset: Command) -> None:
 def test_unstable_systems_are_refused_before_numbers_overflow(infoset: Command, data: str, states: int) -> None:
     ones = [1.0] * states
     Path("big.toml").write_text(
-        f'schema = 1\nkind = "observer"\n[system]\nA = {[[1e15] * states] * states}\nC = {[ones]}\n'
+        f'kind = "observer"\n[system]\nA = {[[1e15] * states] * states}\nC = {[ones]}\n'
         f"[initial]\nlower = {[0.5] * states}\nupper = {ones}\n[noise]\nhalf_width = [0.2]\n"
     )
     Path("data.csv").write_text("y1\n" + '""\n' * 30)

@@ -15,14 +15,15 @@ from scipy.optimize import linprog
 
 from benchmarks import published_radius
 from experiments.common.hill_axes import from_paper, to_paper
-from experiments.common.published_number import PublishedNumber, Verdict
+from experiments.common.printed_numbers import Comparison, Verdict
 from experiments.reachability.file import load_rendezvous
-from experiments.reachability.printed_tables import PROBLEM, TABLES, corrected
+from experiments.reachability.printed_tables import PROBLEM, printed_tables
 from experiments.reachability.published import published_motion, reproduce
 from infoset.arrays import Floats
 from rendezvous.reachability import minimum_energy, solve
 
 RENDEZVOUS = load_rendezvous(PROBLEM)
+TABLES = list(printed_tables().values())
 START = np.array([2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0])
 PERIOD_S, PUSH_M_S2, RADIUS_M = 180.0, 0.15, 90e3
 RATE_RAD_S = float(np.sqrt(3.986004418e14 / (1e7 * (1.0 - 0.1**2)) ** 3) * 1.1**2)
@@ -60,28 +61,28 @@ def linear(controls: Floats) -> Floats:
 @cache
 def states(number: int) -> tuple[Floats, Floats]:
     """Return both columns of the printed controls, shape (2, 4, 6), and their derivatives, shape (12, 2, 4, 6)."""
-    controls = corrected(TABLES[number - 1], "u")
+    controls = TABLES[number - 1].controls
     middle = np.array([linear(controls), nonlinear(controls)])
     moved = (controls + CHANGE * step.reshape(4, 3) for step in np.eye(12))
     return middle, np.array([(np.array([linear(each), nonlinear(each)]) - middle) / CHANGE for each in moved])
 
 
 @pytest.fixture(scope="module")
-def numbers() -> dict[tuple[int, str], PublishedNumber]:
+def numbers() -> dict[tuple[int, str], Comparison]:
     """Verdicts by table and name without unit."""
     found = reproduce(lambda _done: None).numbers
-    return {(int(each.source[-1]), each.name.partition(" (")[0]): each for each in found}
+    return {(int(each.number.source[-1]), each.number.name.partition(" (")[0]): each for each in found}
 
 
 def test_the_motion_as_published_is_equation_1_with_a_radius_of_90_km() -> None:
-    controls = corrected(TABLES[0], "u")
+    controls = TABLES[0].controls
     motion = published_motion(RENDEZVOUS.truth.orbit)
     found = motion.fly(RENDEZVOUS.problem.initial, PUSH_M_S2 * from_paper(controls)[None], PERIOD_S)[0, 1:]
     np.testing.assert_allclose(to_paper(found), nonlinear(controls), rtol=0.0, atol=1e-6)
 
 
 def test_the_control_of_least_energy_gives_the_nonlinear_column_of_table_1(
-    numbers: dict[tuple[int, str], PublishedNumber],
+    numbers: dict[tuple[int, str], Comparison],
 ) -> None:
     computed = nonlinear(to_paper(minimum_energy(solve(RENDEZVOUS.problem).optimal)))
     off = np.abs(computed - TABLES[0].nonlinear) > ROUNDING
@@ -92,7 +93,7 @@ def test_the_control_of_least_energy_gives_the_nonlinear_column_of_table_1(
 
 
 def test_the_printed_controls_give_the_nonlinear_column_of_table_3(
-    numbers: dict[tuple[int, str], PublishedNumber],
+    numbers: dict[tuple[int, str], Comparison],
 ) -> None:
     (_, computed), changes = states(3)
     rounding = ROUNDING + CONTROL_ROUNDING * np.abs(changes[:, 1]).sum(axis=0)
@@ -104,17 +105,17 @@ def test_the_printed_controls_give_the_nonlinear_column_of_table_3(
 
 
 def test_nonlinear_less_linear_of_table_2_is_that_of_the_model(
-    numbers: dict[tuple[int, str], PublishedNumber],
+    numbers: dict[tuple[int, str], Comparison],
 ) -> None:
     """The difference hardly depends on the control, of which four printed numbers are misprints."""
     computed, _ = states(2)
     table = TABLES[1]
-    off = computed[1] - computed[0] - (np.array(table.nonlinear) - corrected(table, "linear x"))
+    off = computed[1] - computed[0] - (table.nonlinear - table.linear)
     assert (np.abs(off[:, 3:]) <= 0.011).all()
     assert (np.abs(off[:, :3]) <= 0.32).all()
     assert (np.abs(off) <= 2.0 * ROUNDING).sum() >= 20
     # Without the model the differences are as large as the printed ones.
-    assert np.abs(table.nonlinear - corrected(table, "linear x")).max() > 50.0
+    assert np.abs(table.nonlinear - table.linear).max() > 50.0
     found = [numbers[2, f"nonlinear x{component + 1}({t + 1})"].verdict for t, component in np.ndindex(4, 6)]
     assert found == [Verdict.EXPLAINED] * 24
 
@@ -123,17 +124,14 @@ def test_nonlinear_less_linear_of_table_2_is_that_of_the_model(
     ("number", "column", "t", "component"), [(1, 1, 2, 1), (1, 1, 3, 1), (3, 0, 2, 3), (3, 1, 4, 6)]
 )
 def test_misprints_follow_from_the_other_numbers(
-    number: int, column: int, t: int, component: int, numbers: dict[tuple[int, str], PublishedNumber]
+    number: int, column: int, t: int, component: int, numbers: dict[tuple[int, str], Comparison]
 ) -> None:
     """Least and greatest value over all controls that round to the printed ones and lead to the other positions."""
     table = TABLES[number - 1]
     middle, changes = states(number)
-    printed = np.array([corrected(table, "linear x"), table.nonlinear])
-    fixed = np.zeros(printed.shape, dtype=bool)
-    fixed[:, :, :3] = True
-    for quantity, at, which, _ in table.misprints:
-        if quantity != "u":
-            fixed[int(quantity.startswith("nonlinear")), at - 1, which - 1] = False
+    printed = np.array([table.linear, table.nonlinear])
+    fixed = np.reshape([each.corrected is None for each in table.numbers[12:60]], printed.shape)
+    fixed[:, :, 3:] = False
     # Three linear positions are printed with two decimals.
     rounding = np.where(np.round(printed, 1) == printed, 0.05, 0.005)[fixed]
     rows, room = changes[:, fixed].T, (printed - middle)[fixed]
@@ -147,20 +145,20 @@ def test_misprints_follow_from_the_other_numbers(
         )
         assert answer.success
         ends.append(middle[column, t - 1, component - 1] + sign * answer.fun)
-    number_found = numbers[number, f"{('linear', 'nonlinear')[column]} x{component}({t})"]
-    assert number_found.verdict is Verdict.MISPRINT
-    assert number_found.corrected is not None
-    decimals = len(number_found.corrected.partition(".")[2])
-    assert {f"{end:.{decimals}f}" for end in ends} == {number_found.corrected}
-    assert number_found.corrected != number_found.printed
+    found = numbers[number, f"{('linear', 'nonlinear')[column]} x{component}({t})"]
+    assert found.verdict is Verdict.MISPRINT
+    assert found.number.corrected is not None
+    decimals = len(found.number.corrected.partition(".")[2])
+    assert {f"{end:.{decimals}f}" for end in ends} == {found.number.corrected}
+    assert found.number.corrected != found.number.printed
 
 
-def test_no_norm_is_explained(numbers: dict[tuple[int, str], PublishedNumber]) -> None:
+def test_no_norm_is_explained(numbers: dict[tuple[int, str], Comparison]) -> None:
     for number, norm in ((1, 73.78), (2, 75.59), (3, 75.23)):
         found = numbers[number, "nonlinear, norm of x(4)"]
         assert float(np.linalg.norm(TABLES[number - 1].nonlinear[-1][:5])) == pytest.approx(norm, abs=0.005)
         assert found.verdict is Verdict.NOT_EXPLAINED
-        assert abs(float(found.printed) - norm) > 0.2
+        assert abs(found.number.value - norm) > 0.2
 
 
 def test_the_fit_of_the_radius(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,11 +13,6 @@ from hypothesis import strategies as st
 from infoset import ConvexPolygons
 from infoset.arrays import Floats
 from infoset.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, _qhull
-from infoset.polytope import cut as old_cut
-from infoset.polytope import intersection as old_intersection
-from infoset.polytope import linear_image as old_linear_image
-from infoset.polytope import minkowski_sum as old_minkowski_sum
-from infoset.polytope import projection as old_projection
 from tests.rationals import Fraction
 from tests.rendezvous.reachability.rationals import RationalSet, polyhedron_of, rounded, vertices_of
 
@@ -275,27 +268,6 @@ def test_a_hull_is_the_same_if_its_tables_are_computed_in_parts(monkeypatch: pyt
     monkeypatch.setattr(_qhull, "_ENTRIES", 1000)
     for part in ("vertices", "normals", "offsets"):
         np.testing.assert_array_equal(getattr(Polytope.from_vertices(points), part), getattr(whole, part))
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        (lambda p: p.support([1.0, 0.5]), lambda p: p.support_function([1.0, 0.5])),
-        (lambda p: p.bounds, lambda p: p.bounding_box()),
-        (lambda p: p.box([0.0], [1.0]), lambda p: p.from_box([0.0], [1.0])),
-        (lambda p: p.from_halfspaces([[1.0], [-1.0]], [1.0, 1.0]), lambda p: p.from_box([-1.0], [1.0])),
-        (lambda p: old_cut(p, [[1.0, 0.0]], [0.5]), lambda p: p.cut([1.0, 0.0], upper=0.5)),
-        (lambda p: old_intersection(p, p), lambda p: p),
-        (lambda p: old_linear_image(p, np.eye(2)), lambda p: p),
-        (lambda p: old_minkowski_sum(p, p), lambda p: p + p),
-        (lambda p: old_projection(p, [0]), lambda p: p.project([0])),
-    ],
-)
-def test_old_names_warn(old: Callable[[Polytope], Any], new: Callable[[Polytope], Any]) -> None:
-    box = Polytope.from_box([0.0, 0.0], [1.0, 1.0])
-    with pytest.deprecated_call():
-        got = old(box)
-    assert repr(got) == repr(new(box))
 
 
 # Published cases ----------------------------------------------------------------------------------------------------

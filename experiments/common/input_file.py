@@ -1,0 +1,381 @@
+"""Files of the user: the tables and keys of a TOML file are the fields of a frozen dataclass.
+
+Every kind of file is read here. A key may be written in any unit of its quantity (`experiments.common.units`), a number
+is rounded once, and an interval may be written as one number, which is both of its ends. The dataclass declares types,
+limits and defaults; pydantic walks through it and finds all errors at once.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tomllib
+import types
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
+from decimal import Context, Decimal, InvalidOperation
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from pydantic import ValidationError
+
+from experiments.common.errors import InputError, nearest, shown
+from experiments.common.file_kinds import (
+    LARGEST_FILE_BYTES,
+    LONGEST_LINE,
+    SCENARIO,
+    ZIP,
+    built_in,
+    built_in_names,
+    kind_of,
+    read_input,
+    taken_by,
+    use_of_content,
+)
+from experiments.common.units import quantity_and_unit, si_factor
+from infoset.limits import LONGEST_DESCRIPTION
+from sim.storage.codec import adapter
+
+ENDS = ("min", "max")
+"""Ends of an interval, after the name of its key."""
+KeyPath = tuple[str, ...]
+Kind = TypeVar("Kind")
+
+_IS_MISSING = "is missing"
+_UNTRAPPED = Context(prec=60, traps=[])
+"""Products beyond the range of decimal numbers are infinite, which is refused as any infinite value."""
+_MOST_FAULTS = 50
+
+
+class KeyField(NamedTuple):
+    """What the value of a key is: a table of a dataclass, many of them, an interval, or anything else."""
+
+    table: type | None
+    many: bool
+    pair: bool
+    numeric: type | None
+
+
+def read_file(owner: type[Kind], name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Kind:
+    """Read a built-in file or a file of the user as a dataclass.
+
+    Parameters
+    ----------
+    owner : type
+        The dataclass; its class variable ``kind``, if any, is the ``kind`` of such files.
+    name_or_path : str or path
+        A built-in name wins over a file of that name, unless the argument has a path separator or ends in ``.toml``.
+    settings : sequence of str or None
+        KEY=VALUE: values in place of those of the file, for example ``thruster.budget_m_s=500``. A key of an array of
+        tables has the number of its table, ``craft.2.weight``; ``.min`` and ``.max`` are the ends of an interval.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is invalid; the message has a line for each error.
+    """
+    text, source = source_of(name_or_path, [kind_name(owner)])
+    made: Any = read_text(owner, text, source, settings)
+    if settings:
+        lines = [line for line in (made.description, f"with {', '.join(settings)}") if line]
+        made = replace(made, description="; ".join(lines)[:LONGEST_DESCRIPTION])
+    return made  # type: ignore[no-any-return]  # the type of the result is `owner`
+
+
+def read_text(owner: type[Kind], text: str, source: str, settings: Sequence[str] | None = None) -> Kind:
+    """Return the dataclass of the text of a file, as `read_file`; messages name `source`."""
+    document, wanted = parse(text, source), kind_name(owner)
+    kind = kind_of(document)
+    if kind is not None and kind != wanted:
+        raise InputError(f"{source}: {taken_by(kind)}")
+    if wanted != SCENARIO and document.pop("kind", None) != wanted:
+        raise InputError(f'{source}: kind: must be "{wanted}"; write it above the first table')
+    reading = _Reading(owner, source)
+    values = reading.in_si(document, owner, ())
+    for setting in settings or ():
+        reading.set(values, setting)
+    return reading.made(values)  # type: ignore[no-any-return]  # pydantic returns Any
+
+
+def source_of(name_or_path: str | os.PathLike[str], kinds: Collection[str]) -> tuple[str, str]:
+    """Return the text of a built-in file of these kinds or of a file of the user, and its name for messages."""
+    given, noun = os.fspath(name_or_path), SCENARIO if SCENARIO in kinds else "problem"
+    is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and Path(given).name == given
+    if is_name and (given in built_in_names(kinds) or not os.path.lexists(given)):
+        return built_in(given, kinds, f"no file and no built-in {noun}").text, f"{given} (built in)"
+    return _text_of_file(given, noun), given
+
+
+def kind_name(owner: type) -> str:
+    """Return the kind of the files of a dataclass."""
+    return str(getattr(owner, "kind", SCENARIO))
+
+
+class _Reading:
+    """A file that is being read: its faults, and its keys and values as written, by their paths in SI."""
+
+    def __init__(self, owner: type, source: str) -> None:
+        self._owner, self._source = owner, source
+        self._faults: dict[KeyPath, str] = {}
+        self._written: dict[KeyPath, tuple[str, object]] = {}
+        self._guessed: set[KeyPath] = set()
+
+    def in_si(self, table: Mapping[str, Any], owner: type, path: KeyPath) -> dict[str, Any]:
+        """Return a table by the names of the fields, numbers in SI; find unknown keys."""
+        known, values = fields_of(owner), dict[str, Any]()
+        for key, value in table.items():
+            name = next((name for name in known if si_factor(key, name) is not None), None)
+            if name is None:
+                self._unknown((*path, key), known)
+                continue
+            here = (*path, name)
+            if name in values:
+                self._faults[here] = f"is written again, as {key}"
+                continue
+            self._written[here] = key, value
+            field = known[name]
+            if field.table is not None and isinstance(value, dict):
+                values[name] = self.in_si(value, field.table, here)
+            elif field.table is not None and isinstance(value, list):
+                values[name] = [
+                    self.in_si(each, field.table, (*here, str(index))) if isinstance(each, dict) else each
+                    for index, each in enumerate(value)
+                ]
+            else:
+                values[name] = _scaled(value, si_factor(key, name) or Decimal(1))
+                if field.pair and isinstance(values[name], float | int) and not isinstance(value, bool):
+                    values[name] = [values[name]] * 2
+        return values
+
+    def _unknown(self, path: KeyPath, known: Mapping[str, KeyField]) -> None:
+        """Note a key that no field has, with the nearest one of its table, or the same key of another table."""
+        if len(self._faults) > _MOST_FAULTS:
+            return
+        quantity, unit = quantity_and_unit(path[-1])
+        by_quantity = {quantity_and_unit(name)[0]: name for name in known}
+        near = by_quantity.get(nearest(quantity, [*by_quantity]) or "")
+        guess = similar_key(path[-1], keys_of(self._owner))
+        if near is not None:
+            self._guessed.add((*path[:-1], near))
+            in_unit = f"{quantity_and_unit(near)[0]}_{unit}"
+            guess = in_unit if si_factor(in_unit, near) is not None else near
+        self._faults[path] = "is not a known key" + (f"; did you mean {guess}?" if guess else "")
+
+    def set(self, values: dict[str, Any], setting: str) -> None:
+        """Replace a value by that of KEY=VALUE."""
+        key, mark, literal = (part.strip() for part in setting.partition("="))
+        if not mark or not key or not literal:
+            raise InputError(f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set name=mine")
+        path, end = key.split("."), None
+        found = _table_at(values, self._owner, path[:-1])
+        if found is None and path[-1] in ENDS:
+            end = ENDS.index(path.pop())
+            found = _table_at(values, self._owner, path[:-1])
+        name = None if found is None else next((n for n in fields_of(found[1]) if si_factor(path[-1], n)), None)
+        if found is None or name is None or (end is not None and not fields_of(found[1])[name].pair):
+            guess = similar_key(key, keys_of(self._owner))
+            hint = f"; did you mean {guess}?" if guess else ""
+            raise InputError(f"--set: {self._source} has no key {shown(key)}{hint}")
+        table, owner = found
+        where = tuple(str(int(part) - 1) if part.isdecimal() else part for part in path[:-1])
+        given = _value(literal)
+        value = self.in_si({path[-1]: given}, owner, where)[name]
+        if end is not None:
+            if isinstance(given, bool) or not isinstance(given, int | Decimal):
+                raise InputError(f"--set: {key}: must be a number, found {shown(given)}")
+            pair = table.get(name)
+            if not isinstance(pair, list) or len(pair) != 2:
+                raise InputError(f"--set: {key}: the file has no such interval; set both ends, KEY=[1.0, 2.0]")
+            value = [value[0], pair[1]] if end == 0 else [pair[0], value[0]]
+        table[name] = value
+
+    def made(self, values: Mapping[str, Any]) -> Any:
+        """Return the dataclass; raise `InputError` with a line for each fault."""
+        made = None
+        try:
+            (made,) = adapter(self._owner).validate_json(json.dumps([values], default=str))
+        except ValidationError as error:
+            for details in error.errors(include_url=False):
+                self._invalid(details)
+        if made is None or self._faults:
+            lines = [f"{self._source}: {self._line(path, text)}" for path, text in self._faults.items()]
+            rest = ["... and more; correct these first"] if len(lines) > _MOST_FAULTS else []
+            raise InputError("\n".join([*lines[:_MOST_FAULTS], *rest]))
+        return made
+
+    def _invalid(self, details: Mapping[str, Any]) -> None:
+        path = tuple(map(str, details["loc"][1:]))
+        if details["type"] == "missing" and path in self._guessed:
+            return
+        text = details["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+        text = _IS_MISSING if details["type"] == "missing" else re.sub(r"^[A-Z]\w+: ", "", text)
+        while path and path not in self._written and path[-1].isdecimal():
+            text, path = f"number {int(path[-1]) + 1} {text}", path[:-1]
+        self._faults.setdefault(path, text)
+
+    def _line(self, path: KeyPath, text: str) -> str:
+        """Return a fault with its key as written, its value, and the SI unit of its limits if the key has another."""
+        key, value = self._written.get(path, (path[-1] if path else "", None))
+        si_unit = quantity_and_unit(path[-1])[1] if path else ""
+        unit = f" (in {si_unit})" if path and key != path[-1] and re.search(r"[1-9]", text) else ""
+        found = f", found {shown(value)}" if value is not None and not isinstance(value, dict) else ""
+        parts = [f"#{int(part) + 1}" if part.isdecimal() else part for part in path[:-1]]
+        where = ".".join([*parts, key if key.isidentifier() else shown(key)])
+        return f"{where}: {text}{unit}{found}" if path else text
+
+
+@cache
+def fields_of(owner: type) -> Mapping[str, KeyField]:
+    """Return the keys of the table of a dataclass, by name."""
+    hints = get_type_hints(owner, include_extras=True)
+    return {field.name: _key_field(hints[field.name]) for field in fields(owner)}
+
+
+def _key_field(hint: Any) -> KeyField:
+    if get_origin(hint) in (Union, types.UnionType):
+        hint = next(kind for kind in get_args(hint) if kind is not types.NoneType)
+    if get_origin(hint) is Annotated:
+        hint = get_args(hint)[0]
+    inner = get_args(hint)
+    many = get_origin(hint) is tuple and inner[1:] == (...,) and is_dataclass(inner[0])
+    table = inner[0] if many else hint
+    is_table = isinstance(table, type) and is_dataclass(table)
+    return KeyField(
+        table if is_table else None, many, hint == tuple[float, float], hint if hint in (int, float) else None
+    )
+
+
+def keys_of(owner: type, prefix: str = "") -> list[str]:
+    """Return the keys of a file with their tables; those of an array of tables have the number 1."""
+    keys = []
+    for name, field in fields_of(owner).items():
+        if field.table is None:
+            keys.append(prefix + name)
+        else:
+            keys += keys_of(field.table, f"{prefix}{name}.{'1.' if field.many else ''}")
+    return keys
+
+
+def similar_key(key: str, known: Sequence[str]) -> str | None:
+    """Return the most similar known key, or up to three keys with the same last part, or None."""
+    last = key.rsplit(".", 1)[-1]
+    alike = [name for name in known if name.rsplit(".", 1)[-1] == last or si_factor(last, name.rsplit(".", 1)[-1])]
+    return " or ".join(alike[:3]) or nearest(key, known)
+
+
+def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:
+    """Return whether the value of a key may be a whole number or any number; None if neither, or there is no key."""
+    path, is_end = key.split("."), False
+    if path[-1] in ENDS:
+        is_end = path.pop() is not None
+    found = _table_at({}, owner, path[:-1])
+    name = None if found is None else next((name for name in fields_of(found[1]) if si_factor(path[-1], name)), None)
+    if found is None or name is None:
+        return None
+    field = fields_of(found[1])[name]
+    return float if field.pair else None if is_end else field.numeric
+
+
+def _table_at(values: dict[str, Any], owner: type, path: Sequence[str]) -> tuple[dict[str, Any], type] | None:
+    """Return a table and its dataclass, adding it if it is missing; None if there is no such table."""
+    table: Any = values
+    for part in path:
+        if isinstance(table, list):
+            number = int(part) if part.isdecimal() and len(part) < 6 else 0
+            if not 1 <= number <= len(table):
+                return None
+            table = table[number - 1]
+        else:
+            field = fields_of(owner).get(part)
+            if field is None or field.table is None or not isinstance(table, dict):
+                return None
+            owner, table = field.table, table.setdefault(part, [] if field.many else {})
+    return (table, owner) if isinstance(table, dict) else None
+
+
+def _value(literal: str) -> Any:
+    """Return a TOML value; any other text is a number such as ``.5``, or text without quotes."""
+    try:
+        parsed = tomllib.loads(f"value = {literal}", parse_float=Decimal)
+        if [*parsed] == ["value"]:
+            return parsed["value"]
+    except (ValueError, RecursionError, InvalidOperation):
+        pass
+    try:
+        return Decimal(literal) if re.fullmatch(r"[+-]?[0-9.]+(?:[eE][+-]?[0-9]{1,4})?", literal) else literal
+    except InvalidOperation:
+        return literal
+
+
+def _scaled(value: Any, factor: Decimal) -> Any:
+    """Return a value with its numbers times a factor, each rounded once; whole numbers without a unit stay whole."""
+    if isinstance(value, list):
+        return [_scaled(item, factor) for item in value]
+    if isinstance(value, bool) or not isinstance(value, int | Decimal):
+        return value
+    return value if isinstance(value, int) and factor == 1 else float(_UNTRAPPED.multiply(Decimal(value), factor))
+
+
+def _text_of_file(path: str, noun: str) -> str:
+    """Return the text of a file of the user; raise `InputError` if it is not a text."""
+    remedy = f"check the path, or see `infoset {noun}s list` for the built-in names"
+    content = read_input(Path(path), f"{noun} file", LARGEST_FILE_BYTES, remedy)
+    if content.startswith(ZIP):
+        raise InputError(f"{path}: {use_of_content(content)}")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{path}: is not UTF-8 text (line {line}); save it as UTF-8") from None
+
+
+def parse(text: str, source: str) -> dict[str, Any]:
+    """Parse TOML; refuse lines that would take the parser too long."""
+    for number, line in enumerate(text.split("\n"), start=1):
+        if len(line) > LONGEST_LINE:
+            raise InputError(f"{source}: line {number} is over {LONGEST_LINE} characters; divide it")
+    try:
+        return tomllib.loads(text, parse_float=Decimal)
+    except (ValueError, InvalidOperation, RecursionError) as error:
+        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise InputError(f"{source}: is not valid TOML: {reason}") from None
+
+
+def to_toml(value: Any) -> str:
+    """Return the file of a dataclass, in SI; it is read back as an equal one."""
+    kind = kind_name(type(value))
+    head = [] if kind == SCENARIO else [f"kind = {_literal(kind)}"]
+    return "\n".join([*head, *_lines(value, "")]) + "\n"
+
+
+def _lines(value: Any, prefix: str) -> Iterator[str]:
+    tables = []
+    for name, field in fields_of(value.__class__).items():
+        inner = getattr(value, name)
+        if inner is None or inner == ():
+            continue
+        if field.table is None:
+            yield f"{name} = {_literal(inner)}"
+        else:
+            tables += [
+                (f"[[{prefix}{name}]]" if field.many else f"[{prefix}{name}]", each, f"{prefix}{name}.")
+                for each in (inner if field.many else (inner,))
+            ]
+    for heading, table, inner_prefix in tables:
+        yield from ("", heading, *_lines(table, inner_prefix))
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, Enum):
+        value = value.value
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_literal, value))}]"
+    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+
+
+def changed(value: Kind, changes: Mapping[str, float | int], source: str) -> Kind:
+    """Return a dataclass with other values by key, checked as a file with these values is."""
+    return read_text(type(value), to_toml(value), source, [f"{key}={number!r}" for key, number in changes.items()])

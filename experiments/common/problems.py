@@ -1,0 +1,96 @@
+"""What problems of all kinds share: the head of their results, and checks of their orbits, times and names.
+
+A problem is a frozen dataclass that `experiments.common.input_file` reads from a file. Its class variable ``kind`` is
+the kind of the file, and its fields ``name`` and ``description`` are those of the results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from experiments.common.errors import InputError
+from experiments.common.output import library_version
+from rendezvous.two_body import OrbitalElements, orbit_fault, semi_major_axis_m
+from sim.storage.codec import fingerprint
+
+MOST_RADIANS, LEAST_RADIANS = 1000.0, 1e-9
+"""Angles of the orbit during a problem, within which linear motion is meaningful."""
+EARTH_M3_S2, EARTH_RADIUS_M = 3.986004418e14, 6378137.0
+_MOST_RADII = 1000.0
+"""Greatest semi-major axis in radii of the planet: that of an orbit in metres, read as kilometres, is greater."""
+_STAR_M3_S2 = 1e19
+"""Gravitational parameter between that of Jupiter, 1.27e17, and that of the Sun, 1.33e20."""
+
+
+class Problem(Protocol):
+    """A problem of any kind."""
+
+    @property
+    def name(self) -> str:
+        """Name of the results."""
+
+    @property
+    def description(self) -> str:
+        """A line about the problem."""
+
+
+def head(problem: Problem) -> dict[str, object]:
+    """Return the first keys of the JSON of a command."""
+    return {"version": library_version(), "problem": problem.name, "problem_hash": fingerprint(problem)}
+
+
+def need_finite(problem: Problem, *results: ArrayLike) -> None:
+    """Raise `InputError` if a result is not finite."""
+    if not all(np.isfinite(values).all() for values in results):
+        raise InputError(f"{problem.name}: the numbers are so large that results are not finite; check the units")
+
+
+def check_names(table: str, names: Sequence[str]) -> None:
+    """Raise ValueError if two tables of an array have the same name."""
+    for index, name in enumerate(names):
+        first = names.index(name)
+        if first < index:
+            raise ValueError(f"{table}.{index + 1}.name: {name!r} is also the name of {table} {first + 1}")
+
+
+def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
+    """Raise ValueError if the orbit turns by an unlikely angle in a time; `key` is that of the time."""
+    angle = duration_s * rate_rad_s
+    if not LEAST_RADIANS <= angle <= MOST_RADIANS:
+        raise ValueError(
+            f"{key} is {angle:.3g} radians of the orbit, and {LEAST_RADIANS:g} to {MOST_RADIANS:g} make sense: check "
+            "its unit and that of the orbit's rate"
+        )
+
+
+def check_orbit(
+    key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float, planet_radius_m: float | None = None
+) -> None:
+    """Raise ValueError if the orbit of a state (position and velocity, SI) meets its planet, or is absurdly large.
+
+    Without a radius, that of a planet with the density of the Earth is used. No planet or moon is denser, so that
+    theirs are greater. Orbits about a star have no upper limit. The message begins with `key`.
+    """
+    position, velocity = (np.asarray(vector, dtype=float) for vector in state)
+    densest_m = EARTH_RADIUS_M * (mu_m3_s2 / EARTH_M3_S2) ** (1.0 / 3.0)
+    fault = orbit_fault(position, velocity, mu_m3_s2, densest_m if planet_radius_m is None else planet_radius_m)
+    if fault is None and mu_m3_s2 < _STAR_M3_S2:
+        radii = semi_major_axis_m(position, velocity, mu_m3_s2) / densest_m
+        if radii > _MOST_RADII:
+            fault = f"the orbit is {radii:.4g} times as large as the planet; at most {_MOST_RADII:g} times make sense"
+    if fault is not None:
+        raise ValueError(f"{key}: {fault}")
+
+
+def check_rate(rate_rad_s: float, eccentricity: float = 0.0) -> None:
+    """Raise ValueError if there is no orbit of this mean motion about the Earth, see `check_orbit`.
+
+    The rate at the surface of a planet depends on its density only, so that the Earth stands for all of them.
+    """
+    axis_m = (EARTH_M3_S2 / rate_rad_s**2) ** (1.0 / 3.0)
+    state = OrbitalElements(axis_m, eccentricity, 0.0, 0.0, 0.0, 0.0).state(EARTH_M3_S2)
+    check_orbit("orbit_rate_rad_s", state, EARTH_M3_S2, EARTH_RADIUS_M)

@@ -1,0 +1,253 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.campaigns.command import Report
+from experiments.campaigns.sweep_axes import sweep_axes
+from experiments.cli import COMMANDS
+from experiments.common.errors import InputError
+from experiments.common.file_kinds import built_in_files
+from experiments.common.input_file import changed, read_file, read_text, to_toml
+from experiments.interception.scenario_file import load_scenario
+from experiments.pareto.file import load_pareto
+from sim import Scenario
+from tests.built_in import problem_text, scenario_text
+
+Infoset = Callable[..., tuple[int, str, str]]
+
+TEXT = scenario_text("asteroid-1997")
+
+MISTAKES = {
+    "missing": ("step_s = 0.5 ", "", "mine.toml: step_s: is missing"),
+    "misspelt": (
+        "distance_km",
+        "distnce_km",
+        "mine.toml: sun.distnce_km: is not a known key; did you mean distance_km?",
+    ),
+    "negative": (
+        "distance_km = 150.0e6",
+        "distance_km = -150.0e6",
+        "mine.toml: sun.distance_km: must be greater than 0, found -1.500e+8",
+    ),
+    "text for a number": ("step_s = 0.5", 'step_s = "0.5"', 'mine.toml: step_s: must be a valid number, found "0.5"'),
+    "reversed pair": (
+        "z_km = [-10.0, 10.0]",
+        "z_km = [10.0, -10.0]",
+        "mine.toml: uncertainty.z_km: must be a pair [minimum, maximum], and is reversed, found [10.0, -10.0]",
+    ),
+    "unknown table": (
+        "[range_sensor]",
+        "[radar]",
+        "mine.toml: radar: is not a known key",
+    ),
+    "wrong unit": (
+        "distance_km",
+        "distance_deg",
+        "mine.toml: sun.distance_deg: is not a known key; did you mean distance_m?",
+    ),
+    "two units of one key": (
+        "direction_deg = 90.0",
+        "direction_deg = 90.0\ndirection_rad = 1.57",
+        "mine.toml: sun.direction_deg: is written again, as direction_rad, found 90.0",
+    ),
+    "beyond a limit in another unit": (
+        "direction_deg = 90.0",
+        "direction_deg = 900.0",
+        "mine.toml: sun.direction_deg: must be at most 6.28319 (in rad), found 900.0",
+    ),
+    "not a number": ("step_s = 0.5", "step_s = nan", "mine.toml: step_s: must be a finite number, found nan"),
+    "bool": ("step_s = 0.5", "step_s = true", "mine.toml: step_s: must be a valid number, found true"),
+    "wrong kind of file": (
+        TEXT,
+        problem_text("service-2"),
+        "mine.toml: this is a problem of kind multipoint; use infoset multipoint FILE",
+    ),
+    "not TOML": (
+        "step_s = 0.5",
+        "step_s 0.5",
+        "mine.toml: is not valid TOML: Expected '=' after a key in a key/value pair (at line 7, column 8)",
+    ),
+    "no such choice": (
+        'noise = "random"',
+        'noise = "rndom"',
+        "mine.toml: noise: must be 'random' or 'game', found \"rndom\"",
+    ),
+}
+"""Old and new text of a file, and the message."""
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_gets_one_message(mistake: str) -> None:
+    old, new, message = MISTAKES[mistake]
+    with pytest.raises(InputError) as caught:
+        read_text(Scenario, TEXT.replace(old, new, 1), "mine.toml")
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("thruster.budgt_m_s=5", 'has no key "thruster.budgt_m_s"; did you mean thruster.budget_m_s?'),
+        ("budget_m_s=5", 'has no key "budget_m_s"; did you mean thruster.budget_m_s?'),
+        ("thruster.budget_m_s", 'must be KEY=VALUE, found "thruster.budget_m_s"; for example --set name=mine'),
+        ("step_s.min=1", 'has no key "step_s.min"'),
+        ("rate_sensor.period_s=1", "rate_sensor.error_rad_s: is missing"),
+        ("uncertainty.y_km.min=1", "uncertainty.y_km.min: the file has no such interval"),
+        ("uncertainty.x_km.min=[1, 2]", "uncertainty.x_km.min: must be a number, found [1, 2]"),
+        ("uncertainty.x_km.max={}", "uncertainty.x_km.max: must be a number, found a table"),
+        ("dispersion.z_km.max=-5", "dispersion.z_km: must be a pair [minimum, maximum], and is reversed"),
+    ],
+)
+def test_a_wrong_setting_gets_one_message(setting: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_scenario("asteroid-1997", [setting])
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("axis", "message"),
+    [
+        ("strategy=1:2:2", '--vary: a scenario has no numeric key "strategy"'),
+        ("thruster.budget=1:2:2", "did you mean thruster.budget_m_s?"),
+    ],
+)
+def test_a_key_that_cannot_be_varied_gets_one_message(axis: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        sweep_axes(axis, load_scenario("asteroid-1997"))
+    assert message in str(caught.value)
+
+
+def test_all_mistakes_of_a_file_are_listed_one_a_line() -> None:
+    names = ("misspelt", "reversed pair", "bool", "wrong unit")
+    text = TEXT
+    for name in names[:3]:
+        text = text.replace(*MISTAKES[name][:2], 1)
+    with pytest.raises(InputError) as caught:
+        read_text(Scenario, text, "mine.toml")
+    assert sorted(str(caught.value).splitlines()) == sorted(MISTAKES[name][2] for name in names[:3])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a = " + "[\n" * 2000, "is not valid TOML: it is nested too deeply"),
+        ("a" * 2000, "line 1 is over 1000 characters"),
+        ("a = 1979-05-27", "a: is not a known key"),
+        ('name = "\\u001b[31m"', "name: must be one line without control characters"),
+        ('name = "../mine"', "name: must begin with a letter or a digit"),
+        (f"step_s = {'9' * 500}", "step_s: must be a finite number"),
+        ("step_s = 1e400", "step_s: must be a finite number"),
+        ("sun = 3", "sun: "),
+        ("uncertainty = []", "uncertainty: "),
+        ("angle_sensor.period_s = 0", "angle_sensor.period_s: must be greater than 0"),
+    ],
+)
+def test_hostile_files_are_refused_with_short_lines(text: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_text(Scenario, text, "mine.toml")
+    assert message in str(caught.value)
+    assert max(map(len, str(caught.value).splitlines())) < 250
+    assert str(caught.value).replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"PK\x03\x04", b"x" * 200_000])
+def test_files_that_are_no_text_are_refused(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_bytes(content)
+    with pytest.raises(InputError, match=r"mine\.toml: "):
+        read_file(Scenario, tmp_path / "mine.toml")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("distance_au", "1.0"),
+        ("distance_m", "149597870700.0"),
+        ("distance_km", "149597870.7"),
+        ("distance_km", "149597870700e-3"),
+    ],
+)
+def test_a_key_is_written_in_any_unit_and_rounded_once(key: str, value: str) -> None:
+    text = TEXT.replace("distance_km = 150.0e6", f"{key} = {value}")
+    sun = read_text(Scenario, text, "mine.toml").sun
+    assert sun is not None
+    assert sun.distance_m == 149597870700.0
+
+
+def test_a_number_is_both_ends_of_an_interval() -> None:
+    assert load_scenario("asteroid-1997", ["uncertainty.x_km=5801.3"]).uncertainty.x_m == (5801300.0, 5801300.0)
+
+
+def test_settings_are_in_any_unit_and_named_in_the_description() -> None:
+    scenario, before = load_scenario("asteroid-1997", ["thruster.budget_km_s=0.5"]), load_scenario("asteroid-1997")
+    assert scenario.thruster.budget_m_s == 500.0
+    assert scenario.description == f"{before.description}; with thruster.budget_km_s=0.5"
+    tilted = load_scenario("asteroid-1997", ["uncertainty.x_km.min=5200", "dispersion.z_km=-8"])
+    assert tilted.uncertainty.x_m == (5200e3, before.uncertainty.x_m[1])
+    assert tilted.dispersion.z_m == (-8e3, -8e3)
+    sensor = load_scenario("asteroid-1997", ["rate_sensor.period_s=1.0", "rate_sensor.error_rad_s=1e-6"]).rate_sensor
+    assert sensor is not None
+    assert sensor.error_rad_s == 1e-6
+
+
+def test_tables_of_an_array_are_numbered_from_1() -> None:
+    problem = load_pareto("pareto-2008", ["craft.3.weight=2.5", "craft.1.position_m=[1, 2, 3]", "name=my meeting"])
+    assert [each.weight for each in problem.craft] == [1.0, 1.0, 2.5]
+    assert problem.craft[0].position_m == (1.0, 2.0, 3.0)
+    assert problem.name == "my meeting"
+    for number in ("4", "0", "0000012", "\u00b2"):
+        with pytest.raises(InputError, match=rf'has no key "craft\.{number}\.weight"'):
+            load_pareto("pareto-2008", [f"craft.{number}.weight=2.5"])
+
+
+def test_changed_checks_as_a_file() -> None:
+    scenario = load_scenario("asteroid-1997")
+    other = changed(scenario, {"thruster.budget_m_s": 0.1 + 0.2, "information_set.sections": 31}, "cell")
+    assert (other.thruster.budget_m_s, other.information_set.sections) == (0.1 + 0.2, 31)
+    assert changed(other, {"thruster.budget_m_s": 1000.0, "information_set.sections": 29}, "cell") == scenario
+    with pytest.raises(InputError, match=r"cell: thruster\.budget_m_s: must be at least 0"):
+        changed(scenario, {"thruster.budget_m_s": -1.0}, "cell")
+
+
+def test_a_name_wins_over_a_file_and_a_path_over_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "comet-fast").write_text(TEXT)
+    assert load_scenario("comet-fast").name == "comet-fast"
+    assert load_scenario("./comet-fast").name == "asteroid-1997"
+    with pytest.raises(InputError, match=r'is called "commet-fast"; did you mean "comet-fast"\?'):
+        load_scenario("commet-fast")
+    with pytest.raises(InputError, match=r"mine\.toml: there is no such file"):
+        load_scenario("mine.toml")
+
+
+@pytest.mark.parametrize("name", built_in_files())
+def test_a_built_in_file_is_written_and_read_again(name: str, infoset: Infoset, tmp_path: Path) -> None:
+    noun = "scenarios" if built_in_files()[name].kind == "scenario" else "problems"
+    assert infoset(noun, "new", "mine.toml", "--like", name) == (
+        0,
+        f"wrote mine.toml, a copy of {name}; change it, then: infoset {noun} check mine.toml\n",
+        "",
+    )
+    assert Path("mine.toml").read_text(encoding="utf-8") == built_in_files()[name].text
+    code, out, _ = infoset(noun, "check", "mine.toml", "--json")
+    assert (code, json.loads(out)["name"]) == (0, name)
+
+
+def test_every_command_that_takes_a_file_has_the_option() -> None:
+    every: list[Any] = [options for rows in COMMANDS.values() for options, _, _ in rows]
+    takes = [options for options in every if {"scenario", "problem"} & {each.name for each in fields(options)}]
+    assert len(takes) >= 13
+    assert [options for options in takes if "settings" not in {each.name for each in fields(options)}] == []
+    assert "settings" not in {each.name for each in fields(Report)}
+
+
+def test_a_written_text_needs_no_key_of_a_default_table() -> None:
+    scenario = load_scenario("asteroid-1997-single")
+    assert "[range_sensor]" not in to_toml(scenario)
+    assert read_text(Scenario, to_toml(scenario), "mine.toml") == scenario
