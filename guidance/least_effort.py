@@ -75,8 +75,9 @@ def unavoidable_m(situation: Situation) -> float:
     """Return the reference of `LeastEffort`, m: a miss that errors of the angles can force; zero with a schedule.
 
     Two motions that differ by the sum of the error bounds at the first image, at the range x0, and at the range e tau
-    look alike until then. They arrive 2 e tau (h(e tau) + h(x0))/(1 - e tau/x0) apart, less if the bounds of the start
-    are nearer. Half of it, less what the impulses after tau can correct, is a miss of one of the two.
+    look alike until then. They arrive 2 e tau (h(e tau) + h(x0))/(1 - e tau/x0) apart, less if the first image and the
+    bounds of the velocity are nearer. Half of it, less what the impulses after tau can correct, is a miss of one of
+    the two.
     """
     model, thruster, e = situation.information.model, situation.thruster, situation.closing_speed_m_s
     if situation.later_times_s is not None:
@@ -85,7 +86,7 @@ def unavoidable_m(situation: Situation) -> float:
     to_go_s: Floats = model.step_s * np.arange(1.0, math.ceil(x0 / (e * model.step_s)))
     h = model.angle_sensor.error_bound
     apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
-    widest_m = 0.5 * (np.ptp(box.z_m) + np.ptp(box.vz_m_s) * box.x_m[1] / e)
+    widest_m = 0.5 * (min(np.ptp(box.z_m), 2.0 * h(x0) * x0) + np.ptp(box.vz_m_s) * x0 / e)
     correctable_m = thruster.greatest_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
     return float((np.minimum(apart_m, widest_m) - correctable_m).max(initial=0.0))
 
