@@ -88,14 +88,13 @@ class GameValue:
             yield f"reserve, m: {', '.join(f'{name} {number(part)}' for name, part in items.items())}"
             return
         if self.best is None:
-            yield f"the value of the game is at least {number(self.lower_m)} m; without a search it has no upper end"
+            yield f"the value of the game is at least {number(self.lower_m)} m; a search is needed to compare strategies with it"
         else:
             yield (
-                "the value of the game lies between the bound and what the best strategy guarantees: "
-                f"{number(self.lower_m)} m and {number(self.best.worst_m)} m ({self.best.name}); the upper end is "
-                "found, not proved"
+                f"the value of the game is at least {number(self.lower_m)} m; the least of the greatest misses found is "
+                f"{number(self.best.worst_m)} m, of {self.best.name}: what it guarantees is that or more"
             )
-        yield f"a proof of the upper end does not cover: {', '.join(self.reasons)}"
+        yield f"no upper end is proved, because of: {', '.join(self.reasons)}"
 
     def summary(self) -> dict[str, object]:
         """Return the value as JSON."""

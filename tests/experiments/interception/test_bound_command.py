@@ -124,12 +124,11 @@ def test_bound_into_a_folder(
         "best_strategy_worst_found_m": best["worst_found_m"],
     }
     assert (
-        "the value of the game lies between the bound and what the best strategy guarantees: "
-        f"{found['lower_bound_m']:.3g} m and {best['worst_found_m']:.3g} m ({best['name']}); the upper end is found, "
-        "not proved\n"
+        f"the value of the game is at least {found['lower_bound_m']:.3g} m; the least of the greatest misses found is "
+        f"{best['worst_found_m']:.3g} m, of {best['name']}: what it guarantees is that or more\n"
     ) in out
     assert (
-        "a proof of the upper end does not cover: gravity, range not exactly known, closing speed not exactly known\n"
+        "no upper end is proved, because of: gravity, range not exactly known, closing speed not exactly known\n"
     ) in out
     assert IS_VALUE not in out
 
@@ -153,7 +152,7 @@ def test_value_where_range_and_speed_are_known(infoset: Infoset, short: Scenario
     assert found["lower_bound_m"] <= symmetric["worst_found_m"] <= value["at_most_m"] < 1.1 * found["lower_bound_m"]
     assert f"{IS_VALUE}{total:.3g} m: no strategy guarantees less than {found['lower_bound_m']:.3g} m" in out
     assert re.search(r"^reserve, m: lower bound \S+, tangent \S+, dead zone \S+, range threshold \S+$", out, re.M)
-    assert "found, not proved" not in out
+    assert "no upper end" not in out
     code, out, _ = infoset(*options, "--budget", 0, "--set", "thruster.budget_m_s=100")
     assert code == 0
     value = json.loads((tmp_path / "found.json").read_text())["value"]
@@ -162,8 +161,8 @@ def test_value_where_range_and_speed_are_known(infoset: Infoset, short: Scenario
     assert [value[key] for key in ("at_most_m", "reserve_m", "best_strategy", "best_strategy_worst_found_m")] == [
         None
     ] * 4
-    assert f"a proof of the upper end does not cover: {reason}\n" in out
-    assert "without a search it has no upper end" in out
+    assert f"no upper end is proved, because of: {reason}\n" in out
+    assert "a search is needed to compare strategies with it" in out
     assert IS_VALUE not in out
 
 
