@@ -88,11 +88,14 @@ class GameValue:
             yield f"reserve, m: {', '.join(f'{name} {number(part)}' for name, part in items.items())}"
             return
         if self.best is None:
-            yield f"the value of the game is at least {number(self.lower_m)} m; a search is needed to compare strategies with it"
+            yield (
+                f"the value of the game is at least {number(self.lower_m)} m; a search is needed to compare strategies "
+                "with it"
+            )
         else:
             yield (
-                f"the value of the game is at least {number(self.lower_m)} m; the least of the greatest misses found is "
-                f"{number(self.best.worst_m)} m, of {self.best.name}: what it guarantees is that or more"
+                f"the value of the game is at least {number(self.lower_m)} m; the least of the greatest misses found "
+                f"is {number(self.best.worst_m)} m, of {self.best.name}: what it guarantees is that or more"
             )
         yield f"no upper end is proved, because of: {', '.join(self.reasons)}"
 
