@@ -131,7 +131,7 @@ class Sweep(Flight):
     and a figure for each noise: lines for one key, maps for two keys.
 
     Forms of --vary: KEY=FROM:TO:COUNT, equal spacing; KEY=log:FROM:TO:COUNT, logarithmic spacing;
-    KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.least or KEY.greatest, an end of a pair;
+    KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.min or KEY.max, an end of a pair;
     angle_sensor.scale, a factor of all error bounds of a sensor. For example: --vary angle_sensor.scale=1:8:8 --vary
     thruster.greatest_impulse_m_s=2.5:20:8.
     """
