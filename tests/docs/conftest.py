@@ -70,7 +70,8 @@ class Page:
 def all_pages() -> list[Page]:
     """Return every page of prose in the project, the pages of the site first."""
     site = [path for path in sorted((ROOT / "docs").rglob("*.md")) if not {"_build", "gallery"} & set(path.parts)]
-    others = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")]
+    names = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "benchmarks/README.md")
+    others = [ROOT / name for name in names]
     return [Page(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")) for path in (*site, *others)]
 
 
