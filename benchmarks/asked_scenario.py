@@ -1,4 +1,4 @@
-"""Common options of the scripts that compare strategies: scenario, model, range meter, runs and seed."""
+"""Common options of the scripts that compare strategies: scenario, model, range sensor, runs and seed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def asked_scenario(
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenario", nargs="?", default="asteroid-1997")
     parser.add_argument("--model", choices=[model.value for model in Model], default=Model.GUARANTEED.value)
-    parser.add_argument("--no-range-meter", action="store_true")
+    parser.add_argument("--no-range-sensor", action="store_true")
     parser.add_argument("--runs", type=int, default=runs)
     parser.add_argument("--seed", type=int, default=seed)
     options = parser.parse_args(arguments)
@@ -27,6 +27,6 @@ def asked_scenario(
     if kind is not scenario.information_set.model:
         settings = replace(scenario.information_set, model=kind, initial_set=None)
         scenario = replace(scenario, information_set=settings)
-    if options.no_range_meter:
+    if options.no_range_sensor:
         scenario = replace(scenario, range_sensor=None)
     return scenario, options.runs, options.seed

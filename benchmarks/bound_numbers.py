@@ -47,7 +47,7 @@ def far() -> Scenario:
     published = load_scenario("asteroid-1997")
     box = StateBox((8e3, 10e3), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
     model = replace(published.set_model, bounds=box, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    thruster = replace(published.thruster, greatest_impulse_m_s=0.5)
+    thruster = replace(published.thruster, max_impulse_m_s=0.5)
     return replace(published, sun=None, dispersion=box, **of_model(model), thruster=thruster)
 
 

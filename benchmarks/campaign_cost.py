@@ -1,6 +1,6 @@
 """Time of a campaign as a function of its runs, and of a run as a function of its sections.
 
-`python benchmarks/campaign_cost.py --out DIR` prints the fitted straight lines and the greatest deviation from them,
+`python benchmarks/campaign_cost.py --out DIR` prints the fitted straight lines and the maximum deviation from them,
 and writes figure-campaign-cost.pdf and .png.
 """
 

@@ -57,5 +57,5 @@ def at_least(pytestconfig: pytest.Config) -> Check:
 
 @pytest.fixture(params=list(NoiseKind), ids=lambda kind: kind.value, scope="module")
 def curve(request: pytest.FixtureRequest) -> Scenario:
-    """The paper's scenario without a range meter: curves 1 and 3 of its experiment."""
+    """The paper's scenario without a range sensor: curves 1 and 3 of its experiment."""
     return replace(load_scenario("asteroid-1997"), noise=request.param, range_sensor=None)

@@ -46,7 +46,7 @@ def variants(single: Scenario) -> dict[str, Scenario]:
         "1.5 mrad at the initial range": {"angle_sensor": replace(angle, error_at_nominal_range_rad=1.5e-3)},
     }
     engines: dict[str, dict[str, Any]] = {
-        "no dead zone": {"least_impulse_m_s": 0.0},
+        "no dead zone": {"min_impulse_m_s": 0.0},
         "delay of one step": {"delay_steps": 1},
     }
     changed = {name: replace(single, **of_model(replace(model, **fields))) for name, fields in sets.items()}

@@ -41,12 +41,12 @@ class Cost:
     step_us, arrival_ms : float
         Processor time of a step of an engagement, microseconds, up to the first label that leaves; and of all that
         follows, and of the margins of the true state, milliseconds.
-    mean_vertices, most_vertices : float
-        Vertices of a section along one axis, mean over the flight and greatest.
-    most_sections : int
-        Greatest number of sections of an engagement.
+    mean_vertices, max_vertices : float
+        Vertices of a section along one axis, mean over the flight and maximum.
+    max_sections : int
+        Maximum number of sections of an engagement.
     memory_mb : float
-        Memory of an engagement, megabytes: greatest traced memory of a batch, divided by its size.
+        Memory of an engagement, megabytes: maximum traced memory of a batch, divided by its size.
     miss_m, guaranteed_miss_m : float
         Medians.
     sound : bool
@@ -56,8 +56,8 @@ class Cost:
     step_us: float
     arrival_ms: float
     mean_vertices: float
-    most_vertices: int
-    most_sections: int
+    max_vertices: int
+    max_sections: int
     memory_mb: float
     miss_m: float
     guaranteed_miss_m: float
@@ -73,7 +73,7 @@ def of_steps(scenario: Scenario, steps: int) -> Scenario:
         scenario,
         rate_sensor=rate_sensor,
         **of_model(replace(scenario.set_model, step_s=step_s, angle_sensor=sensor)),
-        thruster=replace(scenario.thruster, greatest_impulse_m_s=ACCELERATION_M_S2 * step_s),
+        thruster=replace(scenario.thruster, max_impulse_m_s=ACCELERATION_M_S2 * step_s),
     )
 
 
@@ -90,7 +90,7 @@ def cost(scenario: Scenario, steps: int) -> Cost:
     longer = of_steps(scenario, steps)
     simulate(longer, 1 if steps > STEPS[0] else 2)
     flight = Engagements(longer, draw(longer, range(BATCH), 1))
-    greatest = means = looks = sections = 0
+    maximum = means = looks = sections = 0
     spent_s, before = 0.0, 0
     while flight.flying:
         began_s = time.process_time()
@@ -101,7 +101,7 @@ def cost(scenario: Scenario, steps: int) -> Cost:
         spent_s, before = spent_s + elapsed_s, flight.step
         if flight.step % (steps // 50) == 0:
             counts = vertices(flight)
-            looks, means, greatest = looks + 1, means + counts.mean(), max(greatest, int(counts.max()))
+            looks, means, maximum = looks + 1, means + counts.mean(), max(maximum, int(counts.max()))
             sections = max(sections, int(flight._information.section_counts.max()))
     began_s = time.process_time() - elapsed_s
     while flight.flying:
@@ -116,8 +116,8 @@ def cost(scenario: Scenario, steps: int) -> Cost:
         step_us=1e6 * spent_s / (BATCH * before),
         arrival_ms=1e3 * arrival_s / BATCH,
         mean_vertices=means / looks,
-        most_vertices=greatest,
-        most_sections=sections,
+        max_vertices=maximum,
+        max_sections=sections,
         memory_mb=peak / SMALL_BATCH / 1e6,
         miss_m=float(quantiles(results.miss_m, [0.5])[0]),
         guaranteed_miss_m=float(quantiles(results.guaranteed_miss_m.compressed(), [0.5])[0]),
@@ -144,7 +144,7 @@ def main() -> None:
             whole = of.step_us + 1e3 * of.arrival_ms / steps
             sys.stdout.write(
                 f"| {strategy} | {steps} | {of.step_us:.1f} | {of.arrival_ms:.1f} | {whole:.1f} | "
-                f"{of.mean_vertices:.0f} / {of.most_vertices} | {of.most_sections} | {of.memory_mb:.1f} | "
+                f"{of.mean_vertices:.0f} / {of.max_vertices} | {of.max_sections} | {of.memory_mb:.1f} | "
                 f"{of.miss_m:.1f} | {of.guaranteed_miss_m:.1f} | {'yes' if of.sound else 'no'} |\n"
             )
             sys.stdout.flush()

@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def timed(run: Callable[[], Floats], steps: int) -> tuple[float, float]:
-    """Return the shortest processor time, us a step, and the greatest error of the bounds."""
+    """Return the shortest processor time, us a step, and the maximum error of the bounds."""
     best, bounds = np.inf, run()
     for _ in range(ROUNDS):
         start = time.process_time()

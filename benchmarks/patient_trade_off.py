@@ -24,7 +24,7 @@ SHARES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 def figures(scenario: Scenario, strategy: Strategy, runs: int, seed: int) -> list[float]:
-    """Return miss (m) and impulse (m/s), 50 %, 90 % and greatest: with random noise, then with the worst tie rule."""
+    """Return miss (m) and impulse (m/s), 50 %, 90 % and maximum: with random noise, then with the worst tie rule."""
     random = [simulate(replace(scenario, noise=NoiseKind.RANDOM), runs, seed=seed, strategy=strategy, guarantee=False)]
     game = [
         simulate(replace(scenario, noise=NoiseKind.GAME, tie=tie), runs, seed=seed, strategy=strategy, guarantee=False)

@@ -39,7 +39,7 @@ STRATEGIES = ("symmetric-miss", "patient")
 
 
 def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
-    """Return the random scenario with a number, with or without a rate sensor; about half have a range meter.
+    """Return the random scenario with a number, with or without a rate sensor; about half have a range sensor.
 
     Speeds are 1 to 100 km/s, steps 0.01 to 10 s and 16 to 126 of them, angle errors 1e-6 to 1e-2 rad, sections 3 to
     500.
@@ -67,8 +67,8 @@ def gravity_scenario(number: int) -> Scenario:
     """
     generator = np.random.default_rng(np.random.SeedSequence(entropy=34, spawn_key=(number,)))
 
-    def power(least: float, greatest: float) -> float:
-        return float(10.0 ** generator.uniform(least, greatest))
+    def power(minimum: float, maximum: float) -> float:
+        return float(10.0 ** generator.uniform(minimum, maximum))
 
     scenario = random_scenario(number, rate_sensor=number % 8 == 5)
     parameter, distance_m = power(13.5, 20.2), power(6.9, 11.2)
@@ -183,8 +183,8 @@ def scheduled(scenario: Scenario, number: int) -> Scenario:
 
 
 def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Scenario:
-    def decades(least: float, greatest: float) -> float:
-        return float(10.0 ** generator.uniform(least, greatest))
+    def decades(minimum: float, maximum: float) -> float:
+        return float(10.0 ** generator.uniform(minimum, maximum))
 
     def often(share: float) -> bool:
         return bool(generator.uniform() < share)
@@ -216,11 +216,11 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
         initial_set=InitialSet.BOX,
         model=Model.GUARANTEED,
     )
-    greatest_m_s = z_m / flight_s * decades(-0.5, 1.5)
+    max_m_s = z_m / flight_s * decades(-0.5, 1.5)
     thruster = Thruster(
-        greatest_m_s * steps * decades(-1.5, 0.0),
-        0.0 if often(0.3) else greatest_m_s * decades(-2.0, -0.3),
-        greatest_m_s,
+        max_m_s * steps * decades(-1.5, 0.0),
+        0.0 if often(0.3) else max_m_s * decades(-2.0, -0.3),
+        max_m_s,
         (0.0, 0.0, 0.01, 0.05)[int(generator.integers(4))],
     )
     sun = None

@@ -184,7 +184,7 @@ def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
 
 
 def scenarios(hostile: bool) -> list[Scenario]:
-    """Return the built-in scenarios, without and with the range meter."""
+    """Return the built-in scenarios, without and with the range sensor."""
     built_in = [guaranteed(load_scenario(name), hostile) for name in ("asteroid-1997", "comet-fast")]
     return [replace(scenario, range_sensor=sensor) for scenario in built_in for sensor in (None, scenario.range_sensor)]
 
@@ -199,7 +199,7 @@ def fly_batch(number: int, hostile: bool, seed: int) -> Count:
 
 
 def fly_space_batch(number: int, hostile: bool, seed: int) -> Count:
-    """Simulate batch `number` out of the plane: some have a range meter, a comet or rates."""
+    """Simulate batch `number` out of the plane: some have a range sensor, a comet or rates."""
     scenario = load_scenario("comet-fast" if number % 32 == 7 else "asteroid-1997")
     sensor = scenario.range_sensor if number // 8 % 2 else None
     scenario = replace(scenario, rate_sensor=RateSensor(1.0, 5e-8) if number % 128 == 5 else None)

@@ -55,7 +55,7 @@ def rows() -> Iterator[tuple[str, Scenario]]:
     anywhere = replace(sure, dispersion=sure.set_model.bounds)
     for title, scenario in (
         ("guaranteed", sure),
-        ("guaranteed, range meter", ranging),
+        ("guaranteed, range sensor", ranging),
         ("guaranteed, starts in B x D", anywhere),
     ):
         yield f"{title}, random", scenario

@@ -2,8 +2,8 @@
 
     python benchmarks/square_wave_errors.py --model guaranteed --runs 50
 
-The table has a row for each strategy: median and greatest miss and impulse over the starts, with the worst square wave
-of each start (half-periods from one measurement to the whole flight, both signs). A range meter measures without error.
+The table has a row for each strategy: median and maximum miss and impulse over the starts, with the worst square wave
+of each start (half-periods from one measurement to the whole flight, both signs). Range sensors measure without error.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ HALF_PERIODS = (1, 2, 3, 4, 6, 10, 20, 40, 80, 1000)
 
 
 def worst(scenario: Scenario, name: str, runs: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the greatest miss (m) and the greatest impulse (m/s) of each start over all square waves."""
+    """Return the maximum miss (m) and the maximum impulse (m/s) of each start over all square waves."""
     draws = draw(scenario, range(runs), seed)
     steps = draws.steps
     misses, impulses = [], []

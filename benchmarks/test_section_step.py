@@ -103,7 +103,7 @@ def fly_stretch(information: InformationSet, stretch: list[tuple[Floats, Floats]
 
 
 def step_objects(flight: Flight) -> Floats:
-    """Step over shapely objects in a loop; return the extremes (least, greatest) of z + V x/e."""
+    """Step over shapely objects in a loop; return the extremes (minimum, maximum) of z + V x/e."""
     model = flight.model
     half = np.array([model.disturbance_m_s2 * model.step_s, 0.5 * model.disturbance_m_s2 * model.step_s**2])
     extremes = np.full((len(flight.polygons), 2), np.nan)

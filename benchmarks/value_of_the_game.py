@@ -6,7 +6,7 @@
     python -m benchmarks.value_of_the_game --scenarios random --budget 2000 --seeds 1
 
 Searches start anywhere in the uncertainty of the scenario, the other runs in its dispersion. The model is `guaranteed`.
-Each row has the greatest value found, that of any state of the set, and the miss of the truth of that engagement.
+Each row has the maximum value found, that of any state of the set, and the miss of the truth of that engagement.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ STRATEGIES = ("symmetric-miss", "least-effort", "patient")
 RUNS = 100
 RANDOM = 10
 VARIANTS = {
-    "weak engine, 2.5 m/s": ["thruster.greatest_impulse_m_s=2.5"],
+    "weak engine, 2.5 m/s": ["thruster.max_impulse_m_s=2.5"],
     "closing speed 52 to 64 km/s": ["uncertainty.vx_km_s=[-64, -52]"],
     "precise sensor, 1 % of the errors": [
         "angle_sensor.error_at_nominal_range_rad=1.5e-6",

@@ -87,9 +87,9 @@ class Clock:
 
 
 def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
-    """Return the least and greatest mean number of vertices of the sections over the steps, and the greatest number."""
+    """Return the minimum and maximum mean number of vertices of the sections over the steps, and the maximum number."""
     flight = Engagements(scenario, draw(scenario, range(together), 0), guarantee=False)
-    means, greatest = [], 0
+    means, maximum = [], 0
     while flight.flying:
         flight.advance()
         sections = flight._information._state.stack.sections
@@ -97,8 +97,8 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
         if len(records):
             count = (records["end"] - records["begin"]).sum(axis=1)
             means.append(float(count.mean()))
-            greatest = max(greatest, int(count.max()))
-    return min(means), max(means), greatest
+            maximum = max(maximum, int(count.max()))
+    return min(means), max(means), maximum
 
 
 def show(scenario: Scenario, together: int, clock: Clock) -> None:
@@ -136,8 +136,10 @@ def main() -> None:
     parser.add_argument("--together", type=int, nargs="+", default=[50, 200])
     options = parser.parse_args()
     scenario = replace(load_scenario("asteroid-1997"), range_sensor=None, noise=NoiseKind(options.noise))
-    least, most, greatest = vertices(scenario, max(options.together))
-    sys.stdout.write(f"vertices of a section: {least:.0f} to {most:.0f} on average over a flight, {greatest} at most\n")
+    minimum, most, maximum = vertices(scenario, max(options.together))
+    sys.stdout.write(
+        f"vertices of a section: {minimum:.0f} to {most:.0f} on average over a flight, {maximum} at most\n"
+    )
     clock = Clock()
     clock.watch()
     for together in options.together:

@@ -47,7 +47,7 @@ COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
         (
             Sweep,
             "campaigns.run_sweep",
-            "sweep --set body.radius_m=80 --vary angle_sensor.scale=1:8:8,thruster.greatest_impulse_m_s=2.5:20:8 "
+            "sweep --set body.radius_m=80 --vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8 "
             "--runs 100 --until decided --out sensors",
         ),
         (Report, "campaigns.run_report", "report runs --out figures"),
@@ -107,6 +107,7 @@ app = typer.Typer(
     cls=_Root,
     epilog="Example: infoset experiment --runs 50 --out results",
     no_args_is_help=True,
+    rich_markup_mode=None,  # plain help: the text has 45 of 80 columns, in a table of Rich 20
     pretty_exceptions_enable=False,
 )
 for panel, rows in COMMANDS.items():

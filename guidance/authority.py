@@ -26,17 +26,17 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
         return _correctable_at_m(situation.later_times_s - situation.time_s, thruster, budget, range_m / e)
     to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
     steps = np.ceil(to_go_s / step_s) - 1.0
-    full = np.clip(np.floor(budget / thruster.greatest_impulse_m_s), 0.0, np.maximum(steps, 0.0))
-    return np.asarray(thruster.greatest_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0)))
+    full = np.clip(np.floor(budget / thruster.max_impulse_m_s), 0.0, np.maximum(steps, 0.0))
+    return np.asarray(thruster.max_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0)))
 
 
 def _correctable_at_m(times_s: Floats, thruster: Thruster, budget: Floats, to_go_s: Floats) -> Floats:
     """Return the miss (m) that impulses at some times from now can correct; the last one has the rest of the budget."""
     number = np.searchsorted(times_s, to_go_s)
-    full = np.minimum(budget // thruster.greatest_impulse_m_s, number).astype(np.int64)
-    rest = np.minimum(budget - full * thruster.greatest_impulse_m_s, thruster.greatest_impulse_m_s)
-    rest = np.where((full < number) & (rest >= thruster.least_impulse_m_s), rest, 0.0)
+    full = np.minimum(budget // thruster.max_impulse_m_s, number).astype(np.int64)
+    rest = np.minimum(budget - full * thruster.max_impulse_m_s, thruster.max_impulse_m_s)
+    rest = np.where((full < number) & (rest >= thruster.min_impulse_m_s), rest, 0.0)
     times_s = times_s[: full.max(initial=0) + 1]
     sums_s = np.append(0.0, np.cumsum(times_s))
     next_s = np.append(times_s, 0.0)[full]
-    return np.asarray(thruster.greatest_impulse_m_s * (full * to_go_s - sums_s[full]) + rest * (to_go_s - next_s))
+    return np.asarray(thruster.max_impulse_m_s * (full * to_go_s - sums_s[full]) + rest * (to_go_s - next_s))

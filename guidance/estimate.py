@@ -65,8 +65,8 @@ EstimatorKind = Callable[[int, bool], Estimator]
 def independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
     """Return the bound of the part of an angle error that is independent between measurements, rad.
 
-    A line that falls with the range is positive up to the greatest possible distance, and an estimate can be beyond it.
-    The bound is therefore at least half of that at the greatest distance.
+    A line that falls with the range is positive up to the maximum possible distance, and an estimate can be beyond it.
+    The bound is therefore at least half of that at the maximum distance.
     """
     sensor = model.angle_sensor
     if sensor.bias is Bias.CONSTANT:

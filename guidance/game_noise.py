@@ -16,7 +16,7 @@ TIE_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class GameNoise:
-    """Measurements that keep the point of greatest predicted miss in the set, and as much of the set as possible.
+    """Measurements that keep the point of maximum predicted miss in the set, and as much of the set as possible.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class GameNoise:
 
     In space, each axis has its own extremes and its own worse one; the measured angles are chosen for each axis. The
     range has the rule of the plane, for the corner (worse extreme of y, worse extreme of z) of the rectangle of
-    predicted misses of each section: the point to keep is in the section where this corner has the greatest modulus,
+    predicted misses of each section: the point to keep is in the section where this corner has the maximum modulus,
     the other extreme in that of the opposite corner.
 
     References
@@ -133,14 +133,14 @@ def _angle(
     worst = np.where(upper_is_worse, upper.alpha_rad, lower.alpha_rad)
     other = np.where(upper_is_worse, lower.alpha_rad, upper.alpha_rad)
     reach = sensor.error_bounds(np.where(upper_is_worse, upper.range_m, lower.range_m))
-    least, greatest, range_of_least, range_of_greatest = predicted.least_and_greatest_alpha()
+    minimum, maximum, range_of_min, range_of_max = predicted.min_and_max_alpha()
     bound = sensor.bound(sight)
     chosen = keep_point(
         (worst > other) | ((worst == other) & upper_is_worse),
         point_at_top=worst - reach,
         point_at_bottom=worst + reach,
-        least_at_bottom=least + sensor.error_bounds(range_of_least),
-        greatest_at_top=greatest - sensor.error_bounds(range_of_greatest),
+        min_at_bottom=minimum + sensor.error_bounds(range_of_min),
+        max_at_top=maximum - sensor.error_bounds(range_of_max),
         lower=sight.alpha_rad - bound,
         upper=sight.alpha_rad + bound,
     )
@@ -155,13 +155,13 @@ def _range(
     other = np.where(upper_is_worse, lower, upper)
     if upper_is_worse.ndim > 1:
         worst, other = _ranges_of_corners(predicted, upper_is_worse)
-    least, greatest = predicted.stored_range_interval_m()
+    minimum, maximum = predicted.stored_range_interval_m()
     return keep_point(
         worst >= other,
         point_at_top=worst * (1.0 - error),
         point_at_bottom=worst * (1.0 + error),
-        least_at_bottom=least * (1.0 + error),
-        greatest_at_top=greatest * (1.0 - error),
+        min_at_bottom=minimum * (1.0 + error),
+        max_at_top=maximum * (1.0 - error),
         lower=sight.range_m * (1.0 - error),
         upper=sight.range_m * (1.0 + error),
     )
@@ -190,8 +190,8 @@ def keep_point(
     is_larger: Flags,
     point_at_top: Floats,
     point_at_bottom: Floats,
-    least_at_bottom: Floats,
-    greatest_at_top: Floats,
+    min_at_bottom: Floats,
+    max_at_top: Floats,
     lower: Floats,
     upper: Floats,
 ) -> Floats:
@@ -206,8 +206,8 @@ def keep_point(
         Whether the point to keep is the larger of the two extremes in the measured quantity.
     point_at_top, point_at_bottom : ndarray
         Measured values whose interval ends at the point, above or below.
-    least_at_bottom, greatest_at_top : ndarray
-        Measured values whose interval begins at the least value of the set, or ends at its greatest.
+    min_at_bottom, max_at_top : ndarray
+        Measured values whose interval begins at the minimum value of the set, or ends at its maximum.
     lower, upper : ndarray
         Measured values that the true value allows.
 
@@ -216,9 +216,9 @@ def keep_point(
     Kumkov and Patsko (1997), section 7: the rule for ranges, and 'the same way' the one for angles.
     """
     nearest = np.minimum(np.maximum(point_at_top, lower), upper)
-    wider = np.minimum(least_at_bottom, upper)
-    for_larger = np.where((nearest >= least_at_bottom) | (nearest == upper), nearest, wider)
+    wider = np.minimum(min_at_bottom, upper)
+    for_larger = np.where((nearest >= min_at_bottom) | (nearest == upper), nearest, wider)
     nearest = np.minimum(np.maximum(point_at_bottom, lower), upper)
-    wider = np.maximum(greatest_at_top, lower)
-    for_smaller = np.where((nearest <= greatest_at_top) | (nearest == lower), nearest, wider)
+    wider = np.maximum(max_at_top, lower)
+    for_smaller = np.where((nearest <= max_at_top) | (nearest == lower), nearest, wider)
     return np.where(is_larger, for_larger, for_smaller)

@@ -14,26 +14,26 @@ from infoset.arrays import Floats
 
 PARTS = 4
 """Parts of the labels between two sections: the deciding time to go is often between sections."""
-LEAST_AUTHORITY_M = 1e-9
+MIN_AUTHORITY_M = 1e-9
 NO_DEMAND_M = 1e200
 """An excluded label has the interval from this to minus this: it never decides."""
 TRIALS = 60
 
 
 class LeastEffort:
-    """Minimise the greatest share of what later impulses can correct, over all possible times to go.
+    """Minimise the maximum share of what later impulses can correct, over all possible times to go.
 
     Notes
     -----
     A hypothesis is a label of the set, with the time to go tau and the interval [l, h] of possible misses. Its
     *authority* A is the miss that later impulses can correct: the sum of mu2 tau_j over them, as many as schedule,
-    cut-off and budget allow, divided by 1 + eta, the greatest ratio of true and nominal closing speed. The *reference*
+    cut-off and budget allow, divided by 1 + eta, the maximum ratio of true and nominal closing speed. The *reference*
     ref is the miss that no strategy can prevent (`unavoidable_m`). The *effort* rho is the share of the authority that
     the hypothesis needs after the impulse u, if its worst miss is to become ref:
 
         rho(u) = (max(h - u tau, u tau - l) - ref) / A .
 
-    The impulse minimises the greatest rho of all hypotheses. If that is more than 1, it minimises the greatest excess
+    The impulse minimises the maximum rho of all hypotheses. If that is more than 1, it minimises the maximum excess
     max(h - u tau, u tau - l) - A instead. After the last impulse A is zero, and the excess is the miss. An impulse that
     keeps all excesses below a bound that later impulses can keep too guarantees this bound, and effort costs no more
     impulses than this asks.
@@ -52,18 +52,18 @@ class LeastEffort:
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
-        """Return the impulses with the least greatest effort, m/s."""
-        view, e, most = situation.information, situation.closing_speed_m_s, situation.thruster.greatest_impulse_m_s
+        """Return the impulses with the minimax effort, m/s."""
+        view, e, most = situation.information, situation.closing_speed_m_s, situation.thruster.max_impulse_m_s
         ranges = view.ranges_m
         pending = situation.pending_m(ranges / e)
-        least, greatest = view.predicted_miss_by_section_m()
-        lower = _between(np.where(view.living, least - pending, NO_DEMAND_M))
-        upper = _between(np.where(view.living, greatest - pending, -NO_DEMAND_M))
+        minimum, maximum = view.predicted_miss_by_section_m()
+        lower = _between(np.where(view.living, minimum - pending, NO_DEMAND_M))
+        upper = _between(np.where(view.living, maximum - pending, -NO_DEMAND_M))
         ranges = _between(ranges)
         fastest = max(e, *(-vx for vx in view.model.bounds.vx_m_s)) / e
         authority = correctable_later_m(situation, ranges) / fastest
         to_go_s = range_at_impulse(ranges, e, situation.lead_s) / e
-        share, reference = 1.0 / np.maximum(authority, LEAST_AUTHORITY_M), unavoidable_m(situation)
+        share, reference = 1.0 / np.maximum(authority, MIN_AUTHORITY_M), unavoidable_m(situation)
         impulse, effort = balanced((upper - reference) * share, (-lower - reference) * share, to_go_s * share, most)
         if (effort > 1.0).any():
             urgent, _ = balanced(upper - authority, -lower - authority, to_go_s, most)
@@ -87,7 +87,7 @@ def unavoidable_m(situation: Situation) -> float:
     h = model.angle_sensor.error_bound
     apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
     widest_m = 0.5 * (min(np.ptp(box.z_m), 2.0 * h(x0) * x0) + np.ptp(box.vz_m_s) * x0 / e)
-    correctable_m = thruster.greatest_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
+    correctable_m = thruster.max_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
     return float((np.minimum(apart_m, widest_m) - correctable_m).max(initial=0.0))
 
 
@@ -99,7 +99,7 @@ def _between(values: Floats) -> Floats:
 
 
 def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tuple[Floats, Floats]:
-    """Return the u, |u| <= most, where the greatest of falling - slopes u and rising + slopes u is least, and it."""
+    """Return the u, |u| <= most, where the maximum of falling - slopes u and rising + slopes u is minimum, and it."""
     at, value = np.zeros((2, len(falling)))
     balance_all(falling, rising, slopes, float(most), at, value)
     return at, value
@@ -107,9 +107,9 @@ def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tu
 
 @entry
 def balance_all(falling: Floats, rising: Floats, slopes: Floats, most: float, at: Floats, value: Floats) -> None:
-    """Write the results of `balanced`: at the minimum the greatest falling and rising lines are equal, or it is an end.
+    """Write the results of `balanced`: at the minimum the maximum falling and rising lines are equal, or it is an end.
 
-    The next trial is where the two lines that are greatest now intersect, or the middle of the interval that is left.
+    The next trial is where the two lines that are maximum now intersect, or the middle of the interval that is left.
     """
     for b in range(len(at)):
         low, high, u = -most, most, 0.0

@@ -16,8 +16,8 @@ from infoset.limits import COUNT, Checked, NotNegative
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a start: lateral offset, its rate, range and closing speed at t = 0, and lateral acceleration."""
 
-MOST_KEPT = 640
-"""Greatest number of measurements of a sensor that are linearised again at each fit."""
+MAX_KEPT = 640
+"""Maximum number of measurements of a sensor that are linearised again at each fit."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,10 @@ class LeastSquaresFit:
     width^2/12 for the initial bounds, which count as one more measurement. The acceleration a has the variance nu^2/3,
     with the bound nu of the set's model. The covariance of the miss is that of the normal equations.
 
-    If there are more than `MOST_KEPT` measurements of a sensor, the older half is linearised once and for all at the
+    If there are more than `MAX_KEPT` measurements of a sensor, the older half is linearised once and for all at the
     fit of that step, and only its normal equations are stored. The linearised angle keeps the errors z - x tan(alpha)
     that a change of scale of the motion keeps, so a later change of the estimated range does no harm. The cost of a
-    step is thus bounded: about 20 operations on arrays of B `MOST_KEPT` values for each iteration. A step without a
+    step is thus bounded: about 20 operations on arrays of B `MAX_KEPT` values for each iteration. A step without a
     decision has no fit.
 
     With a constant centroid error of a camera, the noise is the pixel part, and c^2/3 is added to the variance of the
@@ -109,7 +109,7 @@ class LeastSquaresFit:
             value, seen = situation.measured[name], situation.is_new(name)
             kept = self.measurements[name].with_one(situation.time_s, value, self.offset_given_m, seen)
             self.measurements[name] = kept
-            if len(kept.times_s) > MOST_KEPT:
+            if len(kept.times_s) > MAX_KEPT:
                 self._store_older_half(situation, name)
 
     def estimate(self, situation: Situation) -> MissEstimate:
@@ -213,11 +213,11 @@ class LeastSquaresFit:
         """Replace the older half of the measurements of a sensor by their normal equations."""
         self._fit(situation)
         kept = self.measurements[name]
-        normal, right = self._equations(situation, name, kept.part(slice(MOST_KEPT // 2)))
+        normal, right = self._equations(situation, name, kept.part(slice(MAX_KEPT // 2)))
         centre, _ = self._prior(situation)
         self._stored_normal = self._stored_normal + normal
         self._stored_right = self._stored_right + right + np.einsum("bij,bj->bi", normal, self.start - centre)
-        self.measurements[name] = kept.part(slice(MOST_KEPT // 2, None))
+        self.measurements[name] = kept.part(slice(MAX_KEPT // 2, None))
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ class LeastSquares(Checked):
     `LeastSquaresFit` describes the fit. The last decision before the arrival that the engine allows has no dead zone.
 
     Limits: there is no process noise, so manoeuvres of the target and errors of the engine are not modelled. One
-    linearisation describes the remaining uncertainty, and without a range meter the range is known poorly until the
+    linearisation describes the remaining uncertainty, and without a range sensor the range is known poorly until the
     end. Nothing is guaranteed; errors that keep their sign, or change it on purpose, are outside the theory. The rate
     sensor is not used.
     """

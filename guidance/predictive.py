@@ -47,7 +47,7 @@ class Predictive(Checked):
     The impulse is k = m / tau, with the estimated miss m and the time to go tau. If the engine has scheduled times
     (`Thruster.impulses_s`), each of them corrects the whole miss. Otherwise the manoeuvres begin at the times to go
     T/s, T/s^2, ..., with the estimated time T from the start to the arrival, and at the last time that the engine
-    allows. A manoeuvre that is greater than the greatest impulse of the engine continues in the next steps.
+    allows. A manoeuvre that is greater than the maximum impulse of the engine continues in the next steps.
 
     After a manoeuvre, its miss is the error of its estimate. With independent errors of angles this falls in proportion
     to the time to go, or faster, so geometric times make the impulses after the first one of similar size. The three
@@ -83,6 +83,6 @@ class Predictive(Checked):
             return whole
         state.due_s = np.where(np.isinf(state.due_s), estimate.to_go_s / self.spacing, state.due_s)
         is_due = (estimate.to_go_s <= state.due_s) | (estimate.to_go_s <= next_s)
-        is_done = is_due & (np.abs(whole) <= situation.thruster.greatest_impulse_m_s)
+        is_done = is_due & (np.abs(whole) <= situation.thruster.max_impulse_m_s)
         state.due_s = np.where(is_done, estimate.to_go_s / self.spacing, state.due_s)
         return np.where(is_due, whole, 0.0)

@@ -36,7 +36,7 @@ class ProportionalNavigation(Checked):
     ratio : float
         Navigation ratio N, greater than 2; 3 to 5 are usual.
     dead_band_m_s : float or None
-        Commands accumulate until their sum has this size, m/s; None is the least impulse of the engine.
+        Commands accumulate until their sum has this size, m/s; None is the minimum impulse of the engine.
 
     Raises
     ------
@@ -90,7 +90,7 @@ class ProportionalNavigation(Checked):
         command = np.clip(command, -np.abs(whole), np.abs(whole))
         dead_band_m_s = self.dead_band_m_s
         if dead_band_m_s is None:
-            dead_band_m_s = situation.thruster.least_impulse_m_s
+            dead_band_m_s = situation.thruster.min_impulse_m_s
         given = np.where((np.abs(command) >= dead_band_m_s) | (left_s <= 0.0), command, 0.0)
         state.accumulated_m_s = np.where(given == 0.0, command, 0.0)
         return given

@@ -14,7 +14,7 @@ from infoset.arrays import Floats
 from infoset.sensor import Measurements
 
 DISC_TOLERANCE = 1e-9
-"""Greatest distance outside the unit disc that is taken as rounding."""
+"""Maximum distance outside the unit disc that is taken as rounding."""
 
 
 @dataclass(frozen=True)

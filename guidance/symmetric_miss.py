@@ -8,7 +8,7 @@ from infoset.arrays import Floats
 
 
 class SymmetricMiss:
-    """Keep the predicted-miss interval symmetric about zero, which minimises the greatest possible miss.
+    """Keep the predicted-miss interval symmetric about zero, which minimises the maximum possible miss.
 
     It reacts to noise: every measurement moves the middle of the interval, and every move is corrected.
 

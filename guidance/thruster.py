@@ -24,8 +24,8 @@ class Thruster:
     Parameters
     ----------
     budget_m_s : float
-        Budget mu: greatest sum of the moduli of all impulses, m/s.
-    least_impulse_m_s, greatest_impulse_m_s : float
+        Budget mu: maximum sum of the moduli of all impulses, m/s.
+    min_impulse_m_s, max_impulse_m_s : float
         Bounds mu1 and mu2 of the modulus of an impulse that is not zero, m/s.
     execution_error_relative : float
         Bound delta of |given / commanded - 1|: a commanded impulse k is executed as k (1 + error).
@@ -50,8 +50,8 @@ class Thruster:
     """
 
     budget_m_s: NotNegative
-    least_impulse_m_s: NotNegative
-    greatest_impulse_m_s: Positive
+    min_impulse_m_s: NotNegative
+    max_impulse_m_s: Positive
     execution_error_relative: Part = 0.0
     pointing_error_rad: Part = 0.0
     last_impulse_s: NotNegative | None = None
@@ -60,10 +60,10 @@ class Thruster:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.least_impulse_m_s > self.greatest_impulse_m_s:
+        if self.min_impulse_m_s > self.max_impulse_m_s:
             raise ValueError(
-                f"Thruster: least_impulse_m_s must not exceed greatest_impulse_m_s, {self.greatest_impulse_m_s:g}: "
-                f"got {self.least_impulse_m_s!r}"
+                f"Thruster: min_impulse_m_s must not exceed max_impulse_m_s, {self.max_impulse_m_s:g}: "
+                f"got {self.min_impulse_m_s!r}"
             )
         for time_s, next_s in pairwise(self.impulses_s):
             if next_s >= time_s:
@@ -125,7 +125,7 @@ class Thruster:
         budget_left_m_s : ndarray, shape (B,)
             Budget n that is left.
         """
-        size, limit = modulus(wanted_m_s), np.minimum(self.greatest_impulse_m_s, budget_left_m_s)
+        size, limit = modulus(wanted_m_s), np.minimum(self.max_impulse_m_s, budget_left_m_s)
         given, over = wanted_m_s, size > limit
         if wanted_m_s.ndim == 1:
             given = np.copysign(np.minimum(size, limit), wanted_m_s)
@@ -134,7 +134,7 @@ class Thruster:
             # Rounding must not make the modulus greater than the limit.
             while (above := modulus(given) > limit).any():
                 given = np.where(above, np.nextafter(given, 0.0), given)
-        idle = (size < self.least_impulse_m_s) | (budget_left_m_s < self.least_impulse_m_s)
+        idle = (size < self.min_impulse_m_s) | (budget_left_m_s < self.min_impulse_m_s)
         return np.where(idle, 0.0, given)
 
     def executed(self, impulse_m_s: Floats, size: Floats | None, direction: Floats | None) -> Floats:

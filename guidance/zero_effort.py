@@ -19,7 +19,7 @@ class ZeroEffortMiss:
     the squared misses of the middles: k = e sum(w m x) / sum(w x^2). (The middle of the whole interval gives U_s.)
 
     Limits: like U_s, it corrects every change of the middle, so it reacts to noise and spends as much. Unlike U_s, it
-    leaves the ends of the interval unequal, so it does not minimise the greatest possible miss.
+    leaves the ends of the interval unequal, so it does not minimise the maximum possible miss.
 
     References
     ----------

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Floats
-from infoset.limits import COUNT, LARGEST, NOT_NEGATIVE, WHOLE, real_values, shown
+from infoset.limits import COUNT, MAXIMUM, NOT_NEGATIVE, WHOLE, real_values, shown
 
 Set = TypeVar("Set")
 Kind = TypeVar("Kind", bound=type)
@@ -21,8 +21,8 @@ Kind = TypeVar("Kind", bound=type)
 def need_finite(name: str, values: Floats) -> None:
     """Raise an error if a number is not finite, or too large for exact decisions."""
     # The sum of squares shows it for almost all arrays; it is the fastest test of a small one.
-    if not np.vdot(values, values) <= LARGEST and not (np.abs(values) <= LARGEST).all():
-        raise ValueError(f"{name} must be finite, at most {LARGEST:g} in size: got {shown(values)}")
+    if not np.vdot(values, values) <= MAXIMUM and not (np.abs(values) <= MAXIMUM).all():
+        raise ValueError(f"{name} must be finite, at most {MAXIMUM:g} in size: got {shown(values)}")
 
 
 def finite_values(name: str, value: ArrayLike, *shape: str | int) -> Floats:
@@ -69,13 +69,15 @@ def constraint_values(names: tuple[str, str], rows: ArrayLike, limits: ArrayLike
 
 def box_ends(lower: ArrayLike, upper: ArrayLike, *shape: str | int) -> tuple[Floats, Floats]:
     """Return the ends of boxes, of the same shape."""
-    least = finite_values("lower", lower, *shape)
-    most = finite_values("upper", upper, *(shape if shape[0] == "..." else least.shape))
-    common_shape("lower and upper", least.shape, most.shape)
-    least, most = np.broadcast_arrays(least, most)
-    if (least > most).any():
-        raise ValueError(f"the box is reversed: its lower end exceeds the upper one by {float((least - most).max()):g}")
-    return least, most
+    minimum = finite_values("lower", lower, *shape)
+    most = finite_values("upper", upper, *(shape if shape[0] == "..." else minimum.shape))
+    common_shape("lower and upper", minimum.shape, most.shape)
+    minimum, most = np.broadcast_arrays(minimum, most)
+    if (minimum > most).any():
+        raise ValueError(
+            f"the box is reversed: its lower end exceeds the upper one by {float((minimum - most).max()):g}"
+        )
+    return minimum, most
 
 
 def common_shape(names: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from infoset._compile import ZERO, allocation_free, inlined, prefetch, record_of
 from infoset.arrays import Floats
-from infoset.chains import CAPACITY, MOST_ADDED, Chain, count_of, number_vertices, offset_of, read, write
+from infoset.chains import CAPACITY, MAX_ADDED, Chain, count_of, number_vertices, offset_of, read, write
 
 ROOM_AT_START = 64
 """Initial room of a chain, in vertices, a power of two."""
-ROOM_AHEAD = 8 * MOST_ADDED
+ROOM_AHEAD = 8 * MAX_ADDED
 """Additional room, in vertices, allocated when a section grows."""
 
 TAKEN = 0
@@ -47,7 +47,7 @@ class Chains(NamedTuple):
 def empty_sections(number: int, room: int = CAPACITY) -> Chains:
     """Return empty chains with room for `room` vertices each, a power of two.
 
-    The rings are allocated at their greatest size; the operating system provides memory when it is written.
+    The rings are allocated at their maximum size; the operating system provides memory when it is written.
     """
     records = np.zeros(2 * number, dtype=record_of(Chain))
     records["ring"] = FIRST_RING + (2 * room + LINE) * np.arange(2 * number)

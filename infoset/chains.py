@@ -9,7 +9,7 @@ a LEFT chain from the highest vertex to the lowest:
 * a disturbance moves each chain as a whole, an impulse moves both: only the origins of the chains change;
 * a cut removes vertices from the ends of the chains and inserts the intersections with its line;
 * as tau decreases, the levels turn in a constant direction, and the last vertices of each chain pass to the other one;
-* the greatest predicted miss is at the peak of the right chain, the least at the peak of the left one. A peak changes
+* the maximum predicted miss is at the peak of the right chain, the minimum at the peak of the left one. A peak changes
   only when a cut removes it.
 
 A vertex is inserted once, changes chains once or twice and is removed once, so the cost of a step is constant.
@@ -33,9 +33,9 @@ from infoset.polygon_exact import two_product, two_sum
 
 EPSILON = float(np.finfo(np.float64).eps)
 CAPACITY = 256
-"""Greatest number of vertices of a section, a power of two."""
-MOST_ADDED = 4
-"""Greatest number of vertices that one step adds: two at each of its two turns."""
+"""Maximum number of vertices of a section, a power of two."""
+MAX_ADDED = 4
+"""Maximum number of vertices that one step adds: two at each of its two turns."""
 REDUCED = 160
 """Number of vertices to which a section of CAPACITY vertices is reduced."""
 ZERO, ONE, TWO = constants(3)
@@ -156,7 +156,7 @@ def start(
 ) -> None:
     """Write a trapezium between two levels at time to go `tau`, s.
 
-    `bottom` and `top` are the least V, the greatest V, m/s, and z, m, of each level.
+    `bottom` and `top` are the minimum V, the maximum V, m/s, and z, m, of each level.
     """
     for chain in (right, left):
         move_to_zero(chain)
@@ -250,17 +250,17 @@ def shift(right: Chain, left: Chain, tau: float, v: float) -> None:
 
 @inlined
 def heights(right: Chain, left: Chain, rings: Floats, tau: float) -> tuple[float, float]:
-    """Least and greatest z of a section at time to go `tau`."""
+    """Minimum and maximum z of a section at time to go `tau`."""
     right_origin, left_origin = origin_height(right, tau), origin_height(left, tau)
-    least = min(
+    minimum = min(
         right_origin + height_in(right, rings, right.begin, tau),
         left_origin + height_in(left, rings, left.end - 1, tau),
     )
-    greatest = max(
+    maximum = max(
         right_origin + height_in(right, rings, right.end - 1, tau),
         left_origin + height_in(left, rings, left.begin, tau),
     )
-    return least, greatest
+    return minimum, maximum
 
 
 @inlined
@@ -280,7 +280,7 @@ def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level:
         inner_v, inner_m = read(chain, rings, end + way)
         inner_height = up * (inner_m - tau * inner_v)
         if inner_height <= level:
-            # Interpolated from the nearer end of the edge, for the least rounding error.
+            # Interpolated from the nearer end of the edge, for the minimum rounding error.
             if level - inner_height <= height - level:
                 v = inner_v + (level - inner_height) / (height - inner_height) * (v - inner_v)
             else:
@@ -300,15 +300,15 @@ def cut(right: Chain, left: Chain, rings: Floats, tau: float, lower: float, uppe
     they do not intersect. If the intersection is empty, the section is unchanged. A band with `lower` above `upper` is
     empty: that of a label behind x = 0, or beyond the range at which the error bound is zero.
     """
-    least, greatest = heights(right, left, rings, tau)
-    overlap = min(greatest - lower, upper - least)
+    minimum, maximum = heights(right, left, rings, tau)
+    overlap = min(maximum - lower, upper - minimum)
     if overlap < 0.0 or lower > upper:
         return False, min(overlap, upper - lower)
     right_height, left_height = origin_height(right, tau), origin_height(left, tau)
-    if greatest > upper:
+    if maximum > upper:
         right.end = cut_end(right, rings, BACKWARD, 1.0, tau, upper - right_height) + 1
         left.begin = cut_end(left, rings, FORWARD, 1.0, tau, upper - left_height)
-    if least < lower:
+    if minimum < lower:
         left.end = cut_end(left, rings, BACKWARD, -1.0, tau, left_height - lower) + 1
         right.begin = cut_end(right, rings, FORWARD, -1.0, tau, right_height - lower)
     return True, overlap
@@ -316,7 +316,7 @@ def cut(right: Chain, left: Chain, rings: Floats, tau: float, lower: float, uppe
 
 @inlined
 def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int:
-    """Return the number of the vertex with the greatest (right chain) or least (left chain) predicted miss; store it.
+    """Return the number of the vertex with the maximum (right chain) or minimum (left chain) predicted miss; store it.
 
     `sign` is 1 for the right chain, -1 for the left one. `magnitude` is that of the terms of the predicted misses, to
     which their rounding error is relative, m. The search starts at the previous peak and ends where the miss decreases
@@ -351,8 +351,8 @@ def first_near_peak(chain: Chain, rings: Floats, sign: float, tolerance: float) 
 
 
 @inlined
-def greatest_and_least_miss(right: Chain, left: Chain, rings: Floats, tau: float) -> tuple[float, float]:
-    """Return the greatest and the least predicted miss of a section; store their vertices as peaks."""
+def max_and_min_miss(right: Chain, left: Chain, rings: Floats, tau: float) -> tuple[float, float]:
+    """Return the maximum and the minimum predicted miss of a section; store their vertices as peaks."""
     # A miss is z + V tau; both terms may be far greater than the sum.
     reach = tau * right.reach
     _, upper = vertex(right, rings, find_peak(right, rings, 1.0, abs(right.m) + reach))
@@ -364,10 +364,10 @@ def greatest_and_least_miss(right: Chain, left: Chain, rings: Floats, tau: float
 def extreme_points(
     right: Chain, left: Chain, rings: Floats, tau: float, relative: float, slack: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return points with the extremes of the predicted miss; `greatest_and_least_miss` must have stored the peaks.
+    """Return points with the extremes of the predicted miss; `max_and_min_miss` must have stored the peaks.
 
-    They are V and m of the lowest point with the greatest miss, and of the highest point with the least. `relative` and
-    `slack` are tolerances for equal misses, relative to the interval and to the magnitudes of the terms.
+    They are V and m of the lowest point with the maximum miss, and of the highest point with the minimum. `relative`
+    and `slack` are tolerances for equal misses, relative to the interval and to the magnitudes of the terms.
     """
     upper_v, upper = vertex(right, rings, right.peak)
     lower_v, lower = vertex(left, rings, left.peak)
@@ -433,14 +433,14 @@ def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) 
 @inlined
 def is_crowded(right: Chain, left: Chain) -> bool:
     """Whether the next step may increase the number of vertices beyond CAPACITY."""
-    return count_of(right, left) > CAPACITY - MOST_ADDED
+    return count_of(right, left) > CAPACITY - MAX_ADDED
 
 
 @allocation_free
 def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points: Floats) -> None:
     """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
 
-    An edge is removed by extending its neighbours to their intersection; the edge that adds the least area is removed
+    An edge is removed by extending its neighbours to their intersection; the edge that adds the minimum area is removed
     first. Vertices that are not convex because of rounding are removed before. If no edge can be removed, three sides
     of a box around the chain replace it. `points`, shape (3 CAPACITY + 4, 2), is a working array.
     """

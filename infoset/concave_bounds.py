@@ -62,12 +62,12 @@ def is_dead_between(dead: Records, latest: Floats) -> bool:
         if dead[i].died == last_event and (count == 0 or dead[i].label > known[count - 1]):
             known[count], values[count] = dead[i].label, dead[i].overlap
             count += 1
-    least, greatest = dead[0].label, dead[len(dead) - 1].label
-    rounding = -CERTAIN * greatest
-    if least < known[0] and bound_between(known, values, count, ZERO, least, known[0], 0.0, 0.0) >= rounding:
+    minimum, maximum = dead[0].label, dead[len(dead) - 1].label
+    rounding = -CERTAIN * maximum
+    if minimum < known[0] and bound_between(known, values, count, ZERO, minimum, known[0], 0.0, 0.0) >= rounding:
         return False
     for i in range(count - 1):
         if bound_between(known, values, count, i + 1, known[i], known[i + 1], 0.0, 0.0) >= rounding:
             return False
     last = known[count - 1]
-    return bool(last == greatest or bound_between(known, values, count, count, last, greatest, 0.0, 0.0) < rounding)
+    return bool(last == maximum or bound_between(known, values, count, count, last, maximum, 0.0, 0.0) < rounding)

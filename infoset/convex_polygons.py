@@ -205,7 +205,7 @@ class ConvexPolygons(PolygonArrays):
         return ConvexPolygons.unchecked(points, one.counts + two.counts)._make(0, kernels.exact_hull)
 
     def project(self, axes: ArrayLike) -> Any:
-        """Return the projection on an axis (0 or 1) as intervals: least and greatest values, shape (...).
+        """Return the projection on an axis (0 or 1) as intervals: minimum and maximum values, shape (...).
 
         `axes` is an integer or a sequence of integers; both axes give the polygons, their coordinates in this order.
         O(n), exact.
@@ -235,11 +235,11 @@ class ConvexPolygons(PolygonArrays):
         return intervals
 
     def reduce_outward(self, cap: int) -> ConvexPolygons:
-        """Return polygons of at most `cap` (>= 4) vertices that contain these, by removing sides with least added area.
+        """Polygons of at most `cap` (>= 4) vertices that contain these, by removing sides with minimum added area.
 
         O(n) for each side; new vertices are rounded.
         """
-        Limits(least=4, whole=True).need("cap", cap)
+        Limits(minimum=4, whole=True).need("cap", cap)
         return self._make(0, kernels.reduce_outward, np.int64(cap))
 
     # Measures ---------------------------------------------------------------------------------------------------------
@@ -317,18 +317,18 @@ class ConvexPolygons(PolygonArrays):
 
         O(n^2), within rounding of the coordinates. Of several centres it is the middle one.
         """
-        values = self._known(self._measure(kernels.largest_disc), "Chebyshev centre")
+        values = self._known(self._measure(kernels.max_disc), "Chebyshev centre")
         return values[..., :2], values[..., 2]
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the least and the greatest coordinates, two arrays of shape (..., 2). O(n), exact."""
+        """Return the minimum and the maximum coordinates, two arrays of shape (..., 2). O(n), exact."""
         used = self._used()[..., None]
         lower = np.min(self.vertices, axis=-2, where=used, initial=np.inf)
         upper = np.max(self.vertices, axis=-2, where=used, initial=-np.inf)
         return self._known(lower, "bounding box"), self._known(upper, "bounding box")
 
     def diameter(self) -> Floats:
-        """Return the greatest distance between two points, shape (...); 0 for the empty set. O(n^2), rounded."""
+        """Return the maximum distance between two points, shape (...); 0 for the empty set. O(n^2), rounded."""
         return self._measure(kernels.size)[..., 1]
 
     def distance(self, other: ConvexPolygons | ArrayLike) -> Floats:

@@ -27,32 +27,32 @@ from infoset.section_stack import SectionStack, impulse_doubts
 
 LABELS = 4
 """Labels replayed for one step; one more on each side serves for extrapolation."""
-MOST_LABELS = LABELS + 2
+MAX_LABELS = LABELS + 2
 PIECES = LABELS + 1
 NEAREST_OUTSIDE = 0.005
-"""Least distance of the label below the others, in their spacing: a line through both amplifies rounding 200 times."""
-MOST_LEAVING_WINDOWS = 16
-"""Greatest number of windows of the labels that leave at one step, with rates: a power of two."""
+"""Minimum distance of a label below the others, in their spacing: a nearer one amplifies rounding."""
+MAX_LEAVING_WINDOWS = 16
+"""Maximum number of windows of the labels that leave at one step, with rates: a power of two."""
 LOOSE = 1.25
-"""A window is halved if its bound exceeds the greatest value known to be reached by this factor."""
+"""A window is halved if its bound exceeds the maximum value known to be reached by this factor."""
 GROUPS = 3000
 """Labels that leave within this part of a flight are bounded together, if they need several steps."""
-LEAST, GREATEST, NEAREST, FARTHEST = range(4)
+MINIMUM, MAXIMUM, NEAREST, FARTHEST = range(4)
 """Columns of a piece: bounds of its predicted miss, and the labels of its ends, m."""
 SLACK = 1e-9
 ROUNDING = 4.0 * chains.EPSILON
-"""Rounding error of a miss, relative to the greatest label: of x at the closest approach, also if z is exactly zero."""
+"""Rounding error of a miss, relative to the maximum label: of x at the closest approach, also if z is exactly zero."""
 
 
 @allocation_free
 def extremes_along(points: Floats, count: int, tau: float) -> tuple[float, float]:
-    """Least and greatest z + V tau over the vertices (V, z)."""
-    least, greatest = np.inf, -np.inf
+    """Minimum and maximum z + V tau over the vertices (V, z)."""
+    minimum, maximum = np.inf, -np.inf
     for i in range(count):
         value = points[i, 1] + points[i, 0] * tau
-        least = min(least, value)
-        greatest = max(greatest, value)
-    return least, greatest
+        minimum = min(minimum, value)
+        maximum = max(maximum, value)
+    return minimum, maximum
 
 
 @by_reference
@@ -61,13 +61,13 @@ class Outlines(NamedTuple):
 
     Parameters
     ----------
-    labels : ndarray, shape (MOST_LABELS,)
+    labels : ndarray, shape (MAX_LABELS,)
         The labels, m.
-    points : ndarray, shape (C, MOST_LABELS, CAPACITY, 2)
+    points : ndarray, shape (C, MAX_LABELS, CAPACITY, 2)
         Vertices (V, z) of their sections along each axis.
-    counts : ndarray of int, shape (C, MOST_LABELS)
+    counts : ndarray of int, shape (C, MAX_LABELS)
         Numbers of vertices.
-    supports : ndarray, shape (4, MOST_LABELS)
+    supports : ndarray, shape (4, MAX_LABELS)
         Supports of the sections in four directions.
     """
 
@@ -93,21 +93,21 @@ def bound_piece(
     centre = 0.5 * (p + q)
     tau = (centre - travelled) / e
     for k in range(number):
-        least, greatest = np.inf, -np.inf
+        minimum, maximum = np.inf, -np.inf
         for i in range(counts[k]):
-            least = min(least, points[k, i, 0])
-            greatest = max(greatest, points[k, i, 0])
-        values[0, k], values[1, k] = -least, greatest
-        least, greatest = extremes_along(points[k], counts[k], tau)
-        values[2, k], values[3, k] = -least, greatest
-    v_least = -bound_between(labels, values[0], number, first, p, q, 0.0, centre)
-    v_greatest = bound_between(labels, values[1], number, first, p, q, 0.0, centre)
-    v_middle = 0.5 * (v_least + v_greatest)
-    room = 0.5 * (v_greatest - v_least) * (q - p) / (2.0 * e)
-    least = -bound_between(labels, values[2], number, first, p, q, -v_middle / e, centre) - room
-    greatest = bound_between(labels, values[3], number, first, p, q, v_middle / e, centre) + room
+            minimum = min(minimum, points[k, i, 0])
+            maximum = max(maximum, points[k, i, 0])
+        values[0, k], values[1, k] = -minimum, maximum
+        minimum, maximum = extremes_along(points[k], counts[k], tau)
+        values[2, k], values[3, k] = -minimum, maximum
+    v_min = -bound_between(labels, values[0], number, first, p, q, 0.0, centre)
+    v_max = bound_between(labels, values[1], number, first, p, q, 0.0, centre)
+    v_middle = 0.5 * (v_min + v_max)
+    room = 0.5 * (v_max - v_min) * (q - p) / (2.0 * e)
+    minimum = -bound_between(labels, values[2], number, first, p, q, -v_middle / e, centre) - room
+    maximum = bound_between(labels, values[3], number, first, p, q, v_middle / e, centre) + room
     drift = 0.5 * law.disturbance * ((q - travelled) / e) ** 2
-    return least - drift, greatest + drift
+    return minimum - drift, maximum + drift
 
 
 @allocation_free
@@ -199,11 +199,14 @@ def bound_leaving(
         width = last_dead - first_dead
         tau = (first - travelled) / law.closing_speed
         for channel in range(laws.shape[0]):
-            least, greatest = extremes_along(outlines.points[channel, 0], outlines.counts[channel, 0], tau)
-            magnitude = abs(least) + abs(greatest)
+            minimum, maximum = extremes_along(outlines.points[channel, 0], outlines.counts[channel, 0], tau)
+            magnitude = abs(minimum) + abs(maximum)
             margin = SLACK * magnitude + width * magnitude / max(first - travelled, 1.0)
             drift = 0.5 * law_of(laws, channel).disturbance * tau * tau
-            pieces[channel, 0, LEAST], pieces[channel, 0, GREATEST] = least - margin - drift, greatest + margin + drift
+            pieces[channel, 0, MINIMUM], pieces[channel, 0, MAXIMUM] = (
+                minimum - margin - drift,
+                maximum + margin + drift,
+            )
             pieces[channel, 0, NEAREST], pieces[channel, 0, FARTHEST] = first_dead, last_dead
         return 1
     made = 0
@@ -216,8 +219,8 @@ def bound_leaving(
         if q <= p:
             continue
         for channel in range(laws.shape[0]):
-            least, greatest = bound_piece(outlines, number, at, p, q, travelled, law_of(laws, channel))
-            pieces[channel, made, LEAST], pieces[channel, made, GREATEST] = least, greatest
+            minimum, maximum = bound_piece(outlines, number, at, p, q, travelled, law_of(laws, channel))
+            pieces[channel, made, MINIMUM], pieces[channel, made, MAXIMUM] = minimum, maximum
             pieces[channel, made, NEAREST], pieces[channel, made, FARTHEST] = p, q
         made += 1
     return made
@@ -261,7 +264,7 @@ def bound_leaving_all(
                 if slots[b, s].living and near <= slots[b, s].label <= far:
                     known = slots[b, s].label
             window, middle = tape, 0.5 * (near + far)
-            may_halve = errors is not None and MOST_LEAVING_WINDOWS * (far - near) > 1.5 * (upper[b] - lower[b])
+            may_halve = errors is not None and MAX_LEAVING_WINDOWS * (far - near) > 1.5 * (upper[b] - lower[b])
             if errors is not None:
                 window = Tape(tape.kinds, tape.values, tape.applies, tape.events, near, far)
             spread = 0.0
@@ -277,11 +280,11 @@ def bound_leaving_all(
                 number = bound_leaving(near, far, known, elapsed, window, errors, laws, room, outlines, new_pieces)
                 spread = 0.0
                 for channel in range(laws.shape[0] if number > 0 else 0):
-                    least, greatest = np.inf, -np.inf
+                    minimum, maximum = np.inf, -np.inf
                     for piece in range(number):
-                        least = min(least, new_pieces[channel, piece, LEAST])
-                        greatest = max(greatest, new_pieces[channel, piece, GREATEST])
-                    spread = math.hypot(spread, 0.5 * (greatest - least))
+                        minimum = min(minimum, new_pieces[channel, piece, MINIMUM])
+                        maximum = max(maximum, new_pieces[channel, piece, MAXIMUM])
+                    spread = math.hypot(spread, 0.5 * (maximum - minimum))
             # Later impulses may centre the interval, so that its width determines Phi.
             if may_halve and spread > LOOSE * reached:
                 windows[count].near, windows[count].far = near, middle
@@ -304,22 +307,22 @@ def spread_at(
         right, left = chains_of(room.records, ROWS * channel + PROBE)
         tau = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
         count = chains.outline(right, left, room.rings, tau, outline)
-        least, greatest = extremes_along(outline, count, tau)
-        spread = math.hypot(spread, 0.5 * (greatest - least) + 0.5 * law.disturbance * tau * tau)
+        minimum, maximum = extremes_along(outline, count, tau)
+        spread = math.hypot(spread, 0.5 * (maximum - minimum) + 0.5 * law.disturbance * tau * tau)
     return spread
 
 
 class GuaranteedMiss:
     """Phi of a batch of engagements: an upper bound of the true miss over the labels that have left the set.
 
-    `speed_error` is the greatest |eta|, the relative error of the closing speed.
+    `speed_error` is the maximum |eta|, the relative error of the closing speed.
     """
 
     def __init__(self, laws: tuple[SectionLaw, ...], batch: int, speed_error: float) -> None:
         self._laws, self._law, self._speed_error = laws, laws[0], speed_error
         self._settled = np.zeros(batch)
         self.exists: Flags = np.zeros(batch, dtype=bool)
-        steps = self._law.label_greatest / (self._law.closing_speed * self._law.step)
+        steps = self._law.label_max / (self._law.closing_speed * self._law.step)
         self._group_steps = max(1, int(steps / GROUPS))
         self._bounded_below = np.full(batch, -np.inf)
         # Pieces whose range is not zero yet, so that impulses move them.
@@ -352,10 +355,10 @@ class GuaranteedMiss:
             if not (real & (far > 0.0)).any():
                 self._settled = np.maximum(self._settled, self._worst([(pieces, real)]))
                 continue
-            for_least, for_greatest = impulse_m_s - doubt, impulse_m_s + doubt
-            moves = np.stack([k[..., None] * x for k in (for_least, for_greatest) for x in (near, far)])
-            pieces[..., LEAST] -= moves.max(axis=0)
-            pieces[..., GREATEST] -= moves.min(axis=0)
+            for_min, for_max = impulse_m_s - doubt, impulse_m_s + doubt
+            moves = np.stack([k[..., None] * x for k in (for_min, for_max) for x in (near, far)])
+            pieces[..., MINIMUM] -= moves.max(axis=0)
+            pieces[..., MAXIMUM] -= moves.min(axis=0)
             still.append((pieces, real))
         self._pending = still
 
@@ -366,15 +369,15 @@ class GuaranteedMiss:
         too, so that the number of replays does not grow with the number of steps.
         """
         lower = np.maximum(lower, self._bounded_below)
-        active = active & (lower <= upper) & (lower < self._least_label(history.elapsed + 1))
+        active = active & (lower <= upper) & (lower < self._min_label(history.elapsed + 1))
         if not active.any():
             return
-        below = self._least_label(history.elapsed + self._group_steps)
+        below = self._min_label(history.elapsed + self._group_steps)
         upper = np.minimum(upper, below)
         self._bounded_below = np.where(active, below, self._bounded_below)
         channels, batch = len(self._laws), len(active)
         errors = history.errors_if_any
-        most = PIECES if errors is None else PIECES * MOST_LEAVING_WINDOWS
+        most = PIECES if errors is None else PIECES * MAX_LEAVING_WINDOWS
         pieces, made = np.zeros((channels, batch, most, 4)), np.zeros(batch, dtype=np.int64)
         bound_leaving_all(
             active,
@@ -388,10 +391,10 @@ class GuaranteedMiss:
             stack.table,
             workspace(channels, history.events, 1),
             Outlines(
-                np.empty(MOST_LABELS),
-                np.empty((channels, MOST_LABELS, chains.CAPACITY, 2)),
-                np.empty((channels, MOST_LABELS), dtype=np.int64),
-                np.empty((4, MOST_LABELS)),
+                np.empty(MAX_LABELS),
+                np.empty((channels, MAX_LABELS, chains.CAPACITY, 2)),
+                np.empty((channels, MAX_LABELS), dtype=np.int64),
+                np.empty((4, MAX_LABELS)),
             ),
             pieces,
             made,
@@ -401,14 +404,14 @@ class GuaranteedMiss:
             self.exists |= real.any(axis=1)
             self._pending.append((pieces, real))
 
-    def _least_label(self, elapsed: int) -> float:
-        """Return the least label, m, that is not below the range threshold after a number of steps."""
-        return self._law.least_range + self._law.closing_speed * (self._law.step * elapsed)
+    def _min_label(self, elapsed: int) -> float:
+        """Return the minimum label, m, that is not below the range threshold after a number of steps."""
+        return self._law.min_range + self._law.closing_speed * (self._law.step * elapsed)
 
     def _worst(self, parts: list[tuple[Floats, Flags]]) -> Floats:
         worst = np.zeros_like(self._settled)
         for pieces, real in parts:
-            modulus = np.hypot.reduce(np.maximum(pieces[..., GREATEST], -pieces[..., LEAST]), axis=0)
-            modulus += ROUNDING * self._law.label_greatest
+            modulus = np.hypot.reduce(np.maximum(pieces[..., MAXIMUM], -pieces[..., MINIMUM]), axis=0)
+            modulus += ROUNDING * self._law.label_max
             worst = np.maximum(worst, np.where(real, modulus, 0.0).max(axis=1))
         return worst * ((1.0 + self._speed_error) * (1.0 + SLACK))

@@ -94,11 +94,11 @@ class InformationSet(InformationSetView):
         if not isinstance(model, SetModel):
             raise TypeError(f"model must be a SetModel: got {shown(model)}")
         COUNT.need("batch", batch)
-        least, greatest = model.label_limits_m
+        minimum, maximum = model.label_limits_m
         slots = max(model.sections, 2 * model.fewest_sections + 1)
-        labels = np.full((batch, slots), greatest)
+        labels = np.full((batch, slots), maximum)
         labels[:, : model.sections] = (
-            np.linspace(least, greatest, model.sections) if model.sections > 1 else 0.5 * (least + greatest)
+            np.linspace(minimum, maximum, model.sections) if model.sections > 1 else 0.5 * (minimum + maximum)
         )
         laws = section_laws(model)
         has_phi = guarantee and model.is_guaranteed and model.starts_as_box
@@ -106,8 +106,8 @@ class InformationSet(InformationSetView):
             model=model,
             stack=SectionStack(laws, labels, np.full(batch, model.sections)),
             history=History(len(laws), batch),
-            lower_label=np.full(batch, least),
-            upper_label=np.full(batch, greatest),
+            lower_label=np.full(batch, minimum),
+            upper_label=np.full(batch, maximum),
             status=np.full(batch, SetStatus.TRACKING.value, dtype=np.int64),
             some_left=np.zeros(batch, dtype=bool),
             lost_step=np.full(batch, -1, dtype=np.int64),
@@ -160,7 +160,7 @@ class InformationSet(InformationSetView):
             Engagements with a measurement.
         alpha_rad : array_like, shape () or (B,), in space (2,) or (2, B), or None
             Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
-            a measured angle, alpha is bounded by the greatest possible displacement across x.
+            a measured angle, alpha is bounded by the maximum possible displacement across x.
 
         Raises
         ------
@@ -179,7 +179,7 @@ class InformationSet(InformationSetView):
         travelled = self.model.closing_speed_m_s * self.time_s
         slack = section_life.CUT_SLACK * (measured + travelled)
         eta = self.model.speed_error
-        nearer = self._least_cosine(alpha_rad) if self.model.is_guaranteed else 1.0
+        nearer = self._min_cosine(alpha_rad) if self.model.is_guaranteed else 1.0
         lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
         upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
         before = state.lower_label.copy(), state.upper_label.copy()
@@ -190,12 +190,12 @@ class InformationSet(InformationSetView):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, None, *before)
 
-    def _least_cosine(self, measured_rad: ArrayLike | None) -> Floats:
-        """Lower bound of x over the distance, shape (B,): from measured angles, or from the greatest velocity."""
+    def _min_cosine(self, measured_rad: ArrayLike | None) -> Floats:
+        """Lower bound of x over the distance, shape (B,): from measured angles, or from the maximum velocity."""
         stack, travelled = self._state.stack, self.model.closing_speed_m_s * self.time_s
         if measured_rad is not None:
             alpha, steepest = self._spread(measured_rad, "alpha_rad"), np.empty((2, self.batch))
-            section_passes.steepest_all(alpha, stack.law.label_greatest - travelled, stack.table, steepest)
+            section_passes.steepest_all(alpha, stack.law.label_max - travelled, stack.table, steepest)
             return np.asarray(np.cos(steepest[0]) * np.cos(steepest[1]))
         box = self.model.bounds
         impulses = self._state.history.total_impulse() * (1.0 + self.model.execution_error_relative)
@@ -276,16 +276,16 @@ class InformationSet(InformationSetView):
         ndarray of bool, shape (B, S)
             Stored sections that were removed.
         """
-        state, active, least_label = self._state, self.tracking, self._least_label_next()
+        state, active, min_label = self._state, self.tracking, self._min_label_next()
         computes_phi = self._computes_phi
         if state.phi is not None:
             state.phi.leave(computes_phi, state.lower_label, state.upper_label, state.stack, state.history)
         if self.model.is_guaranteed:
             # A label between the stored ones may pass the threshold. The status must not depend on whether Phi is
             # computed.
-            state.some_left |= active & (state.lower_label < least_label)
-        np.maximum(state.lower_label, least_label, out=state.lower_label, where=computes_phi)
-        if state.stack.least_label >= least_label:
+            state.some_left |= active & (state.lower_label < min_label)
+        np.maximum(state.lower_label, min_label, out=state.lower_label, where=computes_phi)
+        if state.stack.min_label >= min_label:
             return np.zeros(state.stack.labels.shape, dtype=bool)
         left, removed = state.stack.keep_labels(state.lower_label, state.upper_label, active)
         if removed:
@@ -295,15 +295,15 @@ class InformationSet(InformationSetView):
 
     def sections_are_leaving(self) -> bool:
         """Return whether `drop_below_threshold` would remove a stored section now."""
-        least_label = self._least_label_next()
-        if self._state.stack.least_label >= least_label:
+        min_label = self._min_label_next()
+        if self._state.stack.min_label >= min_label:
             return False
-        return bool(((self._state.stack.labels < least_label) & self.living).any())
+        return bool(((self._state.stack.labels < min_label) & self.living).any())
 
-    def _least_label_next(self) -> float:
-        """Least label, m, whose range is not below the threshold after the next step."""
+    def _min_label_next(self) -> float:
+        """Minimum label, m, whose range is not below the threshold after the next step."""
         elapsed = self.model.step_s * (self._state.history.elapsed + 1)
-        return self.model.least_range_m + self.model.closing_speed_m_s * elapsed
+        return self.model.min_range_m + self.model.closing_speed_m_s * elapsed
 
     def predict(self) -> None:
         """Predict the set over one step, for all disturbances within the bound.

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats
 
-LARGEST = 1e60
-"""Greatest absolute value of any number: products of a few such numbers do not overflow."""
-SMALLEST = 1e-110
-"""Least value of a number that must be positive: its square is not zero."""
+MAXIMUM = 1e60
+"""Maximum absolute value of any number: products of a few such numbers do not overflow."""
+MINIMUM = 1e-110
+"""Minimum value of a number that must be positive: its square is not zero."""
 
 
 @dataclass(frozen=True)
@@ -24,33 +24,33 @@ class Limits:
 
     Parameters
     ----------
-    above, least, below, most : float or None
-        Ends of the interval; `above` and `below` are excluded. None is no limit but `LARGEST`.
+    above, minimum, below, most : float or None
+        Ends of the interval; `above` and `below` are excluded. None is no limit but `MAXIMUM`.
     whole : bool
-        Whether the number must be an integer; `LARGEST` does not apply to integers.
+        Whether the number must be an integer; `MAXIMUM` does not apply to integers.
     """
 
     above: float | None = None
-    least: float | None = None
+    minimum: float | None = None
     below: float | None = None
-    most: float | None = None
+    maximum: float | None = None
     whole: bool = False
 
     def problem(self, value: object) -> str | None:
         """Return why a number is outside the limits, or None."""
         number: Any = value
-        if not (self.whole or -LARGEST <= number <= LARGEST):  # NaN is neither
-            return f"must be finite, at most {LARGEST:g} in size"
+        if not (self.whole or -MAXIMUM <= number <= MAXIMUM):  # NaN is neither
+            return f"must be finite, at most {MAXIMUM:g} in size"
         if self.above is not None and not number > self.above:
             return f"must be greater than {self.above:g}"
-        if self.above == 0.0 and number < SMALLEST:
-            return f"must be at least {SMALLEST:g}"
-        if self.least is not None and number < self.least:
-            return f"must be at least {self.least:g}"
+        if self.above == 0.0 and number < MINIMUM:
+            return f"must be at least {MINIMUM:g}"
+        if self.minimum is not None and number < self.minimum:
+            return f"must be at least {self.minimum:g}"
         if self.below is not None and number >= self.below:
             return f"must be less than {self.below:g}"
-        if self.most is not None and number > self.most:
-            return f"must be at most {self.most:g}"
+        if self.maximum is not None and number > self.maximum:
+            return f"must be at most {self.maximum:g}"
         return None
 
     def need(self, name: str, value: object) -> None:
@@ -86,11 +86,11 @@ class Limits:
 
 NUMBER = Limits()
 POSITIVE = Limits(above=0.0)
-NOT_NEGATIVE = Limits(least=0.0)
+NOT_NEGATIVE = Limits(minimum=0.0)
 FRACTION = Limits(above=0.0, below=1.0)
-PART = Limits(least=0.0, below=1.0)
-WHOLE = Limits(least=0, whole=True)
-COUNT = Limits(least=1, whole=True)
+PART = Limits(minimum=0.0, below=1.0)
+WHOLE = Limits(minimum=0, whole=True)
+COUNT = Limits(minimum=1, whole=True)
 
 LONGEST_NAME, LONGEST_DESCRIPTION = 100, 300
 
@@ -176,8 +176,8 @@ def limits_of(owner: type, field: str) -> Limits:
 def check_fields(owner: object) -> None:
     """Check the values of a dataclass against the annotations of its fields; raise TypeError or ValueError.
 
-    Numbers are annotated with `Limits`, intervals are pairs (least, greatest) of such numbers, ``tuple[float, ...]`` is
-    any number of them; enumerations, other dataclasses and text are checked by type. The message has the name of the
+    Numbers are annotated with `Limits`, intervals are pairs (minimum, maximum) of such numbers, ``tuple[float, ...]``
+    is any number of them; enumerations, other dataclasses and text are checked by type. The message has the name of the
     field, the value, and what is allowed.
     """
     kind: Any = type(owner)
@@ -210,17 +210,17 @@ def _rule(field: str, name: str, hint: Any) -> _Rule:
 
 
 def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:
-    """Raise an error, which starts with `name`, if a value is not a pair (least, greatest) of numbers within limits.
+    """Raise an error, which starts with `name`, if a value is not a pair (minimum, maximum) of numbers within limits.
 
     TypeError for a value that is not a tuple of two real numbers, ValueError for a number outside the limits and for a
     reversed pair.
     """
     if not isinstance(value, tuple) or len(value) != 2:
-        raise TypeError(f"{name} must be a pair (least, greatest): got {shown(value)}")
+        raise TypeError(f"{name} must be a pair (minimum, maximum): got {shown(value)}")
     for end in value:
         limits.need(name, end)
     if value[0] > value[1]:
-        raise ValueError(f"{name} must be a pair (least, greatest), and is reversed: got {shown(value)}")
+        raise ValueError(f"{name} must be a pair (minimum, maximum), and is reversed: got {shown(value)}")
 
 
 def real_values(name: str, value: ArrayLike) -> Floats:

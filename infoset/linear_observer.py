@@ -18,7 +18,7 @@ from infoset.observer_sets import Motion, Polygons, Polytopes, Set, Sets, Strips
 from infoset.polytope import Polytope
 from infoset.zonotope import Zonotope
 
-MOST_STATES = 6
+MAX_STATES = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +34,8 @@ class Inconsistency:
         the normals of the polytope (of a polygon V, `V.polytope().normals`), or of its projection on the measured
         outputs. 0 if the set is not empty.
     excess : ndarray
-        Least enlargement of these bounds, all others unchanged, for which a state exists, in the unit of the output; 0
-        if the set is not empty.
+        Minimum enlargement of these bounds, all others unchanged, for which a state exists, in the unit of the output;
+        0 if the set is not empty.
     """
 
     step: Integers
@@ -86,12 +86,12 @@ class Estimate:
 
     @property
     def lower(self) -> Floats:
-        """Least value of each state, shape (n,) or (B, n); NaN for the empty set."""
+        """Minimum value of each state, shape (n,) or (B, n); NaN for the empty set."""
         return self._hull[0]
 
     @property
     def upper(self) -> Floats:
-        """Greatest value of each state, shape (n,) or (B, n); NaN for the empty set."""
+        """Maximum value of each state, shape (n,) or (B, n); NaN for the empty set."""
         return self._hull[1]
 
     def chebyshev_centre(self) -> Floats:
@@ -99,7 +99,7 @@ class Estimate:
         return self._runs(self.sets.chebyshev_centres(self.states))
 
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the least and the greatest values of matrix x, each of shape (m,) or (B, m); NaN for the empty set.
+        """Return the minimum and the maximum values of matrix x, each of shape (m,) or (B, m); NaN for the empty set.
 
         Raises
         ------
@@ -179,9 +179,9 @@ class LinearObserver:
     ) -> None:
         self._a = _matrices("state_matrix", state_matrix)
         self.states = self._a.shape[-1]
-        if self._a.shape[-2] != self.states or not 1 <= self.states <= MOST_STATES:
+        if self._a.shape[-2] != self.states or not 1 <= self.states <= MAX_STATES:
             raise ValueError(
-                f"state_matrix must have the shape (n, n) or (K, n, n) with n from 1 to {MOST_STATES}: "
+                f"state_matrix must have the shape (n, n) or (K, n, n) with n from 1 to {MAX_STATES}: "
                 f"got {self._a.shape}"
             )
         self._c = _matrices("output_matrix", output_matrix)
@@ -429,7 +429,7 @@ def _half_spaces(polytope: Polytope) -> tuple[Floats, Floats, Floats]:
 
 
 def _sizes_of(shape: Set) -> Floats:
-    """Return the greatest coordinates of a set, shape (n,), or bounds of them."""
+    """Return the maximum coordinates of a set, shape (n,), or bounds of them."""
     if isinstance(shape, Zonotope):
         return np.asarray(np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0))
     return np.asarray(np.abs(shape.vertices).reshape(-1, shape.vertices.shape[-1]).max(axis=0))

@@ -20,7 +20,7 @@ from infoset.concave_bounds import is_dead_between
 from infoset.history import Tape, Tapes, tape_of
 from infoset.replays import (
     LOWER,
-    MOST_HALVED_WINDOWS,
+    MAX_HALVED_WINDOWS,
     PROBE,
     ROWS,
     UPPER,
@@ -43,7 +43,7 @@ LABEL_RESOLUTION = 1e-13
 NARROWEST = 1e-15
 """Width of an interval of living labels that the search may miss, relative to the labels: 5 to 9 ulp. The slack of the
 cuts makes the labels next to that of a true state live over a wider interval."""
-MOST_PROBES = 200
+MAX_PROBES = 200
 
 
 class Living(NamedTuple):
@@ -83,7 +83,7 @@ def locate_end(
     weight_living = room.living_overlaps[emptied, died]
     side = 0
     before = 0.0
-    for probes in range(MOST_PROBES):
+    for probes in range(MAX_PROBES):
         width = abs(living - end)
         if width <= resolution:
             break
@@ -93,8 +93,8 @@ def locate_end(
         fraction = 0.5
         if not slow and weight_living > weight_dead:
             # A probe at an end gives no information: keep half a resolution away from both.
-            least = 0.5 * resolution / width
-            fraction = min(max(-weight_dead / (weight_living - weight_dead), least), 1.0 - least)
+            minimum = 0.5 * resolution / width
+            fraction = min(max(-weight_dead / (weight_living - weight_dead), minimum), 1.0 - minimum)
         label = end + fraction * (living - end)
         probe_died, probe_overlap, probe_emptied = run(label, tape, errors, laws, room.replays)
         if probe_died == ALIVE:
@@ -120,7 +120,7 @@ def search_living(tape: Tape, errors: Floats | None, laws: Laws, room: Workspace
     ends if the bracket is as narrow as `NARROWEST`, or if no label in it can live.
     """
     known, four = room.known, room.four
-    for _ in range(MOST_PROBES):
+    for _ in range(MAX_PROBES):
         if known[2].label - known[0].label <= NARROWEST * known[2].label:
             return False
         lower_half = known[1].label - known[0].label > known[2].label - known[1].label
@@ -183,7 +183,7 @@ def search_everywhere(
     windows, probed = room.windows, room.four
     windows[0].near, windows[0].far, windows[0].died, windows[0].overlap = lower, upper, ALIVE, 0.0
     count = 1
-    for _ in range(MOST_HALVED_WINDOWS):
+    for _ in range(MAX_HALVED_WINDOWS):
         if count == 0:
             break
         best = 0

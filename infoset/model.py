@@ -14,18 +14,18 @@ from infoset.sensors import AngleSensor
 
 Interval = tuple[float, float]
 
-MOST_SECTIONS = 10_000
+MAX_SECTIONS = 10_000
 CENTROID_ERRORS_AT_THRESHOLD = 10.0
-"""Least range threshold in centroid errors of the camera; at shorter ranges its error bound is not a small angle."""
+"""Minimum range threshold in centroid errors of the camera; at shorter ranges its error bound is not a small angle."""
 
 _APPROACH = Limits(below=0.0)
-_SECTIONS = Limits(least=1, most=MOST_SECTIONS, whole=True)
+_SECTIONS = Limits(minimum=1, maximum=MAX_SECTIONS, whole=True)
 
 
 WHOLE_STEPS_TOLERANCE = 1e-9
 """Relative error of the number of steps between two measurements, for periods that are rounded decimals."""
-LEAST_RANGE = 1e-9
-"""Least range as a share of the greatest label; at a range of zero there is no angle."""
+MIN_RANGE = 1e-9
+"""Minimum range as a share of the maximum label; at a range of zero there is no angle."""
 
 
 class Model(Enum):
@@ -67,9 +67,9 @@ class StateBox:
     Parameters
     ----------
     z_m, x_m : tuple of float
-        Least and greatest lateral offset and range, m.
+        Minimum and maximum lateral offset and range, m.
     vz_m_s, vx_m_s : tuple of float
-        Least and greatest relative velocity along z and x, m/s (vx is negative: the object approaches).
+        Minimum and maximum relative velocity along z and x, m/s (vx is negative: the object approaches).
     y_m, vy_m_s : tuple of float, or None
         Offset, m, and velocity, m/s, along the second lateral axis; both make the box spatial, None is a plane.
 
@@ -115,22 +115,22 @@ class StateBox:
 
     @property
     def offset_m(self) -> float:
-        """Greatest distance from the x axis, m."""
+        """Maximum distance from the x axis, m."""
         return math.hypot(*(max(abs(z) for z in self.axis(name).z_m) for name in self.axes))
 
     @property
     def lateral_speed_m_s(self) -> float:
-        """Greatest velocity across the x axis, m/s."""
+        """Maximum velocity across the x axis, m/s."""
         return math.hypot(*(max(abs(v) for v in self.axis(name).vz_m_s) for name in self.axes))
 
     @property
     def farthest_m(self) -> float:
-        """Greatest distance until x = 0, m.
+        """Maximum distance until x = 0, m.
 
-        Without impulses the distance is a convex function of time: it is greatest at the start or at the end.
+        Without impulses the distance is a convex function of time: it is maximum at the start or at the end.
         """
-        offset, greatest = self.offset_m, self.x_m[1]
-        return max(math.hypot(greatest, offset), offset + self.lateral_speed_m_s * (greatest / -self.vx_m_s[1]))
+        offset, maximum = self.offset_m, self.x_m[1]
+        return max(math.hypot(maximum, offset), offset + self.lateral_speed_m_s * (maximum / -self.vx_m_s[1]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -321,19 +321,19 @@ class SetModel(SetSettings):
         """
         if self.range_threshold_m >= box.x_m[0]:
             raise ValueError(
-                f"range_threshold_m must be less than the least range of {name}, {box.x_m[0]:g} m: "
+                f"range_threshold_m must be less than the minimum range of {name}, {box.x_m[0]:g} m: "
                 f"got {self.range_threshold_m!r}"
             )
         bound = min(self.angle_sensor.axis(name).error_bound(box.farthest_m) for name in box.axes)
         if not bound > 0.0:
             raise ValueError(
-                f"angle_sensor: its error bound must be positive up to the greatest distance of {name}, "
+                f"angle_sensor: its error bound must be positive up to the maximum distance of {name}, "
                 f"{box.farthest_m:g} m: got {bound:.3g} rad there"
             )
 
     @property
     def speed_error(self) -> float:
-        """Greatest |eta|, where e (1 + eta) is the true closing speed; zero in the paper's model."""
+        """Maximum |eta|, where e (1 + eta) is the true closing speed; zero in the paper's model."""
         if not self.is_guaranteed:
             return 0.0
         e = self.closing_speed_m_s
@@ -354,27 +354,27 @@ class SetModel(SetSettings):
         return max(1, round(period_s / self.step_s))
 
     @property
-    def least_range_m(self) -> float:
-        """Least range of a hypothesis, m: the threshold, and more than the rounding error of zero."""
-        return max(self.range_threshold_m, LEAST_RANGE * self.label_limits_m[1])
+    def min_range_m(self) -> float:
+        """Minimum range of a hypothesis, m: the threshold, and more than the rounding error of zero."""
+        return max(self.range_threshold_m, MIN_RANGE * self.label_limits_m[1])
 
     @property
     def label_limits_m(self) -> Interval:
-        """Least and greatest label of a true state, m: its range at t = 0 divided by 1 + eta.
+        """Minimum and maximum label of a true state, m: its range at t = 0 divided by 1 + eta.
 
         Raises
         ------
         ValueError
             If eta may be 1 or more, for which the guaranteed model has no labels.
         """
-        least, greatest = self.bounds.x_m
+        minimum, maximum = self.bounds.x_m
         eta = self.speed_error
         if eta >= 1.0:
             raise ValueError(
                 "SetModel: the guaranteed model needs a closing speed known to better than 100 %: bounds.vx_m_s and "
                 f"gravity_speed_change let it differ by {eta:.3g} of closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
             )
-        return least / (1.0 + eta), greatest / (1.0 - eta)
+        return minimum / (1.0 + eta), maximum / (1.0 - eta)
 
 
 def _of(value: float | None, common: float) -> float:

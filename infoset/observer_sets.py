@@ -22,7 +22,7 @@ Set = ConvexPolygons | Polytope | Zonotope
 POLYTOPE_SLACK = 1e-12
 """Enlargement of the bounds of a measurement of a polytope, relative to the terms of normal . x."""
 _SCALE_ULP = 16.0
-MOST_POLYTOPE_VERTICES = 5000
+MAX_POLYTOPE_VERTICES = 5000
 """A polytope with more vertices takes minutes a step."""
 
 
@@ -141,7 +141,7 @@ class Polytopes:
         return np.array([member is None for member in self.members])
 
     def predicted(self, motion: Motion) -> Polytopes:
-        """Return the sets after a step; raise ArithmeticError if one has more than `MOST_POLYTOPE_VERTICES`."""
+        """Return the sets after a step; raise ArithmeticError if one has more than `MAX_POLYTOPE_VERTICES`."""
         w, states = motion.disturbance, len(motion.matrix)
         centre = w.centre if isinstance(w, Zonotope) else np.zeros(states)
         shifts, terms = (
@@ -159,9 +159,9 @@ class Polytopes:
                     moved = moved.plus_segment(half)
             else:
                 moved = moved.plus(polytope_of(w))
-            if len(moved.vertices) > MOST_POLYTOPE_VERTICES:
+            if len(moved.vertices) > MAX_POLYTOPE_VERTICES:
                 raise ArithmeticError(
-                    f"the exact set has {len(moved.vertices)} vertices, and at most {MOST_POLYTOPE_VERTICES} are "
+                    f"the exact set has {len(moved.vertices)} vertices, and at most {MAX_POLYTOPE_VERTICES} are "
                     "possible; use fewer states, fewer steps, or zonotopes of another library"
                 )
             results.append(moved.enlarged(_SCALE_ULP, term))

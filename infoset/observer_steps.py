@@ -16,7 +16,7 @@ from infoset._compile import compiled, inlined
 from infoset.arrays import Floats, Integers
 from infoset.polygon import Points
 
-MOST_VERTICES = 512
+MAX_VERTICES = 512
 """Polygons with more vertices are reduced outward."""
 _SHARP = 2.0
 """Slope of both edges at an extreme vertex, relative to its axis, above which the vertex is divided."""
@@ -26,7 +26,7 @@ _SHARP_CORNER = 0.5
 
 @inlined
 def reach(points: Points, count: int) -> tuple[float, float]:
-    """Greatest sizes of both coordinates of the vertices."""
+    """Maximum sizes of both coordinates of the vertices."""
     x = y = 0.0
     for i in range(count):
         x = max(x, abs(points[i, 0]))
@@ -85,8 +85,8 @@ def predict_all(
             count = polygon_sum.add_polygon(second, count, other, len(other), scratch)
         for g in range(len(generators)):
             count = polygon_sum.add_segment(scratch, count, generators[g, 0], generators[g, 1])
-        if count > MOST_VERTICES:
-            count = polygon_hull.reduce_outward(scratch, count, MOST_VERTICES)
+        if count > MAX_VERTICES:
+            count = polygon_hull.reduce_outward(scratch, count, MAX_VERTICES)
         made[b] = enlarge(scratch, count, shift_x, shift_y, slack_x, slack_y, out[b])
 
 
@@ -228,16 +228,16 @@ def update_all(
         polygon.copy(vertices[b], count, points)
         x, y = reach(points, count)
         for r in range(len(normals)):
-            least, greatest = lower[b, r], upper[b, r]
+            minimum, maximum = lower[b, r], upper[b, r]
             if count == 0:
                 break
             more = slack * (abs(normals[r, 0]) * x + abs(normals[r, 1]) * y + terms[b, r])
-            least, greatest = least - more, greatest + more
+            minimum, maximum = minimum - more, maximum + more
             if normals[r, 0] == 0.0 and normals[r, 1] == 0.0:
-                overlap = min(greatest, -least)
+                overlap = min(maximum, -minimum)
                 count = count if overlap >= 0.0 else 0
             else:
-                count, overlap = polygon.clip_to_band(points, count, normals[r, 0], normals[r, 1], least, greatest)
+                count, overlap = polygon.clip_to_band(points, count, normals[r, 0], normals[r, 1], minimum, maximum)
             if count == 0:
                 excess[b, r] = -overlap
         made[b] = count
@@ -257,7 +257,7 @@ def cut_to_preimage(
     """Write the points x of each polygon for which matrix x is in a later polygon.
 
     The result has at most four vertices more than both. `slack` is the enlargement of the half-planes of the later
-    polygon, relative to the terms of a height. The level of each half-plane is the greatest height of all vertices, so
+    polygon, relative to the terms of a height. The level of each half-plane is the maximum height of all vertices, so
     that the half-plane of an edge of a few ulp with a wrong direction contains the set. Half-planes along the axes
     bound what such edges leave open at sharp tips.
     """
@@ -295,7 +295,7 @@ def cut_to_preimage(
 
 @compiled
 def support_all(vertices: Floats, counts: Integers, direction: Floats) -> Floats:
-    """Return the greatest height of each polygon along a direction; -inf for the empty set."""
+    """Return the maximum height of each polygon along a direction; -inf for the empty set."""
     heights = np.full(counts.size, -np.inf)
     for b in range(counts.size):
         if counts[b] > 0:

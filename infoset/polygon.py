@@ -24,7 +24,7 @@ Points = NDArray[np.float64]
 # A difference of heights may be a rounding error if it is below this, relative to the products in the heights.
 ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 
-SMALLEST = float(np.finfo(np.float64).tiny)
+MINIMUM = float(np.finfo(np.float64).tiny)
 
 
 @inlined
@@ -162,18 +162,18 @@ def clip_to_band(
     if count == 0 or lower > upper:
         return 0, -np.inf
     bottom, top = extremes(points, count, normal_x, normal_y)
-    least = height(points, bottom, normal_x, normal_y)
-    greatest = height(points, top, normal_x, normal_y)
-    overlap = min(greatest - lower, upper - least)
+    minimum = height(points, bottom, normal_x, normal_y)
+    maximum = height(points, top, normal_x, normal_y)
+    overlap = min(maximum - lower, upper - minimum)
     if overlap < 0.0:
         return 0, overlap
-    if greatest > upper:
+    if maximum > upper:
         count = cut_cap(points, count, top, normal_x, normal_y, upper)
         bottom, top = extremes(points, count, normal_x, normal_y)
         # If the band is as thin as the rounding error, the cut may lie an ulp below the lower border: keep the cut.
         lower = min(lower, height(points, top, normal_x, normal_y))
-        least = height(points, bottom, normal_x, normal_y)
-    if least < lower:
+        minimum = height(points, bottom, normal_x, normal_y)
+    if minimum < lower:
         count = cut_cap(points, count, bottom, -normal_x, -normal_y, -lower)
     return count, overlap
 
@@ -181,16 +181,16 @@ def clip_to_band(
 @inlined
 def extremes(points: Points, count: int, normal_x: float, normal_y: float) -> tuple[int, int]:
     """Return the indices of a lowest and a highest vertex along a direction; of equal ones the first."""
-    least = np.inf
-    greatest = -np.inf
+    minimum = np.inf
+    maximum = -np.inf
     bottom = top = 0
     for i in range(count):
         here = height(points, i, normal_x, normal_y)
-        if here < least:
-            least = here
+        if here < minimum:
+            minimum = here
             bottom = i
-        if here > greatest:
-            greatest = here
+        if here > maximum:
+            maximum = here
             top = i
     return bottom, top
 
@@ -315,7 +315,7 @@ def pass_edge(
     offset = cross(edge_x, edge_y, from_x, from_y)
     squared_length = edge_x * edge_x + edge_y * edge_y
     along = from_x * edge_x + from_y * edge_y
-    off_line = offset * offset / max(squared_length, SMALLEST)
+    off_line = offset * offset / max(squared_length, MINIMUM)
     off_start, off_end = from_x * from_x + from_y * from_y, to_x * to_x + to_y * to_y
     squared = off_line if along < squared_length else off_end
     squared = squared if along > 0.0 else off_start

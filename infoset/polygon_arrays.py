@@ -145,9 +145,9 @@ class PolygonArrays:
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
         """Return {p: lower <= p <= upper}, of shapes (2,) or (..., 2). Exact; equal ends give a segment or a point."""
-        least, most = box_ends(lower, upper, "...", 2)
-        corners = np.stack([least, least, most, most], axis=-2)
-        corners[..., 1, 0], corners[..., 3, 0] = most[..., 0], least[..., 0]
+        minimum, most = box_ends(lower, upper, "...", 2)
+        corners = np.stack([minimum, minimum, most, most], axis=-2)
+        corners[..., 1, 0], corners[..., 3, 0] = most[..., 0], minimum[..., 0]
         counts = np.full(corners.shape[:-2], 4)
         kernels.drop_repeats(corners.reshape(-1, 4, 2), counts.reshape(-1))
         return cls.unchecked(corners, counts)
@@ -159,7 +159,7 @@ class PolygonArrays:
         An `outer` polygon contains the disc and exceeds it by the factor 1 / cos(pi / sides); an inner one is
         contained in it. Both to rounding: a few ulp. O(sides), at least three.
         """
-        Limits(least=3, whole=True).need("sides", sides)
+        Limits(minimum=3, whole=True).need("sides", sides)
         middle, r = finite_values("centre", centre, "...", 2), radius_values(radius, "...")
         common_shape("centre and radius", middle.shape[:-1], r.shape)
         angles = (np.arange(sides) + (0.5 if outer else 0.0)) * (2.0 * math.pi / sides)

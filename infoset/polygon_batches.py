@@ -184,7 +184,7 @@ def holds(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> Non
 
 @compiled
 def is_subset(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
-    """Whether all vertices are in the other polygons, exactly decided, and the greatest distance of one from them."""
+    """Whether all vertices are in the other polygons, exactly decided, and the maximum distance of one from them."""
     for i in range(counts.size):
         out[i, 0] = 1.0
         if counts[i] == 0:
@@ -251,11 +251,11 @@ def centroid(vertices: Floats, counts: Integers, out: Floats) -> None:
 
 
 @compiled
-def largest_disc(vertices: Floats, counts: Integers, out: Floats) -> None:
+def max_disc(vertices: Floats, counts: Integers, out: Floats) -> None:
     """Centres and radii of largest discs."""
     for i in range(counts.size):
         if counts[i] > 0:
-            out[i, 0], out[i, 1], out[i, 2] = polygon_distance.largest_disc(vertices[i], counts[i])
+            out[i, 0], out[i, 1], out[i, 2] = polygon_distance.max_disc(vertices[i], counts[i])
 
 
 @compiled

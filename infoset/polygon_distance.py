@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from infoset._compile import compiled
-from infoset.polygon import SMALLEST, Points
+from infoset.polygon import MINIMUM, Points
 from infoset.polygon_exact import holds, intersect, tidy
 
 
@@ -19,7 +19,7 @@ def nearest(points: Points, count: int, x: float, y: float) -> tuple[float, floa
     """
     if holds(points, count, x, y):
         return x, y, 0.0
-    least, best_x, best_y = np.inf, x, y
+    minimum, best_x, best_y = np.inf, x, y
     j = count - 1
     for i in range(count):
         along_x, along_y = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
@@ -34,20 +34,20 @@ def nearest(points: Points, count: int, x: float, y: float) -> tuple[float, floa
         else:
             near_x, near_y = points[j, 0] + part * along_x, points[j, 1] + part * along_y
         distance = math.hypot(x - near_x, y - near_y)
-        if distance < least:
-            least, best_x, best_y = distance, near_x, near_y
+        if distance < minimum:
+            minimum, best_x, best_y = distance, near_x, near_y
         j = i
-    return best_x, best_y, max(least, SMALLEST)
+    return best_x, best_y, max(minimum, MINIMUM)
 
 
 @compiled
 def farthest(points: Points, count: int, other: Points, other_count: int) -> float:
-    """Return the greatest distance of a vertex from another polygon, both nonempty. O(count * other_count)."""
+    """Return the maximum distance of a vertex from another polygon, both nonempty. O(count * other_count)."""
     b, m = tidy(other, other_count)
-    greatest = 0.0
+    maximum = 0.0
     for i in range(count):
-        greatest = max(greatest, nearest(b, m, points[i, 0], points[i, 1])[2])
-    return greatest
+        maximum = max(maximum, nearest(b, m, points[i, 0], points[i, 1])[2])
+    return maximum
 
 
 @compiled
@@ -59,26 +59,26 @@ def gap(points: Points, count: int, other: Points, other_count: int) -> float:
         return 0.0
     a, n = tidy(points, count)
     b, m = tidy(other, other_count)
-    least = np.inf
+    minimum = np.inf
     for i in range(n):
-        least = min(least, nearest(b, m, a[i, 0], a[i, 1])[2])
+        minimum = min(minimum, nearest(b, m, a[i, 0], a[i, 1])[2])
     for i in range(m):
-        least = min(least, nearest(a, n, b[i, 0], b[i, 1])[2])
-    return least
+        minimum = min(minimum, nearest(a, n, b[i, 0], b[i, 1])[2])
+    return minimum
 
 
 @compiled
 def diameter(points: Points, count: int) -> float:
-    """Return the greatest distance between two vertices. O(count^2)."""
-    greatest = 0.0
+    """Return the maximum distance between two vertices. O(count^2)."""
+    maximum = 0.0
     for i in range(count):
         for j in range(i):
-            greatest = max(greatest, math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]))
-    return greatest
+            maximum = max(maximum, math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]))
+    return maximum
 
 
 @compiled
-def largest_disc(points: Points, count: int) -> tuple[float, float, float]:
+def max_disc(points: Points, count: int) -> tuple[float, float, float]:
     """Return the centre (x, y) and the radius of a largest disc in a nonempty polygon. O(count^2).
 
     The sides move inward at the same speed, and a side whose length becomes zero is removed, until no area is left. The
@@ -98,7 +98,7 @@ def largest_disc(points: Points, count: int) -> tuple[float, float, float]:
     speed = np.empty((n, 2))
     radius = 0.0
     while n > 2:
-        least, chosen, open_end = 1e300, -1, False
+        minimum, chosen, open_end = 1e300, -1, False
         for i in range(n):  # vertex i is between the sides i - 1 and i
             h = i - 1 if i > 0 else n - 1
             towards = 1.0 + normals[h, 0] * normals[i, 0] + normals[h, 1] * normals[i, 1]
@@ -115,22 +115,22 @@ def largest_disc(points: Points, count: int) -> tuple[float, float, float]:
             along_x, along_y = normals[i, 1], -normals[i, 0]
             length = (a[j, 0] - a[i, 0]) * along_x + (a[j, 1] - a[i, 1]) * along_y
             closing = (speed[i, 0] - speed[j, 0]) * along_x + (speed[i, 1] - speed[j, 1]) * along_y
-            if length < least * closing:
-                least, chosen = max(0.0, length) / closing, i
+            if length < minimum * closing:
+                minimum, chosen = max(0.0, length) / closing, i
         if chosen < 0:
             break
-        radius += least
-        a[:n] += least * speed[:n]
+        radius += minimum
+        a[:n] += minimum * speed[:n]
         for i in range(chosen, n - 1):
             normals[i, 0], normals[i, 1] = normals[i + 1, 0], normals[i + 1, 1]
         for i in range(min(chosen + 1, n - 1), n - 1):
             a[i, 0], a[i, 1] = a[i + 1, 0], a[i + 1, 1]
         n -= 1
     first = last = 0
-    greatest = -1.0
+    maximum = -1.0
     for i in range(n):
         for j in range(i + 1):
             distance = math.hypot(a[i, 0] - a[j, 0], a[i, 1] - a[j, 1])
-            if distance > greatest:
-                greatest, first, last = distance, i, j
+            if distance > maximum:
+                maximum, first, last = distance, i, j
     return origin_x + 0.5 * (a[first, 0] + a[last, 0]), origin_y + 0.5 * (a[first, 1] + a[last, 1]), radius

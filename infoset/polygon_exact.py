@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from infoset._compile import compiled, inlined
-from infoset.polygon import SMALLEST, Points, append, put
+from infoset.polygon import MINIMUM, Points, append, put
 from infoset.polygon_hull import drop_repeats, sort_points
 
 _SPLIT = 134217729.0
@@ -229,7 +229,7 @@ def corner(points: Points, count: int) -> tuple[int, int, float]:
 
     The first number is 1 for a counter-clockwise ring, -1 for a clockwise one, 0 if all vertices are on one line. The
     second is the first vertex at which the ring turns the other way or back; without one, the first from which it goes
-    around a second time; -1 if the ring is convex. The depth is the greatest distance by which such a vertex must move,
+    around a second time; -1 if the ring is convex. The depth is the maximum distance by which such a vertex must move,
     to the line through its neighbours or to one of them, relative to the largest coordinates.
     """
     size_x = size_y = area = 0.0
@@ -250,8 +250,8 @@ def corner(points: Points, count: int) -> tuple[int, int, float]:
         ax, ay, bx, by = points[i, 0], points[i, 1], points[j, 0], points[j, 1]
         cx, cy = points[k, 0], points[k, 1]
         turn = turns * orientation(ax, ay, bx, by, cx, cy)
-        before = max(abs(bx - ax) / max(size_x, SMALLEST), abs(by - ay) / max(size_y, SMALLEST))
-        after = max(abs(cx - bx) / max(size_x, SMALLEST), abs(cy - by) / max(size_y, SMALLEST))
+        before = max(abs(bx - ax) / max(size_x, MINIMUM), abs(by - ay) / max(size_y, MINIMUM))
+        after = max(abs(cx - bx) / max(size_x, MINIMUM), abs(cy - by) / max(size_y, MINIMUM))
         shorter = min(before, after)
         if (by > ay or (by == ay and bx > ax)) and (cy < by or (cy == by and cx < bx)):  # a peak
             around = j if around < 0.0 < highest else around

@@ -86,7 +86,7 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
     """Remove edges, in place, until at most `cap` vertices are left; the result contains the polygon; return its size.
 
     The cap is at least 4, because a convex polygon of five vertices always has an edge that can be removed. An edge is
-    removed by extending its neighbours to their intersection; the edge that adds the least area is removed first, at
+    removed by extending its neighbours to their intersection; the edge that adds the minimum area is removed first, at
     O(count) per edge. If rounding has given an edge a wrong direction, the hull is taken first; a rectangle replaces a
     hull that is too thin.
     """
@@ -112,8 +112,8 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
 @allocation_free
 def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
-    """Return the edge whose removal adds the least area, and where its neighbours meet; -1 if not convex."""
-    least = np.inf
+    """Return the edge whose removal adds the minimum area, and where its neighbours meet; -1 if not convex."""
+    minimum = np.inf
     chosen = -1
     chosen_x = chosen_y = 0.0
     before = count - 1
@@ -123,8 +123,8 @@ def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
         before = i
         if added < 0.0:
             return -1, 0.0, 0.0
-        if added < least:
-            least = added
+        if added < minimum:
+            minimum = added
             chosen = i
             chosen_x = x
             chosen_y = y
@@ -161,9 +161,9 @@ def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> tup
 def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> tuple[int, bool]:
     """Remove edges inside a path, in place, until `fewest` vertices are left; the path moves outward only.
 
-    The edge that adds the least area is removed first, of equal ones the first. Return the new number of vertices, and
-    False if no edge can be removed before that. O(count + removed log(count)). `work` is a working array of twice as
-    many rows as the least power of two from `count`. Its first column is a tree: the leaves are the areas that the
+    The edge that adds the minimum area is removed first, of equal ones the first. Return the new number of vertices,
+    and False if no edge can be removed before that. O(count + removed log(count)). `work` is a working array of twice
+    as many rows as the minimum power of two from `count`. Its first column is a tree: the leaves are the areas that the
     removal of the edge after each vertex adds, the other nodes are the lesser of two children. Its second column has
     the numbers of the next and, from `leaves`, of the previous vertex.
     """
@@ -241,17 +241,17 @@ def make_rectangle(points: Points, count: int) -> int:
             length = distance
             x = (points[i, 0] - origin_x) / distance
             y = (points[i, 1] - origin_y) / distance
-    least = greatest = lowest = highest = 0.0
+    minimum = maximum = lowest = highest = 0.0
     for i in range(1, count):
         from_x = points[i, 0] - origin_x
         from_y = points[i, 1] - origin_y
         along = x * from_x + y * from_y
         height = cross(x, y, from_x, from_y)
-        least = min(least, along)
-        greatest = max(greatest, along)
+        minimum = min(minimum, along)
+        maximum = max(maximum, along)
         lowest = min(lowest, height)
         highest = max(highest, height)
     made = 0
-    for along, height in ((least, lowest), (greatest, lowest), (greatest, highest), (least, highest)):
+    for along, height in ((minimum, lowest), (maximum, lowest), (maximum, highest), (minimum, highest)):
         made = append(points, made, origin_x + along * x - height * y, origin_y + along * y + height * x)
     return close(points, made)

@@ -68,7 +68,7 @@ def add_segment_carefully(points: Points, count: int, half_x: float, half_y: flo
     origin_x = points[0, 0]
     origin_y = points[0, 1]
     bottom = top = hind = fore = 0
-    lowest = highest = least = greatest = 0.0
+    lowest = highest = minimum = maximum = 0.0
     for i in range(1, count):
         from_x = points[i, 0] - origin_x
         from_y = points[i, 1] - origin_y
@@ -80,13 +80,13 @@ def add_segment_carefully(points: Points, count: int, half_x: float, half_y: flo
         if height > highest:
             highest = height
             top = i
-        if along < least:
-            least = along
+        if along < minimum:
+            minimum = along
             hind = i
-        if along > greatest:
-            greatest = along
+        if along > maximum:
+            maximum = along
             fore = i
-    if greatest - least > highest - lowest:
+    if maximum - minimum > highest - lowest:
         bottom_first, bottom_last = lowest_between(points, count, hind, fore, x, y)
         top_first, top_last = lowest_between(points, count, fore, hind, -x, -y)
     else:

@@ -36,8 +36,8 @@ from infoset.section_life import (
     widen_section,
 )
 
-MOST_HALVED_WINDOWS = 1000
-"""Greatest number of windows of labels that a search halves. If more are needed, the set counts as empty."""
+MAX_HALVED_WINDOWS = 1000
+"""Maximum number of windows of labels that a search halves. If more are needed, the set counts as empty."""
 
 PROBE, LOWER, UPPER = constants(3)
 """Rows of the workspace: the section of the last replay, and the sections at the ends of the living labels.
@@ -99,7 +99,7 @@ class Workspace(NamedTuple):
         A bracket of three labels and the label probed in it.
     latest : ndarray, shape (2, 4)
         Labels and overlaps of those that became empty at the latest event.
-    windows : recarray of WINDOW, shape (MOST_HALVED_WINDOWS + 2,)
+    windows : recarray of WINDOW, shape (MAX_HALVED_WINDOWS + 2,)
         Windows of labels to be searched.
     """
 
@@ -130,7 +130,7 @@ def workspace(channels: int, events: int, slots: int) -> Workspace:
         known=np.recarray(slots + 2, PROBED),
         four=np.recarray(4, PROBED),
         latest=np.empty((2, 4)),
-        windows=np.recarray(MOST_HALVED_WINDOWS + 2, WINDOW),
+        windows=np.recarray(MAX_HALVED_WINDOWS + 2, WINDOW),
     )
 
 
@@ -197,7 +197,7 @@ def replay(
 def run(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom) -> tuple[int, float, int]:
     """Replay a label along all axes; return the event at which it became empty, or ALIVE, the overlap, m, and its axis.
 
-    A label becomes empty with the first of its axes. If several become empty at one event, the least overlap counts.
+    A label becomes empty with the first of its axes. If several become empty at one event, the minimum overlap counts.
     """
     died, overlap, emptied = ALIVE, 0.0, 0
     kinds, values, applies, events, nearest, farthest = tape

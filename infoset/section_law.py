@@ -33,7 +33,7 @@ class SectionLaw(NamedTuple):
     disturbance : float
         Bound nu of the acceleration along z, m/s^2.
     half_v : float
-        Greatest change of V by the disturbance in one step, nu times the step, m/s.
+        Maximum change of V by the disturbance in one step, nu times the step, m/s.
     half_v_at_start : float
         Part of `half_v` added at t = 0, m/s. The guaranteed model adds half of the change at the start of a step and
         half at its end; after t = 0 the two halves of adjacent steps are added together.
@@ -46,9 +46,9 @@ class SectionLaw(NamedTuple):
         Error bound of an angle: rad, and rad per metre of range.
     exact_angles : bool
         Whether z/x is the tangent of the angle. The paper's model takes the angle itself.
-    label_least, label_greatest : float
+    label_min, label_max : float
         Limits of the labels of a true state, m.
-    z_least, z_greatest, vz_least, vz_greatest, vx_least, vx_greatest : float
+    z_min, z_max, vz_min, vz_max, vx_min, vx_max : float
         Box of initial states, m and m/s; the guaranteed model enlarges it by the error of the scale.
     rectangle : bool
         Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
@@ -62,8 +62,8 @@ class SectionLaw(NamedTuple):
         Number of this axis and of the other one in arrays with an axis of channels; `other` is -1 in a plane.
     centroid_error : float
         Part of the error bound of both angles that falls with the range x: centroid_error / x, m.
-    least_range : float
-        Least range of a label in the set, m.
+    min_range : float
+        Minimum range of a label in the set, m.
     """
 
     closing_speed: float
@@ -76,14 +76,14 @@ class SectionLaw(NamedTuple):
     error_at_zero_range: float
     error_slope: float
     exact_angles: bool
-    label_least: float
-    label_greatest: float
-    z_least: float
-    z_greatest: float
-    vz_least: float
-    vz_greatest: float
-    vx_least: float
-    vx_greatest: float
+    label_min: float
+    label_max: float
+    z_min: float
+    z_max: float
+    vz_min: float
+    vz_max: float
+    vx_min: float
+    vx_max: float
     rectangle: bool
     angles: int
     other_error_at_zero_range: float
@@ -93,7 +93,7 @@ class SectionLaw(NamedTuple):
     channel: int
     other: int
     centroid_error: float
-    least_range: float
+    min_range: float
 
 
 Laws = NDArray[np.record]
@@ -142,7 +142,7 @@ def _law(model: SetModel) -> SectionLaw:
 
     Angles contain no information about scale: a true motion with closing speed e (1 + eta) has the angles of a motion
     of the model with all lengths, velocities and impulses divided by 1 + eta. Therefore the guaranteed model enlarges
-    the bounds of lengths and velocities by eta, takes the greatest error bound of an angle over the ranges that
+    the bounds of lengths and velocities by eta, takes the maximum error bound of an angle over the ranges that
     correspond to a label, and adds eta to the engine's error of an impulse. See docs/guarantee.md.
     """
     box, sensor, eta = model.bounds, model.angle_sensor, model.speed_error
@@ -152,20 +152,20 @@ def _law(model: SetModel) -> SectionLaw:
     if guaranteed:
         slope *= (1.0 + math.copysign(eta, slope)) * (1.0 + BOUND_SLACK)
         error *= 1.0 + BOUND_SLACK
-    z_least, z_greatest = _scaled_outward(box.z_m, eta)
-    vz_least, vz_greatest = _scaled_outward(box.vz_m_s, eta)
+    z_min, z_max = _scaled_outward(box.z_m, eta)
+    vz_min, vz_max = _scaled_outward(box.vz_m_s, eta)
     # The true distance of a label is at least (1 - eta) x.
     centroid = sensor.centroid_error_m * (1.0 + BOUND_SLACK) / (1.0 - eta)
-    least_label, greatest_label = model.label_limits_m
+    min_label, max_label = model.label_limits_m
     if guaranteed:
         offset, speed = max(abs(z) for z in box.z_m), max(abs(v) for v in box.vz_m_s)
-        rate = model.closing_speed_m_s / least_label
+        rate = model.closing_speed_m_s / min_label
         # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding term keeps coordinates
         # that are known exactly inside the set.
         slack = rate * offset * model.gravity_speed_change + ROUNDING * (speed + rate * offset)
-        vz_least, vz_greatest = vz_least - slack, vz_greatest + slack
-        slack = ROUNDING * (offset + speed * greatest_label / model.closing_speed_m_s)
-        z_least, z_greatest = z_least - slack, z_greatest + slack
+        vz_min, vz_max = vz_min - slack, vz_max + slack
+        slack = ROUNDING * (offset + speed * max_label / model.closing_speed_m_s)
+        z_min, z_max = z_min - slack, z_max + slack
     return SectionLaw(
         closing_speed=float(model.closing_speed_m_s),
         step=float(model.step_s),
@@ -179,14 +179,14 @@ def _law(model: SetModel) -> SectionLaw:
         error_at_zero_range=float(error),
         error_slope=float(slope),
         exact_angles=guaranteed,
-        label_least=float(least_label),
-        label_greatest=float(greatest_label),
-        z_least=z_least,
-        z_greatest=z_greatest,
-        vz_least=vz_least,
-        vz_greatest=vz_greatest,
-        vx_least=float(box.vx_m_s[0]),
-        vx_greatest=float(box.vx_m_s[1]),
+        label_min=float(min_label),
+        label_max=float(max_label),
+        z_min=z_min,
+        z_max=z_max,
+        vz_min=vz_min,
+        vz_max=vz_max,
+        vx_min=float(box.vx_m_s[0]),
+        vx_max=float(box.vx_m_s[1]),
         rectangle=not model.starts_as_box,
         angles=LINEAR if centroid > 0.0 or (guaranteed and slope > 0.0) else PLANE,
         other_error_at_zero_range=0.0,
@@ -196,17 +196,17 @@ def _law(model: SetModel) -> SectionLaw:
         channel=0,
         other=-1,
         centroid_error=centroid,
-        least_range=float(model.least_range_m),
+        min_range=float(model.min_range_m),
     )
 
 
 def _scaled_outward(interval: Interval, eta: float) -> Interval:
     """Return an interval that contains a / (1 + h) for all a in the interval and |h| <= eta."""
-    least, greatest = interval
+    minimum, maximum = interval
     if eta == 0.0:
-        return float(least), float(greatest)
+        return float(minimum), float(maximum)
     slack = 1.0 + BOUND_SLACK
     return (
-        slack * least / (1.0 - eta) if least < 0.0 else least / (1.0 + eta) / slack,
-        slack * greatest / (1.0 - eta) if greatest > 0.0 else greatest / (1.0 + eta) / slack,
+        slack * minimum / (1.0 - eta) if minimum < 0.0 else minimum / (1.0 + eta) / slack,
+        slack * maximum / (1.0 - eta) if maximum > 0.0 else maximum / (1.0 + eta) / slack,
     )

@@ -25,12 +25,12 @@ SUM_SLACK = 8.0 * chains.EPSILON
 RIGHT_ANGLE = 0.5 * math.pi
 ANGLE_SLACK = 1e-12
 WIDEST_CONE, CONE_STRETCH = 0.2, 1.01
-"""Greatest error of a direction, rad, that bounds an angle, and a bound of asin(k sin(b))/(k b) up to it."""
+"""Maximum error of a direction, rad, that bounds an angle, and a bound of asin(k sin(b))/(k b) up to it."""
 
 ALIVE = np.iinfo(np.int64).max
 
 # Columns of a section's summary.
-LOWER_MISS, UPPER_MISS, Z_LEAST, Z_GREATEST = range(4)
+LOWER_MISS, UPPER_MISS, Z_MIN, Z_MAX = range(4)
 SUMMARY_COLUMNS = 4
 
 
@@ -55,22 +55,22 @@ def start_section(right: Chain, left: Chain, rings: Floats, label: float, law: S
     """
     x = label
     e = law.closing_speed
-    z_least, z_greatest = law.z_least, law.z_greatest
-    shift_at_least = shift_at_greatest = 0.0
-    lowest, highest = law.vz_least, law.vz_greatest
+    z_min, z_max = law.z_min, law.z_max
+    shift_at_min = shift_at_max = 0.0
+    lowest, highest = law.vz_min, law.vz_max
     if law.rectangle:
-        lowest -= max(law.vx_least * z_least, law.vx_greatest * z_least) / x
-        highest -= min(law.vx_least * z_greatest, law.vx_greatest * z_greatest) / x
-        shift_at_least, shift_at_greatest = -e * math.atan(z_least / x), -e * math.atan(z_greatest / x)
-        z_least, z_greatest = math.atan(z_least / x) * x, math.atan(z_greatest / x) * x
+        lowest -= max(law.vx_min * z_min, law.vx_max * z_min) / x
+        highest -= min(law.vx_min * z_max, law.vx_max * z_max) / x
+        shift_at_min, shift_at_max = -e * math.atan(z_min / x), -e * math.atan(z_max / x)
+        z_min, z_max = math.atan(z_min / x) * x, math.atan(z_max / x) * x
     tau = time_to_go(label, ZERO, law)
     chains.start(
         right,
         left,
         rings,
         tau,
-        (lowest + shift_at_least, highest + shift_at_least, z_least),
-        (lowest + shift_at_greatest, highest + shift_at_greatest, z_greatest),
+        (lowest + shift_at_min, highest + shift_at_min, z_min),
+        (lowest + shift_at_max, highest + shift_at_max, z_max),
     )
     if law.half_v_at_start > 0.0:
         chains.spread(right, left, tau, law.half_v_at_start)
@@ -78,42 +78,42 @@ def start_section(right: Chain, left: Chain, rings: Floats, label: float, law: S
 
 @inlined
 def nearest_range(travelled: float, law: SectionLaw) -> float:
-    """Return the least range of a label in the set after the range has decreased by `travelled`, m."""
-    return max(law.label_least - travelled, law.least_range)
+    """Return the minimum range of a label in the set after the range has decreased by `travelled`, m."""
+    return max(law.label_min - travelled, law.min_range)
 
 
 @allocation_free
 def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw) -> tuple[float, float]:
-    """Return the greatest sizes of two measured angles, rad, that agree with the measurements up to a range.
+    """Return the maximum sizes of two measured angles, rad, that agree with the measurements up to a range.
 
     `alpha` and `across` are the measured angles of this axis and of the other one. The distance is at most x/(cos(own)
     cos(other)). If one of the angles is unbounded, the first is pi/2 and the second zero.
 
-    The bound of a camera is greatest at the least distance, that of the nearest label. Another error bound that grows
+    The bound of a camera is maximum at the minimum distance, that of the nearest label. Another error bound that grows
     with the distance r grows with the angles: in a plane r = x/cos(alpha), in space r is at most x/(cos(alpha_y)
-    cos(alpha_z)). The greatest angles are the least solution of s = |alpha_m| + a + h(r(s)). Three fixed-point
+    cos(alpha_z)). The maximum angles are the minimum solution of s = |alpha_m| + a + h(r(s)). Three fixed-point
     iterations approach it from below; a fourth step of the length of the third passes it if the right-hand side does
     not exceed s there.
     """
     growth, other_growth = max(law.error_slope, 0.0) * range_m, max(law.other_error_slope, 0.0) * range_m
     centroid = 0.0
     if law.centroid_error > 0.0:
-        centroid = law.centroid_error / nearest_range(law.label_greatest - range_m, law)
+        centroid = law.centroid_error / nearest_range(law.label_max - range_m, law)
     constant, other_constant = law.error_at_zero_range + centroid, law.other_error_at_zero_range + centroid
     if law.angles == CONE:
         if max(abs(alpha), abs(across)) >= RIGHT_ANGLE:
             return RIGHT_ANGLE, 0.0
         constant, other_constant = constant * CONE_STRETCH / math.cos(across), constant * CONE_STRETCH / math.cos(alpha)
         growth, other_growth = growth * CONE_STRETCH / math.cos(across), growth * CONE_STRETCH / math.cos(alpha)
-    least, other_least = abs(alpha) + constant, abs(across) + other_constant
-    before = own = least + growth
-    other_before = other = other_least + other_growth
+    minimum, other_min = abs(alpha) + constant, abs(across) + other_constant
+    before = own = minimum + growth
+    other_before = other = other_min + other_growth
     for _ in range(3):
         if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
             return RIGHT_ANGLE, 0.0
         cosine, other_cosine = math.cos(own), math.cos(other)
-        before, own = own, least + growth / cosine / other_cosine
-        other_before, other = other, other_least + other_growth / cosine / other_cosine
+        before, own = own, minimum + growth / cosine / other_cosine
+        other_before, other = other, other_min + other_growth / cosine / other_cosine
     own += (own - before) + ANGLE_SLACK
     other += (other - other_before) + ANGLE_SLACK
     if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
@@ -121,15 +121,15 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
     if law.angles == CONE and max(own - abs(alpha), other - abs(across)) > WIDEST_CONE:
         return RIGHT_ANGLE, 0.0
     cosine, other_cosine = math.cos(own), math.cos(other)
-    passed = least + growth / cosine / other_cosine <= own
-    if passed and other_least + other_growth / cosine / other_cosine <= other:
+    passed = minimum + growth / cosine / other_cosine <= own
+    if passed and other_min + other_growth / cosine / other_cosine <= other:
         return own, other
     return RIGHT_ANGLE, 0.0
 
 
 @inlined
 def slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
-    """Return the least and the greatest slope z/x that agree with measured angles, at range x.
+    """Return the minimum and the maximum slope z/x that agree with measured angles, at range x.
 
     `alpha` and `across` are the angles of this axis and of the other one, rad. `travelled` is the decrease of the range
     since the start, m, the same for all labels.
@@ -160,24 +160,24 @@ def wide_slope_band(alpha: float, across: float, travelled: float, x: float, law
         bound += law.centroid_error / x
     if not law.exact_angles:
         return alpha - bound, alpha + bound
-    near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
+    near, far = max(law.label_min - travelled, 0.0), law.label_max - travelled
     own, other = steepest_angles(alpha, across, far, law)
     if own >= RIGHT_ANGLE:
         return -np.inf, np.inf
     cosine, other_cosine = math.cos(own), math.cos(other)
     # The error bound depends on the true distance, in a plane x/cos(alpha).
     farthest = far / cosine / other_cosine
-    greatest = law.error_at_zero_range + max(law.error_slope, 0.0) * farthest
-    other_greatest = law.other_error_at_zero_range + max(law.other_error_slope, 0.0) * farthest
+    maximum = law.error_at_zero_range + max(law.error_slope, 0.0) * farthest
+    other_max = law.other_error_at_zero_range + max(law.other_error_slope, 0.0) * farthest
     if falling:
         centroid = law.centroid_error / nearest_range(travelled, law)
-        greatest += centroid
-        other_greatest += centroid
+        maximum += centroid
+        other_max += centroid
     if rising:
         bound = law.error_at_zero_range + law.error_slope * ((near + far - near * far / x) / cosine / other_cosine)
     if law.angles == CONE:
         # asin(sin(b)/cos(across)) is at most its secant k b.
-        bound *= math.asin(math.sin(greatest) / math.cos(across)) / greatest
+        bound *= math.asin(math.sin(maximum) / math.cos(across)) / maximum
     if rising or falling:
         bound = bound / cosine**2
         lower, upper = math.tan(alpha) - bound, math.tan(alpha) + bound
@@ -187,10 +187,10 @@ def wide_slope_band(alpha: float, across: float, travelled: float, x: float, law
         upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
     if law.angles == ELEVATION:
         # z/x is tan(elevation)/cos(azimuth), with the factor 1/cos(azimuth) between two bounds.
-        least_factor = 1.0 / math.cos(max(abs(across) - other_greatest, 0.0))
-        greatest_factor = 1.0 / math.cos(abs(across) + other_greatest)
-        factor = 0.5 * (least_factor + greatest_factor)
-        doubt = 0.5 * (greatest_factor - least_factor) * math.tan(own)
+        min_factor = 1.0 / math.cos(max(abs(across) - other_max, 0.0))
+        max_factor = 1.0 / math.cos(abs(across) + other_max)
+        factor = 0.5 * (min_factor + max_factor)
+        doubt = 0.5 * (max_factor - min_factor) * math.tan(own)
         lower, upper = factor * lower - doubt, factor * upper + doubt
     return lower, upper
 
@@ -289,24 +289,24 @@ def rate_band(
     then = e * ago
     near_then, far_then = near + then, far + then
     if sight.known:
-        least_near, greatest_near = slope_band(sight.alpha, sight.across, travelled - then, near_then, law)
-        least_far, greatest_far = slope_band(sight.alpha, sight.across, travelled - then, far_then, law)
+        min_near, max_near = slope_band(sight.alpha, sight.across, travelled - then, near_then, law)
+        min_far, max_far = slope_band(sight.alpha, sight.across, travelled - then, far_then, law)
     else:
-        least_near, greatest_near = law.z_least / near_then, law.z_greatest / near_then
-        least_far, greatest_far = law.z_least / far_then, law.z_greatest / far_then
-    least, greatest = min(least_near, least_far), max(greatest_near, greatest_far)
-    if not (least > -np.inf and greatest < np.inf):
+        min_near, max_near = law.z_min / near_then, law.z_max / near_then
+        min_far, max_far = law.z_min / far_then, law.z_max / far_then
+    minimum, maximum = min(min_near, min_far), max(max_near, max_far)
+    if not (minimum > -np.inf and maximum < np.inf):
         return -np.inf, np.inf
-    steepest = max(abs(least), abs(greatest))
+    steepest = max(abs(minimum), abs(maximum))
     if sight.steps > 0:
-        fastest = max(abs(law.vz_least), abs(law.vz_greatest)) + sight.fired * (1.0 + law.impulse_error)
+        fastest = max(abs(law.vz_min), abs(law.vz_max)) + sight.fired * (1.0 + law.impulse_error)
         fastest += law.disturbance * (law.step * elapsed)
         if near <= 0.0:
             return -np.inf, np.inf
         steepest = (steepest * far_then + fastest * ago) / near
         doubt = sight.doubt + 0.5 * law.disturbance * ago * ago
-        least += min((sight.moved - doubt) / near_then, (sight.moved - doubt) / far_then)
-        greatest += max((sight.moved + doubt) / near_then, (sight.moved + doubt) / far_then)
+        minimum += min((sight.moved - doubt) / near_then, (sight.moved - doubt) / far_then)
+        maximum += max((sight.moved + doubt) / near_then, (sight.moved + doubt) / far_then)
     widest = 1.0 + steepest * steepest if law.exact_angles else 1.0
     lower, upper = omega - error, omega + error
     lower *= widest if lower < 0.0 else 1.0
@@ -317,8 +317,8 @@ def rate_band(
     if far > near:
         at_near, at_far = scaled_square(near, middle, then) / e, scaled_square(far, middle, then) / e
         chord = at_near + (at_far - at_near) * ((x - near) / (far - near))
-    turn = 0.5 * (least + greatest) * (x - middle)
-    room = 0.5 * (greatest - least) * (0.5 * (far - near))
+    turn = 0.5 * (minimum + maximum) * (x - middle)
+    room = 0.5 * (maximum - minimum) * (0.5 * (far - near))
     return (
         lower * (chord if lower < 0.0 else curve) + turn - room,
         upper * (chord if upper > 0.0 else curve) + turn + room,
@@ -407,7 +407,7 @@ def summarise_section(
 ) -> None:
     """Write the extremes (13), (14) of the predicted miss of a section, those of z + V x/e -+ nu/2 (x/e)^2."""
     tau = time_to_go(label, elapsed, law)
-    upper, lower = chains.greatest_and_least_miss(right, left, rings, tau)
+    upper, lower = chains.max_and_min_miss(right, left, rings, tau)
     drift = 0.5 * law.disturbance * tau * tau
     summaries[law.channel, b, s, UPPER_MISS] = upper + drift
     summaries[law.channel, b, s, LOWER_MISS] = lower - drift

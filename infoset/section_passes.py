@@ -19,8 +19,8 @@ from infoset.section_life import (
     LOWER_MISS,
     SUMMARY_COLUMNS,
     UPPER_MISS,
-    Z_GREATEST,
-    Z_LEAST,
+    Z_MAX,
+    Z_MIN,
     across_of,
     impulse_doubt,
     measure_rate_section,
@@ -50,8 +50,8 @@ class Slot(Protocol):
     died : int
         Number of the event that made a section empty, or ALIVE.
     overlap : float
-        Overlap of an empty section with the band that made it empty, m: negative. The least one if several became empty
-        at that event.
+        Overlap of an empty section with the band that made it empty, m: negative. The minimum one if several became
+        empty at that event.
     emptied : int
         Axis of the section with that overlap.
     """
@@ -130,7 +130,7 @@ def start_all(sections: Sections, laws: Laws) -> None:
 def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool:
     """Whether a section is cut at an event: if the label lives, or another axis has just made it empty.
 
-    The overlap of a label that an event makes empty is the least one of its axes, whatever their order.
+    The overlap of a label that an event makes empty is the minimum one of its axes, whatever their order.
     """
     slot = sections.slots[b, s]
     return bool(slot.living or (channel > 0 and slot.died == event))
@@ -180,7 +180,7 @@ def step_all(
 
     Sections of engagements that are `behind` are at step `elapsed` - 1 and are moved to step `elapsed`. Those that are
     `measured` are cut by an angle, `alpha` of shape (C, B), rad, and summarised; those that are `stale` are summarised.
-    `event` is the number of the measurement, -1 without one. `heights_wanted` writes the least and the greatest z of
+    `event` is the number of the measurement, -1 without one. `heights_wanted` writes the minimum and the maximum z of
     all sections.
     """
     deaths = 0
@@ -210,9 +210,9 @@ def step_all(
                 summarise_section(right, left, rings, slot.label, elapsed, law, summaries, b, s)
             if heights_wanted:
                 tau = time_to_go(slot.label, elapsed, law)
-                least, greatest = chains.heights(right, left, rings, tau)
-                summaries[channel, b, s, Z_LEAST] = least
-                summaries[channel, b, s, Z_GREATEST] = greatest
+                minimum, maximum = chains.heights(right, left, rings, tau)
+                summaries[channel, b, s, Z_MIN] = minimum
+                summaries[channel, b, s, Z_MAX] = maximum
     return deaths
 
 
@@ -325,7 +325,7 @@ def make_room_all(
 
     Every section must be able to gain `added` vertices. Return the number of floats by which the rings are too small,
     for which memory must be allocated, and the number of vertices that every section may gain. It is less than
-    `MOST_ADDED` if a section must be reduced first; `widen` reduces those of the active engagements.
+    `MAX_ADDED` if a section must be reduced first; `widen` reduces those of the active engagements.
     """
     slots, used = sections.slots, sections.used
     records, rings = sections.records, sections.rings
@@ -392,7 +392,7 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
 
 @entry
 def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: Floats) -> None:
-    """Write the least and the greatest alpha of the living sections along each axis, rad, and their ranges, m.
+    """Write the minimum and the maximum alpha of the living sections along each axis, rad, and their ranges, m.
 
     `extremes`, shape (4, C, B), is not written for engagements without a living section.
     """
@@ -406,16 +406,16 @@ def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: F
                 # Only sections of stopped engagements can be at range zero.
                 if not slots[b, s].living or x == 0.0:
                     continue
-                least, greatest = summaries[channel, b, s, Z_LEAST] / x, summaries[channel, b, s, Z_GREATEST] / x
-                if none or least < extremes[0, channel, b]:
-                    extremes[0, channel, b], extremes[2, channel, b] = least, x
-                if none or greatest > extremes[1, channel, b]:
-                    extremes[1, channel, b], extremes[3, channel, b] = greatest, x
+                minimum, maximum = summaries[channel, b, s, Z_MIN] / x, summaries[channel, b, s, Z_MAX] / x
+                if none or minimum < extremes[0, channel, b]:
+                    extremes[0, channel, b], extremes[2, channel, b] = minimum, x
+                if none or maximum > extremes[1, channel, b]:
+                    extremes[1, channel, b], extremes[3, channel, b] = maximum, x
                 none = False
 
 
 @entry
-def keep_labels_all(active: Flags, least: Floats, greatest: Floats, sections: Sections, removed: Flags) -> int:
+def keep_labels_all(active: Flags, minimum: Floats, maximum: Floats, sections: Sections, removed: Flags) -> int:
     """Remove the living sections with labels outside limits of shape (B,), m; return their number.
 
     `removed`, shape (B, S), receives the mask of the removed ones.
@@ -424,7 +424,7 @@ def keep_labels_all(active: Flags, least: Floats, greatest: Floats, sections: Se
     for b in range(len(sections.used)):
         for s in range(sections.used[b]):
             slot = sections.slots[b, s]
-            if active[b] and slot.living and not least[b] <= slot.label <= greatest[b]:
+            if active[b] and slot.living and not minimum[b] <= slot.label <= maximum[b]:
                 slot.living = False
                 removed[b, s] = True
                 number += 1
@@ -440,7 +440,7 @@ def write_outline(records: chain_storage.Records, rings: Floats, n: int, tau: fl
 
 @entry
 def steepest_all(alpha: Floats, farthest: float, laws: Laws, steepest: Floats) -> None:
-    """Write the greatest sizes of angles of shape (C, B) up to a range: those of `steepest_angles`, shape (2, B)."""
+    """Write the maximum sizes of angles of shape (C, B) up to a range: those of `steepest_angles`, shape (2, B)."""
     law = law_of(laws, ZERO)
     for b in range(alpha.shape[1]):
         steepest[0, b], steepest[1, b] = steepest_angles(alpha[0, b], across_of(alpha, b, law), farthest, law)

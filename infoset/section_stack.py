@@ -29,7 +29,7 @@ class Freshness(IntEnum):
     SUMMARISED = 2
     """The extremes of the predicted miss are up to date."""
     WITH_HEIGHTS = 3
-    """The least and the greatest z are up to date too."""
+    """The minimum and the maximum z are up to date too."""
 
 
 class SectionStack:
@@ -44,7 +44,7 @@ class SectionStack:
 
     Attributes
     ----------
-    least_label : float
+    min_label : float
         Lower bound of the labels of living sections, m.
     """
 
@@ -59,7 +59,7 @@ class SectionStack:
         # Vertices that every section may still gain, and the present step.
         self._spare = self._elapsed = 0
         section_passes.start_all(self.sections, self.table)
-        self.least_label = self._least_label()
+        self.min_label = self._min_label()
 
     @property
     def law(self) -> SectionLaw:
@@ -124,16 +124,16 @@ class SectionStack:
 
         Only the active engagements change, but the others may use their room later without another count.
         """
-        self._spare -= chains.MOST_ADDED
+        self._spare -= chains.MAX_ADDED
         if self._spare >= 0:
             return
         elapsed, points = self._elapsed, chain_storage.working_room()
         make_room = section_passes.make_room_all
         floats, spare = make_room(active, chain_storage.ROOM_AHEAD, elapsed, self.sections, self.table, points, False)
-        if floats or spare < chains.MOST_ADDED:
+        if floats or spare < chains.MAX_ADDED:
             self.sections = self.sections._replace(rings=chain_storage.with_room(self.sections.rings, floats))
             _, spare = make_room(active, chain_storage.ROOM_AHEAD, elapsed, self.sections, self.table, points, True)
-        self._spare = spare - chains.MOST_ADDED
+        self._spare = spare - chains.MAX_ADDED
 
     def make_room_for_new(self, wanted: Flags, number: int) -> None:
         """Allocate room for `number` sections of any size in each of the wanted engagements."""
@@ -146,9 +146,9 @@ class SectionStack:
     def note_new(self, spare: int) -> None:
         """Register new sections, each of which may gain at least `spare` vertices."""
         self._spare = min(self._spare, spare)
-        self.least_label = self._least_label()
+        self.min_label = self._min_label()
 
-    def _least_label(self) -> float:
+    def _min_label(self) -> float:
         return float(np.where(self.living, self.labels, np.inf).min())
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
@@ -206,10 +206,10 @@ class SectionStack:
         self._freshness = Freshness.BEHIND
         self._elapsed = elapsed
 
-    def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> tuple[Flags, int]:
-        """Remove the living sections with labels outside [least, greatest]; return a mask of them and their number."""
+    def keep_labels(self, minimum: Floats, maximum: Floats, active: Flags) -> tuple[Flags, int]:
+        """Remove the living sections with labels outside [minimum, maximum]; return a mask of them and their number."""
         removed = np.zeros(self.labels.shape, dtype=bool)
-        return removed, section_passes.keep_labels_all(active, least, greatest, self.sections, removed)
+        return removed, section_passes.keep_labels_all(active, minimum, maximum, self.sections, removed)
 
     def widest(self, elapsed: int, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
         """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`.

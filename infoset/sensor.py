@@ -43,15 +43,15 @@ class Apart:
     Parameters
     ----------
     offset_m, predicted_miss_m : ndarray, shape (axes, n)
-        Greatest differences of their positions z and of their predicted misses z + V x/e along each lateral axis, m.
+        Maximum differences of their positions z and of their predicted misses z + V x/e along each lateral axis, m.
     shift_m : ndarray, shape (n,)
-        Greatest difference of their ranges x, m.
+        Maximum difference of their ranges x, m.
     range_m, farthest_m : ndarray, shape (n,)
-        Their least range x and greatest distance, m.
+        Their minimum range x and maximum distance, m.
     slope : ndarray, shape (n,)
-        Greatest distance from the x axis, and greatest change of it until x = 0, of both, as a share of x.
+        Maximum distance from the x axis, and maximum change of it until x = 0, of both, as a share of x.
     closing_speed_m_s : ndarray, shape (n,)
-        Their greatest closing speed e.
+        Their maximum closing speed e.
     """
 
     offset_m: Floats
@@ -105,7 +105,7 @@ class Sensor(ABC):
 
     @abstractmethod
     def bound(self, sight: Geometry) -> Floats | float:
-        """Return the greatest size of the error, in the unit of the quantity, broadcast against the true value."""
+        """Return the maximum size of the error, in the unit of the quantity, broadcast against the true value."""
 
     @abstractmethod
     def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
@@ -148,7 +148,7 @@ class Sensor(ABC):
         return None
 
     def share(self, apart: Apart) -> Floats:
-        """Return half of the greatest difference of the measured values of two motions, in units of the bound.
+        """Return half of the maximum difference of the measured values of two motions, in units of the bound.
 
         Shape (n,). Both can have the same measured value where it is at most 1. This default is that of `band`, which
         neglects the square of the slope.

@@ -71,7 +71,7 @@ class AngleSensor(Sensor):
         A number makes the sensor a camera, in place of the three values above. Its bound at the distance d is
         pixel_error_rad + centroid_error_m / d, the same for both axes.
     centroid_error_m : float
-        Greatest distance between the point of the body that a camera measures and its centre, m.
+        Maximum distance between the point of the body that a camera measures and its centre, m.
     error_at_nominal_range_y_rad, error_at_zero_range_y_rad : float or None
         The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For space only.
     error_shape : ErrorShape or None
@@ -212,7 +212,7 @@ class AngleSensor(Sensor):
         return (self.error_at_nominal_range_rad - self.constant_error_rad) / self.nominal_range_m
 
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
-        """Return the greatest size of the error at a range (m), rad.
+        """Return the maximum size of the error at a range (m), rad.
 
         The bound of a camera does not increase at distances below its centroid error, where c/d is greater than 1 rad.
         """
@@ -223,7 +223,7 @@ class AngleSensor(Sensor):
         return bound
 
     def error_bounds(self, range_m: Floats) -> Floats:
-        """Return the greatest size of the error of each angle, rad, at ranges (m) of shape (..., B).
+        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B).
 
         Returns
         -------
@@ -334,7 +334,7 @@ class AngleSensor(Sensor):
         return False, errors * self.error_bound(range_m) * range_m
 
     def share(self, apart: Apart) -> Floats:
-        """Return half of the greatest difference of the angles, in units of the bound, shape (n,).
+        """Return half of the maximum difference of the angles, in units of the bound, shape (n,).
 
         An angle changes by at most as much as z/x. The elevation of a gimbal also depends on the azimuth, by the
         product of the two slopes, which is at most half of `slope` squared. The bound may fall with the distance, which
@@ -358,14 +358,14 @@ def _direction(alpha_rad: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class RangeSensor(Checked, Sensor):
-    """A range meter with a bounded relative error.
+    """A range sensor with a bounded relative error.
 
     Parameters
     ----------
     period_s : float
         Time between measurements, s; the first is at t = 0.
     relative_error : float
-        Greatest |d_m - d| / d, in (0, 1).
+        Maximum |d_m - d| / d, in (0, 1).
 
     Raises
     ------
@@ -398,7 +398,7 @@ class RangeSensor(Checked, Sensor):
         sets.measure_range(measured[self.name], self.relative_error, where, alpha_rad=measured.get(AngleSensor.name))
 
     def share(self, apart: Apart) -> Floats:
-        """Return half of the greatest difference of the distances, in units of the bound, shape (n,)."""
+        """Return half of the maximum difference of the distances, in units of the bound, shape (n,)."""
         difference_m = apart.slope * np.hypot.reduce(apart.offset_m) + apart.shift_m
         return np.asarray(difference_m / (2.0 * self.relative_error * apart.range_m))
 
@@ -420,7 +420,7 @@ class RateSensor(Checked, Sensor):
     period_s : float
         Time between measurements, s; the first is at t = 0.
     error_rad_s : float
-        Greatest |omega_m - omega|, rad/s.
+        Maximum |omega_m - omega|, rad/s.
 
     Raises
     ------
@@ -456,7 +456,7 @@ class RateSensor(Checked, Sensor):
         return True, errors * self.error_rad_s * range_m * range_m / closing_speed_m_s
 
     def share(self, apart: Apart) -> Floats:
-        """Return half of the greatest difference of the rates, in units of the bound, shape (n,).
+        """Return half of the maximum difference of the rates, in units of the bound, shape (n,).
 
         The rate is the derivative of z/x times cos^2(alpha), which depends on z.
         """

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 MaskedFloats = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
 MaskedIntegers = np.ma.MaskedArray[tuple[int], np.dtype[np.int64]]
 
-LEAST_RANGE_M = 1e-25
-"""Least range of a section that can be mapped to (omega, alpha): e/x^2 is within `LARGEST` up to the speed of light."""
+MIN_RANGE_M = 1e-25
+"""Minimum range of a section mapped to (omega, alpha): e/x^2 is within `MAXIMUM` up to the speed of light."""
 
 
 @dataclass(frozen=True)
@@ -70,14 +70,14 @@ def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: f
     polygon : ConvexPolygons
         Polygons of (V, z), m/s and m.
     range_m, closing_speed_m_s : float
-        Range x, m, at least `LEAST_RANGE_M`, and closing speed e, m/s.
+        Range x, m, at least `MIN_RANGE_M`, and closing speed e, m/s.
 
     Returns
     -------
     ConvexPolygons
         omega = (V + e z/x)/x in rad/s, alpha = z/x in rad.
     """
-    Limits(least=LEAST_RANGE_M).need("range_m", range_m)
+    Limits(minimum=MIN_RANGE_M).need("range_m", range_m)
     POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     x, e = range_m, closing_speed_m_s
     return polygon.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
@@ -174,25 +174,25 @@ class SetQueries:
         return np.asarray(np.count_nonzero(self._state.stack.living, axis=1))
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Return the least and the greatest range of the living sections, m; zeros where none lives."""
+        """Return the minimum and the maximum range of the living sections, m; zeros where none lives."""
         ranges, living = self.ranges_m, self.living
         tracked, rows = living.any(axis=1), np.arange(len(ranges))
         # The labels increase with the slot.
-        least = ranges[rows, living.argmax(axis=1)]
-        greatest = ranges[rows, -1 - living[:, ::-1].argmax(axis=1)]
-        return np.where(tracked, least, 0.0), np.where(tracked, greatest, 0.0)
+        minimum = ranges[rows, living.argmax(axis=1)]
+        maximum = ranges[rows, -1 - living[:, ::-1].argmax(axis=1)]
+        return np.where(tracked, minimum, 0.0), np.where(tracked, maximum, 0.0)
 
-    def least_and_greatest_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return the least and the greatest line-of-sight angle of the living sections, and their ranges.
+    def min_and_max_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return the minimum and the maximum line-of-sight angle of the living sections, and their ranges.
 
         Returns
         -------
-        alpha_least, alpha_greatest, range_of_least, range_of_greatest : ndarray, shape (B,), in space (2, B)
+        alpha_min, alpha_max, range_of_min, range_of_max : ndarray, shape (B,), in space (2, B)
             rad and m; zeros where no section lives.
         """
         extremes = self._state.stack.extreme_angles(self._state.history.elapsed)
-        least, greatest, of_least, of_greatest = (self._by_axis(values) for values in extremes)
-        return least, greatest, of_least, of_greatest
+        minimum, maximum, of_min, of_max = (self._by_axis(values) for values in extremes)
+        return minimum, maximum, of_min, of_max
 
     def predicted_miss(self, pending: Sequence[tuple[float, Floats]] = ()) -> PredictedMiss:
         """Return the predicted-miss interval of each engagement and the states that reach its ends.
@@ -214,13 +214,13 @@ class SetQueries:
         return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))
 
     def worst_predicted_miss_m(self) -> Floats:
-        """Return the greatest |predicted miss| in each stored section, m, shape (B, S); zero for empty sections."""
+        """Return the maximum |predicted miss| in each stored section, m, shape (B, S); zero for empty sections."""
         summaries = self._state.stack.summaries[self._channels]
         worst = np.maximum(summaries[..., section_life.UPPER_MISS], -summaries[..., section_life.LOWER_MISS])
         return np.where(self.living, np.hypot.reduce(worst, axis=0), 0.0)
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
-        """Return the least and the greatest predicted miss of each section, m, each (B, S); zeros if it is empty."""
+        """Return the minimum and the maximum predicted miss of each section, m, each (B, S); zeros if it is empty."""
         summaries, living = self._by_axis(self._state.stack.summaries), self.living
         lower, upper = summaries[..., section_life.LOWER_MISS], summaries[..., section_life.UPPER_MISS]
         return np.where(living, lower, 0.0), np.where(living, upper, 0.0)
@@ -309,11 +309,11 @@ class SetQueries:
             raise IndexError(f"engagement must be less than {self.batch}, the number of engagements: got {engagement}")
 
     def living_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Return the least and the greatest range, m, that agree with the history, to rounding.
+        """Return the minimum and the maximum range, m, that agree with the history, to rounding.
 
         Returns
         -------
-        least, greatest : ndarray, shape (B,)
+        minimum, maximum : ndarray, shape (B,)
             m; zeros where no range agrees.
 
         Notes
@@ -341,12 +341,12 @@ class SetQueries:
             return f"<{head}: {self.batch} engagements, {states}>"
         if not self.tracking[0]:
             return f"<{head}: {self.status[0].name.lower()}>"
-        least, greatest = self.stored_range_interval_m()
+        minimum, maximum = self.stored_range_interval_m()
         miss = self.predicted_miss()
         ends = np.stack([miss.lower_m, miss.upper_m]).reshape(2, -1)[:, : len(self.axes)].T.tolist()
         named = ["predicted miss"] if len(ends) == 1 else [f"predicted miss along {axis}" for axis in self.axes]
         misses = ", ".join(f"{name} {low:.4g} to {high:.4g} m" for name, (low, high) in zip(named, ends, strict=True))
         return (
-            f"<{head}: {self.section_counts[0]} sections, range {least[0] / 1e3:.6g} to {greatest[0] / 1e3:.6g} km, "
+            f"<{head}: {self.section_counts[0]} sections, range {minimum[0] / 1e3:.6g} to {maximum[0] / 1e3:.6g} km, "
             f"{misses}>"
         )

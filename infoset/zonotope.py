@@ -44,10 +44,10 @@ class Zonotope:
     @classmethod
     def box(cls, lower: ArrayLike, upper: ArrayLike) -> Zonotope:
         """Return {x: lower <= x <= upper}; equal ends give a flat box."""
-        least, greatest = box_ends(lower, upper, "n")
-        centre = 0.5 * least + 0.5 * greatest
+        minimum, maximum = box_ends(lower, upper, "n")
+        centre = 0.5 * minimum + 0.5 * maximum
         # Rounding of the centre must not lose an end.
-        half = np.maximum(greatest - centre, centre - least)
+        half = np.maximum(maximum - centre, centre - minimum)
         return cls(centre, np.diag(half)[half > 0.0])
 
     @property

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 _LONGEST = 70
-"""Greatest number of characters of a value; NumPy breaks longer arrays into lines."""
+"""Maximum number of characters of a value; NumPy breaks longer arrays into lines."""
 
 
 def short_repr(self: Any) -> str:

@@ -21,13 +21,13 @@ from rendezvous.relative_motion import ClohessyWiltshire
 CONTACT = 1e-12
 """A gap is contact if it is at most this share of the lengths that it is the difference of."""
 
-_LEAST_STEP = 1e-14
-_MOST_STEPS, _MOST_CLOSING_STEPS = 200_000, 50
+_MIN_STEP = 1e-14
+_MAX_STEPS, _MAX_CLOSING_STEPS = 200_000, 50
 _BEYOND_DRY = 1e-12
-_MOST_NEWTON, _OPTIMAL = 60, 1e-11
+_MAX_NEWTON, _OPTIMAL = 60, 1e-11
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _GRADES = 0.25 ** np.arange(11)
-_GREATEST_VELOCITY_GAIN = math.sqrt(50.0)
+_MAX_VELOCITY_GAIN = math.sqrt(50.0)
 """Bound of |Phi_vv| in Hill's equations: in plane its Frobenius norm squared is 9 c^2 - 24 c + 17, c = cos nt."""
 
 
@@ -99,7 +99,7 @@ class LinearCapture:
 
     Notes
     -----
-    The gap is the greatest distance that the evader can keep at a time. The search begins at t = 0. Value, slope and a
+    The gap is the maximum distance that the evader can keep at a time. The search begins at t = 0. Value, slope and a
     bound of the curvature give a lower bound of the gap; a step ends before that bound is zero, so that no contact is
     missed, however short. The tolerance is `CONTACT` times the lengths in the gap: distance and travels. A gap above
     twice the tolerance is no contact. A contact is grazing if the gap, extrapolated at its rate, does not fall below
@@ -128,7 +128,7 @@ def free_space_capture(
 ) -> LinearCapture | None:
     """Solve the game of two constant accelerations without gravity; None if the evader escapes.
 
-    Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the accelerations are the greatest
+    Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the accelerations are the maximum
     values. The evader escapes if its acceleration is not the smaller one and the players are not on a collision course.
 
     The first root of |r + v t| = (a_P - a_E) t^2 / 2; nu is along r + v t.
@@ -200,11 +200,11 @@ def circular_orbit_capture(
     """Solve the game of two constant accelerations about a circular orbit (Hill's frame); None if there is no capture.
 
     Position and velocity, shapes (3,), are the evader's, relative to the pursuer: radial, along the motion, normal. The
-    accelerations are the greatest ones, the rate is the mean motion. The search ends at `longest_s`, by default after
+    accelerations are the maximum ones, the rate is the mean motion. The search ends at `longest_s`, by default after
     50 revolutions; there is no capture if the evader's acceleration is not the smaller one.
 
     The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt, a concave
-    function of nu with one maximum: the evader's greatest distance at T, as both reachable sets have the same shape.
+    function of nu with one maximum: the evader's maximum distance at T, as both reachable sets have the same shape.
     With nu fixed it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
 
     Raises
@@ -212,7 +212,7 @@ def circular_orbit_capture(
     ValueError
         If position or velocity are not three finite numbers, the position is zero, or the mean motion is not positive.
     LinearGameError
-        If the greatest distance is not computed to its tolerance.
+        If the maximum distance is not computed to its tolerance.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     if not rate_rad_s > 0.0:
@@ -222,8 +222,8 @@ def circular_orbit_capture(
         return None
     end = 100.0 * np.pi / rate_rad_s if longest_s is None else longest_s
     distance = _HillDistance(np.concatenate([position, velocity]), advantage, rate_rad_s, end)
-    greatest = distance.greatest_bend()
-    return _first_contact(distance, lambda _from, _to: greatest, end)
+    maximum = distance.max_bend()
+    return _first_contact(distance, lambda _from, _to: maximum, end)
 
 
 class _HillDistance:
@@ -240,11 +240,11 @@ class _HillDistance:
         self._effects, self._weights = self._nodes(low, high)
         self._nu = _unit(state[:3])
 
-    def greatest_bend(self) -> float:
+    def max_bend(self) -> float:
         """Bound |x''| + a |Phi_vv|: relative accelerations in Hill's frame are an ellipse and an oscillation."""
         (x, _, z, vx, vy, vz), n = self._state, self._rate
         in_plane, normal = math.hypot(3.0 * n * n * x + 2.0 * n * vy, n * vx), math.hypot(n * n * z, n * vz)
-        return math.hypot(2.0 * in_plane, normal) + self._advantage * _GREATEST_VELOCITY_GAIN
+        return math.hypot(2.0 * in_plane, normal) + self._advantage * _MAX_VELOCITY_GAIN
 
     def _nodes(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
         half = 0.5 * (high - low)
@@ -253,7 +253,7 @@ class _HillDistance:
         return effects, self._advantage * (half[:, None] * _WEIGHTS).ravel()
 
     def __call__(self, time_s: float) -> _Gap:
-        """Return the greatest of nu . x - a int |M^T nu| over the unit sphere."""
+        """Return the maximum of nu . x - a int |M^T nu| over the unit sphere."""
         x = self._motion.transition(0.0, time_s) @ self._state
         if time_s == 0.0:
             length = float(np.linalg.norm(x[:3]))
@@ -273,7 +273,7 @@ class _HillDistance:
     def _maximised(self, there: Floats, effects: Floats, weights: Floats, tolerance: float) -> Floats:
         nu = self._nu
         products = (effects @ effects.transpose(0, 2, 1)).reshape(-1, 9)
-        for _ in range(_MOST_NEWTON):
+        for _ in range(_MAX_NEWTON):
             along, size = _along(nu, effects)
             now = float(nu @ there - weights @ size)
             shares = weights / size
@@ -298,7 +298,7 @@ class _HillDistance:
                 break
             nu = trial
         raise LinearGameError(
-            "the evader's greatest distance was not found to its tolerance: check the units of state and accelerations"
+            "the evader's maximum distance was not found to its tolerance: check the units of state and accelerations"
         )
 
 
@@ -330,7 +330,7 @@ def _first_contact(
     `dry` at which a craft has burnt its mass, where the bend is infinite.
     """
     t, window = 0.0, math.inf
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         here = gap(t)
         if here.value <= 2.0 * CONTACT * here.lengths:
             return _contact(gap, bend, t, here, end)
@@ -339,7 +339,7 @@ def _first_contact(
         window = min(window, end - t, 0.5 * (dry - t))
         # Below the value by the tolerance, so that a grazing contact is not stepped over.
         step = min(window, _safe_step(here.value - CONTACT * here.lengths, here.rate, bend(t, t + window)))
-        t, window = min(end, t + max(step, _LEAST_STEP * t)), 2.0 * step
+        t, window = min(end, t + max(step, _MIN_STEP * t)), 2.0 * step
     raise LinearGameError("the gap is nearly zero for so long that the first contact cannot be determined")
 
 
@@ -349,12 +349,12 @@ def _contact(
     """Compute the zero from a time at which the gap is within its tolerance, and whether the contact is grazing."""
     contact_s, at_contact = t, here
     most = 2.0 * CONTACT * here.lengths
-    for _ in range(_MOST_CLOSING_STEPS):
+    for _ in range(_MAX_CLOSING_STEPS):
         if here.value <= 0.0 or here.value > most or t >= end:
             break
         step = _safe_step(here.value, here.rate, max(bend(t, t), 0.0))
         before, value = t, here.value
-        t = min(end, t + max(step, _LEAST_STEP * t))
+        t = min(end, t + max(step, _MIN_STEP * t))
         here = gap(t)
         if here.value <= 0.0:
             contact_s, at_contact = before + (t - before) * value / (value - here.value), here

@@ -1,4 +1,4 @@
-"""Smooth functions of time as polynomials on panels, refined until they are resolved; the greatest control."""
+"""Smooth functions of time as polynomials on panels, refined until they are resolved; the maximum control."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RESOLVED = 1e-11
 ROUNDING = 1e-7
 _AT_ONCE = 2048
 TOLERANCE = 1e-11
-_MOST_HALVINGS = 40
+_MAX_HALVINGS = 40
 
 
 def chebyshev_points(count: int) -> Floats:
@@ -52,7 +52,7 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> tuple[Flo
     panels; the functions may jump there and are not evaluated there. Returns half the lengths of the panels, s, and the
     coefficients, shape (P, 12, m), of Chebyshev polynomials of the position in the panel, -1 to 1.
 
-    A panel is halved until the last two coefficients are below 1e-11 of the greatest value on all panels, or below 1e-7
+    A panel is halved until the last two coefficients are below 1e-11 of the maximum value on all panels, or below 1e-7
     of it and no longer decreasing (rounding), or below the effect of the rounding of times. Sinusoids on panels of one
     radian have an error below 1e-13 at once: the remainder of the interpolation is at most (1/2)^12 / (2^11 12!) =
     2.5e-16 of their amplitude. Raise `ValueError` if a value is not finite, or no break is later than another.
@@ -95,8 +95,8 @@ def _fitted(function: Callable[[Floats], Floats], starts: Floats, ends: Floats) 
     return np.concatenate(parts)
 
 
-def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
-    """Return the greatest |u| of a control, m/s^2, to 1e-9, relative.
+def max_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
+    """Return the maximum |u| of a control, m/s^2, to 1e-9, relative.
 
     `control` returns u, shape (k, 3), m/s^2, at k times, s. It is smooth between `breaks_s`, which do not decrease, and
     its motion turns by about a radian at most between two of them (`LinearMotion.breaks`). Between short panels at late
@@ -106,18 +106,18 @@ def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> f
     On panels u is a polynomial of degree 11 to 1e-11 (`resolve`), |u|^2 one of degree 22. A polynomial p
     of degree d is bounded by its values at the zeros of the Chebyshev polynomial of degree M > d (Ehlich and Zeller,
     1964): max |p| <= max_j |p(x_j)| / cos(pi d / (2 M)). Applied to |u|^2 minus the middle of its samples, this bounds
-    each panel from above; panels that may contain the greatest are halved until bound and sample agree to 1e-11. No
+    each panel from above; panels that may contain the maximum are halved until bound and sample agree to 1e-11. No
     peak between samples is missed.
     """
     squares = (_FIT_SQUARES @ ((_AT_SQUARES @ resolve(control, breaks_s)[1]) ** 2).sum(axis=2)[..., None])[..., 0]
-    greatest = 0.0
-    for _ in range(_MOST_HALVINGS):
+    maximum = 0.0
+    for _ in range(_MAX_HALVINGS):
         values = squares @ _AT_SAMPLES.T
         top, bottom = values.max(axis=1), values.min(axis=1)
         bounds = 0.5 * (top + bottom) + 0.5 * _FACTOR * (top - bottom)
-        greatest = max(greatest, float(top.max()))
-        open_ = bounds > greatest * (1.0 + 2.0 * TOLERANCE)
+        maximum = max(maximum, float(top.max()))
+        open_ = bounds > maximum * (1.0 + 2.0 * TOLERANCE)
         if not open_.any():
             break
         squares = np.concatenate([squares[open_] @ half.T for half in _HALVES])
-    return float(np.sqrt(greatest))
+    return float(np.sqrt(maximum))

@@ -57,7 +57,7 @@ def semi_major_axis_m(position_m: Floats, velocity_m_s: Floats, gravitational_pa
 
 
 def perigee_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float) -> float:
-    """Return the least distance from the planet's centre on the osculating orbit, m; zero for a radial fall."""
+    """Return the minimum distance from the planet's centre on the osculating orbit, m; zero for a radial fall."""
     inward = float(position_m @ velocity_m_s)
     momentum_squared = float((position_m @ position_m) * (velocity_m_s @ velocity_m_s)) - inward * inward
     latus_rectum = max(0.0, momentum_squared) / gravitational_parameter_m3_s2

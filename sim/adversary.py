@@ -1,4 +1,4 @@
-"""Search for the start, the measurement errors and the target's accelerations with the greatest miss of a strategy.
+"""Search for the start, the measurement errors and the target's accelerations with the maximum miss of a strategy.
 
 A simulated miss is a lower bound of what the strategy can guarantee. It does not prove that no greater one exists.
 """
@@ -35,22 +35,22 @@ CHUNK = 50
 GENERATION = 100
 """Engagements between two selections."""
 ELITE = 24
-"""Number of plans with the greatest values so far that are changed further."""
+"""Number of plans with the maximum values so far that are changed further."""
 LINEAGE_SHARE = 6
-"""Greatest number of the elite that comes from one first plan in the first part of the search."""
+"""Maximum number of the elite that comes from one first plan in the first part of the search."""
 YOUNG_SHARE = 0.5
 """Share of the budget that is the first part of the search."""
 FIRST_SHARE = 0.25
 """Share of the budget for first plans."""
-MOST_ERRORS = 1e8
-"""Greatest number of errors in the first plans, of 8 bytes each."""
+MAX_ERRORS = 1e8
+"""Maximum number of errors in the first plans, of 8 bytes each."""
 
 
 class Objective(Enum):
     """What a search maximises: the value of an engagement."""
 
     ANY_STATE = "any-state"
-    """The greatest miss of a state that the set contained when control ended for its label (`sim.label_ends`).
+    """The maximum miss of a state that the set contained when control ended for its label (`sim.label_ends`).
 
     All these states agree with what was measured until then, so that the truth can be chosen among them afterwards. The
     sections contain at least all states that agree with the measurements. Where the set became empty, the miss of the
@@ -70,7 +70,7 @@ class BudgetError(ValueError):
 
 @dataclass(frozen=True)
 class WorstEngagement:
-    """The engagement with the greatest miss of a search.
+    """The engagement with the maximum miss of a search.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class WorstEngagement:
     objective : Objective
         What the search maximised.
     any_state_miss_m : float
-        Greatest miss of a state that the set contained when control ended for its label, m.
+        Maximum miss of a state that the set contained when control ended for its label, m.
     miss_m : float
         Miss of the simulated true state, m.
     truth_kept : bool
@@ -93,8 +93,8 @@ class WorstEngagement:
     accelerations_m_s2 : ndarray, shape (steps,), or None
         Accelerations of the target, m/s^2; shape (2, steps), along y and z, in space. None if the target is that of the
         scenario.
-    greatest_acceleration_m_s2 : mapping of str to float
-        Greatest acceleration of the searched targets by lateral axis, m/s^2; empty if the target is that of the
+    max_acceleration_m_s2 : mapping of str to float
+        Maximum acceleration of the searched targets by lateral axis, m/s^2; empty if the target is that of the
         scenario.
     construction : str
         Kind of the first plan from which the engagement was derived.
@@ -103,7 +103,7 @@ class WorstEngagement:
     lateral_miss_m : mapping of str to float
         Position at the closest approach by lateral axis, y and z, m; empty in a plane.
     history : tuple of (int, float)
-        Evaluations and greatest value so far, m, at each increase.
+        Evaluations and maximum value so far, m, at each increase.
     """
 
     scenario: Scenario
@@ -118,7 +118,7 @@ class WorstEngagement:
     velocity_m_s: Floats
     errors: Mapping[str, Floats]
     accelerations_m_s2: Floats | None
-    greatest_acceleration_m_s2: Mapping[str, float]
+    max_acceleration_m_s2: Mapping[str, float]
     construction: str
     changes: int
     evaluations: int
@@ -168,7 +168,7 @@ def find_worst(
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> WorstEngagement:
-    """Search possible starts, errors within their bounds, and accelerations of the target, for the greatest miss.
+    """Search possible starts, errors within their bounds, and accelerations of the target, for the maximum miss.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def find_worst(
     A quarter of the budget is for first plans: game noise with its four tie rules and, before a cut-off or
     scheduled impulses, its shift; noise that keeps the upper or the lower extreme in a random or blockwise order,
     constant and extremal errors, and errors that show the middle between the true motion and one with the same
-    measurements. The plans with the greatest misses are then changed, by a few steps, blocks, switching times or
+    measurements. The plans with the maximum misses are then changed, by a few steps, blocks, switching times or
     coordinates of the start, and compete with their changes. In the first part of the search, the number of plans
     from one first plan is limited. In space, both axes have errors of their own, and a change of the angle errors
     is along one axis or both.
@@ -251,9 +251,9 @@ class _Search:
         self._elite: Flown | None = None
 
     def check_memory(self, budget: int) -> None:
-        """Raise BudgetError if the first plans of a budget have more than `MOST_ERRORS` errors."""
+        """Raise BudgetError if the first plans of a budget have more than `MAX_ERRORS` errors."""
         space = self._space
-        most = int(MOST_ERRORS / (FIRST_SHARE * (len(space.names) + 1) * space.axes * space.steps))
+        most = int(MAX_ERRORS / (FIRST_SHARE * (len(space.names) + 1) * space.axes * space.steps))
         if budget > most:
             raise BudgetError(
                 f"budget must be at most {most} for flights of {space.steps} steps, because the search keeps its first "
@@ -287,9 +287,9 @@ class _Search:
             name: by_axis(elite.errors[:1, row], self.scenario.sensors.get(name))[..., 0, :]
             for row, name in enumerate(self._space.names)
         }
-        greatest: dict[str, float] = {}
+        maximum: dict[str, float] = {}
         if self._space.has_accelerations:
-            greatest = dict(zip(self.scenario.set_model.axes, self._space.acceleration_m_s2.tolist(), strict=True))
+            maximum = dict(zip(self.scenario.set_model.axes, self._space.acceleration_m_s2.tolist(), strict=True))
         return WorstEngagement(
             scenario=replace(self.scenario, dispersion=StateBox(**ends)),
             seed=self._seed,
@@ -302,8 +302,8 @@ class _Search:
             position_m=position_m,
             velocity_m_s=velocity_m_s,
             errors=errors,
-            accelerations_m_s2=by_axis(elite.accelerations_m_s2[:1])[..., 0, :] if greatest else None,
-            greatest_acceleration_m_s2=greatest,
+            accelerations_m_s2=by_axis(elite.accelerations_m_s2[:1])[..., 0, :] if maximum else None,
+            max_acceleration_m_s2=maximum,
             construction=self._first_plans.constructions[int(elite.plans.lineage[0])],
             changes=int(elite.plans.changes[0]),
             evaluations=self.evaluations,
@@ -368,9 +368,9 @@ class _Search:
             if len(kept) == ELITE:
                 break
         self._elite = rivals.take(np.array(kept))
-        greatest = float(self._elite.value[0])
-        if np.isfinite(greatest) and (not self.history or greatest > self.history[-1][1]):
-            self.history.append((self.evaluations, greatest))
+        maximum = float(self._elite.value[0])
+        if np.isfinite(maximum) and (not self.history or maximum > self.history[-1][1]):
+            self.history.append((self.evaluations, maximum))
 
 
 def state_names(scenario: Scenario) -> list[str]:

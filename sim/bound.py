@@ -29,7 +29,7 @@ class LowerBound:
     by_label : tuple of TruthPair
         Best pairs of all examined labels, in ascending order, for each velocity along x.
     disturbance_m_s2 : float
-        Greatest acceleration of the true motion along z, m/s^2; `SetModel` contains that along y.
+        Maximum acceleration of the true motion along z, m/s^2; `SetModel` contains that along y.
     """
 
     pairs: tuple[TruthPair, ...]
@@ -63,12 +63,12 @@ class LowerBound:
 
 
 def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None = None) -> LowerBound:
-    """Find the greatest miss below which no strategy can guarantee to stay.
+    """Find the maximum miss below which no strategy can guarantee to stay.
 
     Parameters
     ----------
     scenario : Scenario
-        A range meter has no effect unless it is very precise, because the two motions have the same range x.
+        A range sensor has no effect unless it is very precise, because the two motions have the same range x.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
 
@@ -89,9 +89,9 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     Later impulses may differ, and each changes z at x = 0 by at most mu2 x_j / |V_x|. The distance of the two along z
     at x = 0 is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two has at least half of it.
     The sum uses the earliest impulses that the budget allows, because they change z most. One motion alone has at least
-    |z(T)| less the sum over all impulses; the start of that motion is the corner of the box with the greatest |z(T)|.
-    The miss is the least distance of the flight, which is shorter than the distance at x = 0 by at most the factor
-    |V_x| / |(V_x, W)|, with the greatest velocity W across x. The linear programs neglect the square of the slope of
+    |z(T)| less the sum over all impulses; the start of that motion is the corner of the box with the maximum |z(T)|.
+    The miss is the minimum distance of the flight, which is shorter than the distance at x = 0 by at most the factor
+    |V_x| / |(V_x, W)|, with the maximum velocity W across x. The linear programs neglect the square of the slope of
     the line of sight; the difference that they find is reduced until all measurements can be the same.
     docs/guarantee.md has the proof.
 
@@ -154,7 +154,7 @@ def label_grid(scenario: Scenario, vx_m_s: float) -> Floats:
 
 
 def pair_at(scenario: Scenario, label_m: float, vx_m_s: float, *, last_common_step: int | None = None) -> TruthPair:
-    """Find the pair of motions, or the single one, with the greatest bound for x = label and V_x = vx at t = 0.
+    """Find the pair of motions, or the single one, with the maximum bound for x = label and V_x = vx at t = 0.
 
     `last_common_step` is the last step of a pair with the same measurements; None searches for the best one and
     considers single motions.

@@ -35,7 +35,7 @@ from sim.undecided_cells import UndecidedCells
 from sim.versions import calculating_versions
 
 FEWEST_A_SHARD = 50
-"""Least number of engagements per shard of a sweep."""
+"""Minimum number of engagements per shard of a sweep."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Campaign:
     Parameters
     ----------
     runs : int
-        Number of runs, from run 0; with `until` the greatest number.
+        Number of runs, from run 0; with `until` the maximum number.
     seed : int
         Run K is the same engagement in every campaign and experiment with this seed.
     noise : CampaignNoise or None
@@ -128,8 +128,8 @@ class Campaign:
         Keys and values that a sweep varies, as in a scenario file; stored as a description.
     cells : tuple of Scenario
         Scenarios of a sweep, one for each combination of the values; the last axis varies fastest.
-    most_runs : int or None
-        Greatest number of runs of a cell with a requirement in `until`; `runs` is then the least. None is `runs`.
+    max_runs : int or None
+        Maximum number of runs of a cell with a requirement in `until`; `runs` is then the minimum. None is `runs`.
     require : Requirement, HitRequirement or None
         Requirement of a sweep for its reports; stored as a description. None is that of `until`.
 
@@ -151,7 +151,7 @@ class Campaign:
     until: StoppingRule | AnyRequirement | None = None
     axes: tuple[Axis, ...] = ()
     cells: tuple[Scenario, ...] = ()
-    most_runs: int | None = None
+    max_runs: int | None = None
     require: AnyRequirement | None = None
 
     def __post_init__(self) -> None:
@@ -165,8 +165,8 @@ class Campaign:
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
         if self.until is not None and isinstance(self.until, AnyRequirement) != bool(self.axes):
             raise ValueError("until must be a stopping rule of a campaign, or a requirement of a sweep")
-        if self.most_runs is not None:
-            Limits(least=self.runs, whole=True).need("most_runs", self.most_runs)
+        if self.max_runs is not None:
+            Limits(minimum=self.runs, whole=True).need("max_runs", self.max_runs)
 
     def run(
         self,
@@ -218,7 +218,7 @@ class Campaign:
         hashes = ",".join(fingerprint(noise.applied_to(cell)) for cell in self.cells)
         return Manifest(
             scenario=noise.applied_to(self.scenario),
-            runs=self.greatest_runs,
+            runs=self.cell_runs,
             chunk=self.chunk or (self._default_chunk() if stored is None else stored.chunk),
             seed=self.seed,
             noise=noise,
@@ -245,12 +245,12 @@ class Campaign:
     @property
     def engagements(self) -> int:
         """Engagements of all cells, at most."""
-        return self.greatest_runs * max(1, len(self.cells))
+        return self.cell_runs * max(1, len(self.cells))
 
     @property
-    def greatest_runs(self) -> int:
-        """Greatest number of runs of a cell."""
-        return self.runs if self.most_runs is None else self.most_runs
+    def cell_runs(self) -> int:
+        """Maximum number of runs of a cell."""
+        return self.runs if self.max_runs is None else self.max_runs
 
     @property
     def _noise(self) -> CampaignNoise:
@@ -269,7 +269,7 @@ class Campaign:
 
     def _default_chunk(self) -> int:
         """Return the engagements per shard; small for cells with few runs, because they may be extended later."""
-        size = chunk_size(self.greatest_runs)
+        size = chunk_size(self.cell_runs)
         return min(size, max(self.runs, FEWEST_A_SHARD)) if self.axes else size
 
     def _fly_missing(
@@ -346,7 +346,7 @@ class Sweep(Campaign):
         As for `Campaign`; at least one.
     runs : int
         Engagements per cell.
-    cells, folder, seed, noise, guarantee, chunk, strategy, until, most_runs, require
+    cells, folder, seed, noise, guarantee, chunk, strategy, until, max_runs, require
         As for `Campaign`; the guaranteed miss is not computed by default.
 
     Raises
@@ -368,11 +368,11 @@ class Sweep(Campaign):
         chunk: int | None = None,
         strategy: Strategy | None = None,
         until: AnyRequirement | None = None,
-        most_runs: int | None = None,
+        max_runs: int | None = None,
         require: AnyRequirement | None = None,
     ) -> None:
         if not axes:
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
         super().__init__(
-            scenario, runs, folder, seed, noise, strategy, guarantee, chunk, until, axes, cells, most_runs, require
+            scenario, runs, folder, seed, noise, strategy, guarantee, chunk, until, axes, cells, max_runs, require
         )

@@ -16,7 +16,7 @@ from sim.simulate import ENGAGEMENTS_AT_ONCE, simulate
 from sim.versions import VersionError, calculating_versions, differences
 
 FEWEST_CHUNKS = 256
-LARGEST_CHUNK = 4096
+MAX_CHUNK = 4096
 
 
 class CampaignNoise(Enum):
@@ -92,4 +92,4 @@ def chunk_size(runs: int) -> int:
     Small chunks limit the work that is lost if a process stops. Large chunks limit the number of files.
     """
     batches = -(-runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
-    return max(1, min(batches, LARGEST_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE
+    return max(1, min(batches, MAX_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE

@@ -24,9 +24,9 @@ def possible_miss_m(
     disturbance_m_s2: float = 0.0,
     constant_bias: bool = False,
 ) -> FloatOrFloats:
-    """Return half the greatest width of the interval of misses along one axis that images leave possible, m.
+    """Return half the maximum width of the interval of misses along one axis that images leave possible, m.
 
-    It is also the greatest miss after an impulse that centres this interval exactly.
+    It is also the maximum miss after an impulse that centres this interval exactly.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def possible_miss_m(
     Let 2 d be the difference of two motions with the same images, and u the time before the last image. Then |d| is at
     most b0 + p e u, with the bound b0 = p e t_c + c of the last image, and the second derivative of d at most nu. From
     d = b0 at the last image and a slope s/2 there, d is at most b0 - s u / 2 + nu u^2 / 2 before it, which must not be
-    below -b0 - p e u. So s is at most 4 b0 / u + 2 p e + nu u at each image. The least value of this is at
+    below -b0 - p e u. So s is at most 4 b0 / u + 2 p e + nu u at each image. The minimum value of this is at
     u = 2 sqrt(b0 / nu), or at the first image, u = t_f - t_c, if that is later; and the miss is
     M = b0 + s t_c / 2 + nu t_c^2 / 2:
 
@@ -79,7 +79,7 @@ def _images_s(scenario: Scenario) -> list[float]:
     """Return the times before the nominal arrival of the images until the last decision of an impulse, s."""
     model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
     steps = scenario.impulse_steps
-    end_s = arrival_s - model.least_range_m / model.closing_speed_m_s
+    end_s = arrival_s - model.min_range_m / model.closing_speed_m_s
     last_step = int(end_s / model.step_s) if steps is None else int(max(steps))
     camera = model.angle_sensor
     before_s = (
@@ -109,8 +109,8 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     this difference be 2 b0 at the last image before the last decision, and 2 b0 - s u + nu u^2 at the time u before it:
     the disturbance nu accelerates the motions apart. It is at least -2 b at all images if s is at most
     (2 b0 + 2 b)/u + nu u, and its speed is possible at t = 0 if s is at most 2 w + 2 nu t, with the half-width w of the
-    speeds of the initial set and the time t of the last image. With the greatest s the misses differ most; before its
-    least value, at u = s/(2 nu), the difference is constant. If one of the motions is the true one, images in the
+    speeds of the initial set and the time t of the last image. With the maximum s the misses differ most; before its
+    minimum value, at u = s/(2 nu), the difference is constant. If one of the motions is the true one, images in the
     middle of both are shifted by half the difference.
     """
     model = scenario.set_model
@@ -127,10 +127,10 @@ def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) ->
     """Return `worst_shift_m` in the planar model of one axis, for images at these times before the arrival, s."""
     range_m = before_s * model.closing_speed_m_s
     bound_m, last_s = model.angle_sensor.error_bound(range_m) * range_m, before_s[-1]
-    earlier_s, disturbance, (least, greatest) = before_s[:-1] - last_s, model.disturbance_m_s2, model.bounds.vz_m_s
+    earlier_s, disturbance, (minimum, maximum) = before_s[:-1] - last_s, model.disturbance_m_s2, model.bounds.vz_m_s
     speed_m_s = min(
         np.min(2.0 * (bound_m[-1] + bound_m[:-1]) / earlier_s + disturbance * earlier_s),
-        greatest - least + 2.0 * disturbance * (arrival_s - last_s),
+        maximum - minimum + 2.0 * disturbance * (arrival_s - last_s),
     )
     times_s = arrival_s - last_s - model.step_s * np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
     times_s = np.clip(times_s, 0.0, 0.5 * speed_m_s / disturbance if disturbance else None)

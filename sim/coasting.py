@@ -17,8 +17,8 @@ LONGEST_FLIGHT = 3.0
 """Time, in units of range by closing speed, after which a motion counts as one that does not arrive."""
 
 
-LEAST_RANGE = 1e-9
-"""Least range of a step as a share of the first; at a range of zero there is no angle."""
+MIN_RANGE = 1e-9
+"""Minimum range of a step as a share of the first; at a range of zero there is no angle."""
 
 
 class NoArrivalError(ValueError):
@@ -43,7 +43,7 @@ class Coasting:
     pushed : ndarray, shape (n, 2 C, C - 1)
         Integral of Phi^-1 over time for a unit acceleration along each lateral axis.
     nearest_m, speed_m_s : float
-        Least distance of the segment between spacecraft and object from the Sun, and greatest velocity of the two
+        Minimum distance of the segment between spacecraft and object from the Sun, and maximum velocity of the two
         relative to it, at these times; infinite and zero in free space.
     """
 
@@ -68,7 +68,7 @@ class Coasting:
     def range_m(self) -> Floats:
         """Range x at the steps, m, shape (n - 1,)."""
         ranges_m = self.states[self.axes - 1]
-        return np.asarray(np.maximum(ranges_m[:-1], LEAST_RANGE * ranges_m[0]))
+        return np.asarray(np.maximum(ranges_m[:-1], MIN_RANGE * ranges_m[0]))
 
     @property
     def closing_speed_m_s(self) -> Floats:

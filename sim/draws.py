@@ -11,7 +11,7 @@ import numpy as np
 from guidance import NoiseKind, TieRule
 from infoset import AngleSensor, Bias, StateBox
 from infoset.arrays import Floats
-from sim.gravity import greatest_impulses_m_s, with_gravity
+from sim.gravity import max_impulses_m_s, with_gravity
 from sim.scenario import Scenario
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
@@ -61,7 +61,7 @@ class Draws:
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     """Return the random numbers of some runs; run k has the same numbers in every call with the same seed."""
-    steps = greatest_number_of_steps(scenario)
+    steps = max_number_of_steps(scenario)
     lower, upper = corners(scenario.dispersion)
     starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
     if scenario.is_spatial:
@@ -123,7 +123,7 @@ def in_disc(errors: Floats) -> Floats:
 
 
 def corners(box: StateBox) -> tuple[Floats, Floats]:
-    """Return least and greatest (z, x, V_z, V_x) of a box, or (y, z, x, V_y, V_z, V_x) of one in space."""
+    """Return minimum and maximum (z, x, V_z, V_x) of a box, or (y, z, x, V_y, V_z, V_x) of one in space."""
     lateral = [box.axis(name) for name in box.axes]
     intervals = np.array(
         [*(axis.z_m for axis in lateral), box.x_m, *(axis.vz_m_s for axis in lateral), box.vx_m_s], dtype=np.float64
@@ -136,7 +136,7 @@ def generator(seed: int, run: int, stream: int) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy=seed, spawn_key=(run, stream))))
 
 
-def greatest_number_of_steps(scenario: Scenario) -> int:
+def max_number_of_steps(scenario: Scenario) -> int:
     """Return the number of steps after which every start of the dispersion has passed its closest approach.
 
     The time at the lowest closing speed is increased by the share of it that gravity can take away, at least by 1 %.
@@ -144,6 +144,6 @@ def greatest_number_of_steps(scenario: Scenario) -> int:
     box = scenario.dispersion
     slowest = -box.vx_m_s[1]
     model = scenario.set_model
-    model = with_gravity(model, scenario.sun, greatest_impulses_m_s(model, scenario.thruster))
+    model = with_gravity(model, scenario.sun, max_impulses_m_s(model, scenario.thruster))
     longer = max(1.01, 1.0 / (1.0 - min(model.gravity_speed_change, 0.75)))
     return math.ceil(longer * box.x_m[1] / (slowest * model.step_s)) + 2

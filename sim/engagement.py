@@ -38,7 +38,7 @@ from sim.truth_section import TruthSection
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-LEAST_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
+MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 Pending = tuple[tuple[float, Floats], ...]
 """Impulses that are decided and not given yet: times from now, s, and impulses, m/s."""
 
@@ -159,9 +159,9 @@ class Engagements:
         situation = self._situation(miss, measured, pending)
         wanted = decide(self._strategy, situation, self._states, tracking)
         wanted = np.where(tracking & situation.may_fire, wanted, 0.0)
-        spent = self._budget < thruster.least_impulse_m_s
+        spent = self._budget < thruster.min_impulse_m_s
         if spent.any():
-            self._spent |= spent & (modulus(wanted) >= thruster.least_impulse_m_s)
+            self._spent |= spent & (modulus(wanted) >= thruster.min_impulse_m_s)
         self._queue.append(thruster.give(wanted, self._budget))
         if self._theorem_8 is not None:
             self._theorem_8.decide(situation, wanted, self._queue[-1], tracking)
@@ -194,7 +194,7 @@ class Engagements:
         passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
         passing = self._flying & passage.passed
         if passing.any():
-            self._miss = np.where(passing, passage.least_distance_m, self._miss)
+            self._miss = np.where(passing, passage.min_distance_m, self._miss)
             self._lateral_miss = np.where(passing, passage.lateral_m, self._lateral_miss)
             self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
             self._flying &= ~passage.passed
@@ -340,13 +340,13 @@ class Engagements:
         if self._last_impulse_step is not None and self.step >= self._last_impulse_step:
             is_over = np.ones_like(self._tracking)
         else:
-            is_over = self._budget < max(self.scenario.thruster.least_impulse_m_s, LEAST_FLOAT)
+            is_over = self._budget < max(self.scenario.thruster.min_impulse_m_s, MIN_FLOAT)
         for queued in self._queue:
             is_over &= modulus(queued) == 0.0
         return is_over
 
     def any_state_miss_m(self, results: Results) -> Floats:
-        """Return the greatest miss of a state of the set, m, shape (B,): `LabelEnds.any_state_miss_m`."""
+        """Return the maximum miss of a state of the set, m, shape (B,): `LabelEnds.any_state_miss_m`."""
         return self._label_ends.any_state_miss_m(results)
 
     def _theorem_8_miss_m(self) -> MaskedFloats:
@@ -360,11 +360,11 @@ class Engagements:
         """Return the results so far, with these run numbers."""
         arrivals_s = self._arrivals_s()
         lost = self._information.inconsistent
-        margin = self._truth_section.least_margin_m(arrivals_s)
+        margin = self._truth_section.min_margin_m(arrivals_s)
         payoff, known = self._label_ends.published_m, self._label_ends.left
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()
-        # Without a closest approach within the greatest number of steps, the miss is the present range.
+        # Without a closest approach within the maximum number of steps, the miss is the present range.
         miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
         radius_m = self.scenario.radius_m
         start, lateral_miss = np.zeros((2, len(runs), 2))

@@ -25,7 +25,7 @@ class BoundError(RuntimeError):
 class PairProgram:
     """The linear programs of one lateral axis, with its sensors and the steps in which they measure.
 
-    `limits_m` is the greatest distance of the two along the axis at each step with the same measurements,
+    `limits_m` is the maximum distance of the two along the axis at each step with the same measurements,
     `miss_limits_m` that of their predicted misses w + V_w x/c; infinite where nothing is measured. The difference of
     the two follows the transition matrices of `motion`, without its small parts along the other axes.
     """

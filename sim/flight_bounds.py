@@ -17,7 +17,7 @@ INSTANTS = 500
 STRETCHES = (1.001, 1.02, 1.2, 4.0)
 """Lengths of the flight that are tried, in units of the longest one without gravity."""
 NEAREST_SHARE = 0.1
-"""Least share of the nominal distance from the attracting body that the deviations must leave."""
+"""Minimum share of the nominal distance from the attracting body that the deviations must leave."""
 INFLATION = 1.001
 """Factor between a trial and the deviations that follow from the one before."""
 TRIALS = 100
@@ -36,15 +36,15 @@ class FlightBounds:
     times_s : ndarray, shape (N,)
         Times since t = 0.
     nearest_m : ndarray, shape (N,)
-        Least distance of the segment between spacecraft and object from the attracting body, within half a step.
+        Minimum distance of the segment between spacecraft and object from the attracting body, within half a step.
     fastest_m_s : ndarray, shape (N,)
-        Greatest speed of a point of the segment relative to the attracting body.
+        Maximum speed of a point of the segment relative to the attracting body.
     distance_m, speed_m_s : ndarray, shape (N,)
-        Greatest modulus of the relative position and velocity.
+        Maximum modulus of the relative position and velocity.
     offset_m, velocity_m_s : ndarray, shape (axes, N)
-        Greatest modulus of each component of the relative position and velocity, x last.
+        Maximum modulus of each component of the relative position and velocity, x last.
     closing_speed_m_s : float
-        Least closing speed of the flight.
+        Minimum closing speed of the flight.
     """
 
     times_s: Floats
@@ -100,11 +100,11 @@ def flight_bounds(
     bounds : StateBox
         Possible starts.
     disturbances_m_s2 : tuple of float
-        Greatest acceleration of the object along each lateral axis.
+        Maximum acceleration of the object along each lateral axis.
     sun : Sun
         The attracting body.
     impulses_m_s : float
-        Greatest sum of the impulses' moduli.
+        Maximum sum of the impulses' moduli.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def flight_bounds(
     start = np.array([[*(box.z_m for box in boxes), bounds.x_m], [*(box.vz_m_s for box in boxes), bounds.vx_m_s]])
     middle, half = start.mean(axis=2), 0.5 * np.ptp(start, axis=2)
     half = np.concatenate([np.linalg.norm(half, axis=1, keepdims=True), half], axis=1)
-    # All impulses at once, along each axis: the deviations are greatest then.
+    # All impulses at once, along each axis: the deviations are maximum then.
     impulses = np.array([impulses_m_s, *(impulses_m_s for _ in boxes), 0.0])
     first = np.array([[np.zeros_like(half[0]), half[0]], [impulses, half[1]]])
     disturbance = np.array([np.zeros_like(half[0]), [np.linalg.norm(disturbances_m_s2), *disturbances_m_s2, 0.0]])
@@ -143,10 +143,10 @@ def _nominal(middle: Floats, sun: Sun, times_s: Floats) -> _Motion:
 def _deviation(first: Floats, disturbance_m_s2: Floats, nominal: _Motion, times_s: Floats, sun: Sun) -> _Motion:
     """Return bounds of all deviations from the nominal motion.
 
-    A deviation d satisfies |d_i''| <= (K/R^3) (1.5 |d| + 0.5 |d_i|) + disturbance along axis i, with the least distance
-    R from the attracting body that the deviation allows for, and its modulus the same with |d| in place of |d_i|. The
-    right side increases with both. A function that is not less than the double integral of the right side for it is
-    therefore a bound of all deviations.
+    A deviation d satisfies |d_i''| <= (K/R^3) (1.5 |d| + 0.5 |d_i|) + disturbance along axis i, with the minimum
+    distance R from the attracting body that the deviation allows for, and its modulus the same with |d| in place of
+    |d_i|. The right side increases with both. A function that is not less than the double integral of the right side
+    for it is therefore a bound of all deviations.
     """
     step_s, far_m = times_s[1], np.linalg.norm(nominal.place_m, axis=1)
     fast_m_s = np.linalg.norm(nominal.speed_m_s, axis=1)
@@ -211,7 +211,7 @@ def _bounds(nominal: _Motion, deviation: _Motion, times_s: Floats, instants: int
 
 
 def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats, Floats]:
-    """Return the least distance of the segment from the attracting body: of the nominal one, and of all possible ones.
+    """Return the minimum distance of the segment from the attracting body: nominal, and of all possible motions.
 
     At the length u of the nominal segment it is (height^2 + (u - foot)^2)^(1/2). The deviation is at most linear in u.
     """
@@ -220,10 +220,10 @@ def _distances_of_segment(nominal: _Motion, deviation: _Motion) -> tuple[Floats,
     foot = -(own * relative / length).sum(axis=0)
     height = np.sqrt(np.maximum((own * own).sum(axis=0) - foot**2, 0.0))
 
-    def least(of_craft: Floats, of_object: Floats) -> Floats:
+    def minimum(of_craft: Floats, of_object: Floats) -> Floats:
         slope = np.clip((of_object - of_craft) / length, -1.0 + 1e-12, 1.0 - 1e-12)
         at = np.clip(foot + height * slope / np.sqrt(1.0 - slope**2), 0.0, length)
         return np.asarray(np.hypot(height, at - foot) - of_craft - (of_object - of_craft) * (at / length))
 
     sizes = deviation.place_m[:, MODULUS]
-    return least(*np.zeros_like(sizes)), least(*sizes)
+    return minimum(*np.zeros_like(sizes)), minimum(*sizes)

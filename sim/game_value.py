@@ -15,7 +15,7 @@ from sim.gravity import on_board_model
 from sim.scenario import Scenario
 
 ROUNDING = 1e-12
-MOST_TRIALS = 100
+MAX_TRIALS = 100
 
 
 @dataclass(frozen=True)
@@ -25,12 +25,12 @@ class ValueReserve:
     Parameters
     ----------
     lower_bound_m : float
-        Reserve of the lower bound itself: the least distance in place of that at x = 0, Lemma 20, the accelerations and
-        the steps that the search for pairs examines.
+        Reserve of the lower bound itself: the minimum distance in place of that at x = 0, Lemma 20, the accelerations
+        and the steps that the search for pairs examines.
     tangent_m : float
         Angles that are not small.
     dead_zone_m : float
-        Impulses below the least one.
+        Impulses below the minimum one.
     range_threshold_m : float
         Impulses below the range threshold.
     """
@@ -53,15 +53,15 @@ def why_no_value(scenario: Scenario) -> tuple[str, ...]:
     """
     model, thruster = scenario.set_model, scenario.thruster
     box = model.bounds
-    least_m_s, greatest_m_s = box.vx_m_s
+    min_m_s, max_m_s = box.vx_m_s
     failed = {
         # The possible misses are one interval for one axis, one range and one closing speed.
         "engagement in space": scenario.is_spatial,
         "gravity": scenario.sun is not None,
         "range not exactly known": box.x_m[0] != box.x_m[1],
-        "closing speed not exactly known": least_m_s != greatest_m_s,
+        "closing speed not exactly known": min_m_s != max_m_s,
         # The set widens each impulse by the relative error of the nominal closing speed, also if the true one is known.
-        "closing speed not the nominal one": least_m_s == greatest_m_s != -model.closing_speed_m_s,
+        "closing speed not the nominal one": min_m_s == max_m_s != -model.closing_speed_m_s,
         # An impulse must shift all possible misses alike, and before the next measurement.
         "impulses with errors": thruster.execution_error_relative > 0.0,
         "impulses with a delay": thruster.delay_steps > 0,
@@ -85,11 +85,11 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
     docs/guarantee.md, Lemma 22, has the proof. Cost: one information set.
     """
     course = _course(scenario)
-    exact = replace(course, least_impulse_m_s=0.0, threshold_m=0.0, is_small=True)
+    exact = replace(course, min_impulse_m_s=0.0, threshold_m=0.0, is_small=True)
     steps = (
         exact,
         replace(exact, is_small=False),
-        replace(exact, is_small=False, least_impulse_m_s=course.least_impulse_m_s),
+        replace(exact, is_small=False, min_impulse_m_s=course.min_impulse_m_s),
         course,
     )
     misses_m, impulses_m_s = zip(*(_guarantee(each) for each in steps), strict=True)
@@ -102,8 +102,8 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
 class _Course:
     """Data of the flight at its steps, shape (n,).
 
-    `half_width_m` is the greatest half-width of the possible misses at a step, for small angles, without accelerations
-    after it; `later_m` is what these add. `first_m` is the greatest possible miss at the start.
+    `half_width_m` is the maximum half-width of the possible misses at a step, for small angles, without accelerations
+    after it; `later_m` is what these add. `first_m` is the maximum possible miss at the start.
     """
 
     scenario: Scenario
@@ -113,7 +113,7 @@ class _Course:
     half_width_m: Floats
     later_m: Floats
     first_m: float
-    least_impulse_m_s: float
+    min_impulse_m_s: float
     threshold_m: float
     is_small: bool
 
@@ -133,7 +133,7 @@ def _course(scenario: Scenario) -> _Course:
     measured = np.array([i % every == 0 and model.angle_sensor.measures_at(before_s[i]) for i in range(steps)])
     for i in range(steps):
         if not widest.tracking.all():
-            break  # below the least range of a camera, where the set has no label and impulses are not counted
+            break  # below the minimum range of a camera, where the set has no label and impulses are not counted
         if measured[i]:
             widest.measure_angle(0.0)
         half_width_m[i] = widest.predicted_miss().upper_m[0]
@@ -150,16 +150,16 @@ def _course(scenario: Scenario) -> _Course:
         half_width_m=half_width_m,
         later_m=np.cumsum(arms_m[::-1])[::-1] - arms_m,
         first_m=max(abs(z + v * box.x_m[0] / e) for z in box.z_m for v in box.vz_m_s) + arms_m.sum() - 0.5 * arms_m[0],
-        least_impulse_m_s=thruster.least_impulse_m_s,
-        threshold_m=max(model.least_range_m, nearest_m),
+        min_impulse_m_s=thruster.min_impulse_m_s,
+        threshold_m=max(model.min_range_m, nearest_m),
         is_small=False,
     )
 
 
 def _guarantee(course: _Course) -> tuple[float, float]:
-    """Return the greatest miss of `symmetric-miss`, m, and the greatest sum of its impulses, m/s."""
+    """Return the maximum miss of `symmetric-miss`, m, and the maximum sum of its impulses, m/s."""
     scenario, model = course.scenario, course.scenario.set_model
-    greatest, least, e = scenario.thruster.greatest_impulse_m_s, course.least_impulse_m_s, model.closing_speed_m_s
+    maximum, minimum, e = scenario.thruster.max_impulse_m_s, course.min_impulse_m_s, model.closing_speed_m_s
     decides = course.may_decide & (course.range_m >= course.threshold_m)
     to_go_s, speed_m_s = course.range_m / e, max(abs(v) for v in model.bounds.vz_m_s)
     worst_m, wider, last_to_go_s = course.first_m, 1.0, math.inf
@@ -169,13 +169,13 @@ def _guarantee(course: _Course) -> tuple[float, float]:
             slope = (worst_m / to_go_s[i] + speed_m_s) / e
             wider = max(wider, _wider(model.angle_sensor, float(course.range_m[i]), slope))
         if decides[i]:
-            # Impulse i is at most (greatest miss before - after) / tau_i, whose sum is taken by parts, and at most mu2.
+            # Impulse i is at most (maximum miss before - after) / tau_i, whose sum is taken by parts, and at most mu2.
             by_parts_m_s += worst_m * (1.0 / to_go_s[i] - 1.0 / last_to_go_s)
-            spent_m_s = min(by_parts_m_s, spent_m_s + greatest)
-            middle_m = wider * course.half_width_m[i] + course.later_m[i] + least * to_go_s[i]
-            worst_m = min(worst_m, max(middle_m, worst_m - greatest * to_go_s[i]))
+            spent_m_s = min(by_parts_m_s, spent_m_s + maximum)
+            middle_m = wider * course.half_width_m[i] + course.later_m[i] + minimum * to_go_s[i]
+            worst_m = min(worst_m, max(middle_m, worst_m - maximum * to_go_s[i]))
             last_to_go_s = to_go_s[i]
-            speed_m_s += greatest
+            speed_m_s += maximum
         speed_m_s += model.disturbance_m_s2 * model.step_s
     return float(worst_m), float(spent_m_s)
 
@@ -183,13 +183,13 @@ def _guarantee(course: _Course) -> tuple[float, float]:
 def _wider(sensor: AngleSensor, range_m: float, slope: float) -> float:
     """Return how much wider than for small angles the band of an angle can be, up to a slope of the line of sight."""
     bound, true_rad = sensor.error_bound(range_m), math.atan(slope)
-    greatest, seen_rad = max(bound, sensor.error_bound(range_m * math.hypot(1.0, slope))), math.inf
-    for _ in range(MOST_TRIALS):
-        # The greatest possible angle depends on the bound at the distances that it allows.
-        seen_rad, before_rad = (true_rad + 2.0 * greatest) * (1.0 + ROUNDING), seen_rad
+    maximum, seen_rad = max(bound, sensor.error_bound(range_m * math.hypot(1.0, slope))), math.inf
+    for _ in range(MAX_TRIALS):
+        # The maximum possible angle depends on the bound at the distances that it allows.
+        seen_rad, before_rad = (true_rad + 2.0 * maximum) * (1.0 + ROUNDING), seen_rad
         if seen_rad >= 0.5 * math.pi:
             return math.inf
         if seen_rad == before_rad:
-            return math.tan(greatest) / math.tan(bound) / math.cos(seen_rad) ** 2
-        greatest = max(greatest, sensor.error_bound(range_m / math.cos(seen_rad)))
+            return math.tan(maximum) / math.tan(bound) / math.cos(seen_rad) ** 2
+        maximum = max(maximum, sensor.error_bound(range_m / math.cos(seen_rad)))
     return math.inf

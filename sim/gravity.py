@@ -12,7 +12,7 @@ from infoset.arrays import Floats
 from sim.flight_bounds import flight_bounds, greater_of_neighbours, no_bound
 from sim.scenario import Scenario, Sun
 
-LEAST_SPEED_CHANGE = 1e-8
+MIN_SPEED_CHANGE = 1e-8
 
 
 def on_board_model(scenario: Scenario) -> SetModel:
@@ -27,7 +27,7 @@ def on_board_model(scenario: Scenario) -> SetModel:
         execution_error_relative=thruster.execution_error_relative,
         pointing_error_rad=thruster.pointing_error_rad,
     )
-    model = with_gravity(model, scenario.sun, greatest_impulses_m_s(model, thruster))
+    model = with_gravity(model, scenario.sun, max_impulses_m_s(model, thruster))
     if model.speed_error >= 1.0:
         raise ValueError(
             f"the guaranteed model needs a closing speed known to better than 100 %: bounds.vx_m_s lets it differ by "
@@ -36,10 +36,10 @@ def on_board_model(scenario: Scenario) -> SetModel:
     return model
 
 
-def greatest_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
-    """Return the greatest sum of a flight's impulses, m/s: the budget, or the greatest impulse at every step."""
+def max_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
+    """Return the maximum sum of a flight's impulses, m/s: the budget, or the maximum impulse at every step."""
     steps = model.bounds.x_m[1] / (-model.bounds.vx_m_s[1] * model.step_s) + 1.0
-    most = min(thruster.budget_m_s, thruster.greatest_impulse_m_s * steps)
+    most = min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
     return most * (1.0 + thruster.execution_error_relative)
 
 
@@ -53,7 +53,7 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     sun : Sun or None
         The attracting body; None is free space.
     impulses_m_s : float
-        Greatest sum of the impulses' moduli, which change the lateral velocity.
+        Maximum sum of the impulses' moduli, which change the lateral velocity.
 
     Raises
     ------
@@ -66,17 +66,17 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     difference of gravity between spacecraft and object and of its derivative.
     """
     if sun is None:
-        return replace(model, gravity_m_s2=0.0, gravity_y_m_s2=None, gravity_speed_change=LEAST_SPEED_CHANGE)
+        return replace(model, gravity_m_s2=0.0, gravity_y_m_s2=None, gravity_speed_change=MIN_SPEED_CHANGE)
     disturbances = tuple(model.axis(name).disturbance_m_s2 for name in model.axes)
     flight = flight_bounds(model.bounds, disturbances, sun, impulses_m_s)
     gradient = sun.gravitational_parameter_m3_s2 / flight.nearest_m**3
     distance, pull = flight.distance_m, 2.0 * gradient * flight.distance_m
     jerk = 2.0 * gradient * (flight.speed_m_s + 3.0 * distance * flight.fastest_m_s / flight.nearest_m)
-    m, later_pull, later_jerk = flight.closing_speed_m_s, _greatest_later(pull), _greatest_later(jerk)
+    m, later_pull, later_jerk = flight.closing_speed_m_s, _max_later(pull), _max_later(jerk)
     offset, velocity = flight.offset_m[:-1], flight.velocity_m_s[:-1]
     tide = gradient * (1.5 * distance + 0.5 * offset)
     scale = later_pull / m * velocity + (0.5 * (later_pull / m) ** 2 + later_jerk / (3.0 * m)) * offset
-    *along_y, along_z = (_greatest(each) for each in tide + scale)
+    *along_y, along_z = (_max(each) for each in tide + scale)
     # All that gravity has changed until the end of each step.
     changes = np.cumsum(greater_of_neighbours(pull)) * flight.times_s[1] / min(m, model.closing_speed_m_s)
     allowed = 1.0 - replace(model, gravity_speed_change=0.0).speed_error
@@ -87,15 +87,15 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
         model,
         gravity_m_s2=along_z,
         gravity_y_m_s2=along_y[0] if along_y else None,
-        gravity_speed_change=float(max(LEAST_SPEED_CHANGE, changes[-1])),
+        gravity_speed_change=float(max(MIN_SPEED_CHANGE, changes[-1])),
     )
 
 
-def _greatest_later(values: Floats) -> Floats:
-    """Return the greatest value from each time on."""
+def _max_later(values: Floats) -> Floats:
+    """Return the maximum value from each time on."""
     return np.asarray(np.maximum.accumulate(values[::-1])[::-1])
 
 
-def _greatest(values: Floats) -> float:
-    """Return the greatest value of a function between times that are close together."""
+def _max(values: Floats) -> float:
+    """Return the maximum value of a function between times that are close together."""
     return float(values.max() + np.abs(np.diff(values)).max())

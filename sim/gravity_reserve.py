@@ -23,21 +23,21 @@ class GravityReserve:
     Parameters
     ----------
     position_m, speed_m_s : float
-        Greatest second-order part of the difference of the two motions and of its rate.
+        Maximum second-order part of the difference of the two motions and of its rate.
     across_m_s : float
-        Greatest change of the velocity across x by gravity.
+        Maximum change of the velocity across x by gravity.
     closing_m_s : float
-        Least closing speed of the flight.
+        Minimum closing speed of the flight.
     deviation_m_s : float
-        Greatest difference of a closing speed from that of the motion without impulses.
+        Maximum difference of a closing speed from that of the motion without impulses.
     nearer_m : ndarray, shape (n,)
-        Greatest change of x by impulses, at the steps and at last until after the arrival.
+        Maximum change of x by impulses, at the steps and at last until after the arrival.
     late_s : float
-        Greatest change of the time when the middle of the two is at x = 0, by impulses.
+        Maximum change of the time when the middle of the two is at x = 0, by impulses.
     drift_m : float
-        Greatest change of the difference of the two in that time.
+        Maximum change of the difference of the two in that time.
     impulses_m_s : float
-        Greatest sum of impulses.
+        Maximum sum of impulses.
     stretch_per_s2 : float
         An impulse that acts for the time t displaces by its straight line times at most 1 + stretch t^2.
     """
@@ -74,7 +74,7 @@ def gravity_reserve(
     reach_m : float
         A bound of the distance across x at x = 0 that is to be proved.
     disturbance_m_s2 : float
-        Greatest acceleration of each by its engine.
+        Maximum acceleration of each by its engine.
 
     Notes
     -----
@@ -84,12 +84,12 @@ def gravity_reserve(
 
     def impulses_until(end_s: float) -> float:
         steps = math.floor(end_s / step_s * (1.0 + ROUNDING)) + 1
-        return min(thruster.budget_m_s, thruster.greatest_impulse_m_s * steps)
+        return min(thruster.budget_m_s, thruster.max_impulse_m_s * steps)
 
     if sun is None:
-        nothing, least = np.zeros(len(closing)), float(closing.min())
-        impulses = impulses_until(arrival_s + reach_m / least)
-        return GravityReserve(0.0, 0.0, 0.0, least, 0.0, nothing, 0.0, 0.0, impulses, 0.0)
+        nothing, minimum = np.zeros(len(closing)), float(closing.min())
+        impulses = impulses_until(arrival_s + reach_m / minimum)
+        return GravityReserve(0.0, 0.0, 0.0, minimum, 0.0, nothing, 0.0, 0.0, impulses, 0.0)
     parameter, near = sun.gravitational_parameter_m3_s2, motion.nearest_m
     half, rate = (0.5 * np.linalg.norm(part, axis=0) for part in (difference[:axes], difference[axes:]))
     # The proof needs all bounds until the closest approach, some time after x = 0: gap bounds it, as is checked below.
@@ -111,14 +111,14 @@ def gravity_reserve(
     deviation = 4.0 * gradient * size * horizon + 0.5 * impulses * turned * growth
     lateral = motion.states[axes:-1]
     across = float(np.linalg.norm(lateral - lateral[:, :1], axis=0).max()) + deviation + between
-    least = float(closing.min()) - deviation - between
+    minimum = float(closing.min()) - deviation - between
     position = 6.0 * size**2 / nearest * turned * growth
     speed = 2.0 * position / horizon
     stretch = gradient * growth / 3.0
     nearer_m = impulses * stretch * np.append(motion.times_s[:-1], horizon) ** 3
     nearer_end = float(nearer_m[-1])
-    if least <= 0.0 or nearer_end + position + float(half[-1]) + reach_m > gap * least:
+    if minimum <= 0.0 or nearer_end + position + float(half[-1]) + reach_m > gap * minimum:
         return None
-    late = (nearer_end + 0.5 * position) / least
+    late = (nearer_end + 0.5 * position) / minimum
     drift = late * (2.0 * float(rate[-1]) + speed + (disturbance_m_s2 + 4.0 * gradient * size) * late)
-    return GravityReserve(position, speed, across, least, deviation, nearer_m, late, drift, impulses, stretch)
+    return GravityReserve(position, speed, across, minimum, deviation, nearer_m, late, drift, impulses, stretch)

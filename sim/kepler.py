@@ -16,7 +16,7 @@ POSITION_ERROR_M = 1e-5
 """Error of the position at arrival for which the length of a leap is chosen, m. The leap of a step is shorter than the
 step only where gravity is strong."""
 SHORTEST_LEAP = 1e-6
-"""Least length of a leap in units of the step. Only a motion that falls into the attracting body needs shorter ones."""
+"""Minimum length of a leap in units of the step. Only a fall into the attracting body needs shorter ones."""
 NEWTON_STEPS = 8
 X = -1
 """Axis x of a motion, after the lateral axes: z in a plane, y and z in space."""
@@ -62,7 +62,7 @@ class Passage:
     """
 
     passed: Flags
-    least_distance_m: Floats
+    min_distance_m: Floats
     arrival_s: Floats
     lateral_m: Floats
 
@@ -176,8 +176,8 @@ class KeplerMotion:
             arrival,
             closest,
         )
-        least = np.where(passed, np.hypot.reduce(closest), np.inf)
-        return Passage(passed, least, arrival, closest[self._lateral])
+        minimum = np.where(passed, np.hypot.reduce(closest), np.inf)
+        return Passage(passed, minimum, arrival, closest[self._lateral])
 
 
 def sun_and_orbit(sun: Sun) -> tuple[Floats, Floats]:
@@ -267,7 +267,7 @@ def leap(
 
 @inlined
 def longest_leap_s(state: Floats, gravitational_parameter_m3_s2: float, acceleration_error_m_s2: float) -> float:
-    """Return the greatest length of a leap for which its mean acceleration has at most a given error.
+    """Return the maximum length of a leap for which its mean acceleration has at most a given error.
 
     At the distance R from the Sun, a motion with the speed v changes in the time t = min(R/v, (R^3/K)^(1/2)). A leap of
     order four and length h has an error of the order of (K/R^2) (h/t)^4. The shorter length of the two bodies' counts.

@@ -22,7 +22,7 @@ class LabelEnds:
     Attributes
     ----------
     published_m : ndarray, shape (B,)
-        Greatest predicted miss of the sections when they left the set, m: Phi of the paper.
+        Maximum predicted miss of the sections when they left the set, m: Phi of the paper.
     left : ndarray of bool, shape (B,)
         Whether a section has left the set.
 
@@ -74,11 +74,11 @@ class LabelEnds:
         labels_m : ndarray, shape (B, S)
             Labels of the sections, m.
         misses_m : ndarray, shape (2, B, S), or (2, 2, B, S) in space
-            Least and greatest predicted miss of each section, m; in space along y and z.
+            Minimum and maximum predicted miss of each section, m; in space along y and z.
         """
         misses = misses_m.reshape(2, len(self._laws), *labels_m.shape)
         self.left |= left.any(axis=1)
-        self.published_m = np.maximum(self.published_m, np.where(left, _greatest(misses), 0.0).max(axis=1))
+        self.published_m = np.maximum(self.published_m, np.where(left, _max(misses), 0.0).max(axis=1))
         counts = np.where(control_is_over[:, None], living, left) & ~self._is_over[:, None]
         self._is_over = self._is_over | control_is_over
         if counts.any():
@@ -86,7 +86,7 @@ class LabelEnds:
             self._moving.append((labels_m, counts, misses))
 
     def any_state_miss_m(self, results: Results) -> Floats:
-        """Return the greatest miss of a state that the set contained when control ended for its label, m, shape (B,).
+        """Return the maximum miss of a state that the set contained when control ended for its label, m, shape (B,).
 
         The true state is such a state if it was always inside its section. Where the set became empty, or no section
         has ended, it is the only one.
@@ -97,11 +97,11 @@ class LabelEnds:
         return np.maximum(np.where(ended, of_sections, 0.0), of_truth)
 
     def _reached_m(self, labels: Floats, counts: Flags, misses: Floats) -> Floats:
-        """Return the greatest true miss of some sections of each engagement, m, shape (B,)."""
-        return np.asarray(np.where(counts, _greatest(misses) * self._scale(labels), 0.0).max(axis=1))
+        """Return the maximum true miss of some sections of each engagement, m, shape (B,)."""
+        return np.asarray(np.where(counts, _max(misses) * self._scale(labels), 0.0).max(axis=1))
 
     def _scale(self, labels: Floats) -> Floats:
-        """Return the greatest 1 + eta of a label: a length of the guaranteed model times 1 + eta is the true one.
+        """Return the maximum 1 + eta of a label: a length of the guaranteed model times 1 + eta is the true one.
 
         The label is the true range at t = 0 divided by 1 + eta.
         """
@@ -112,6 +112,6 @@ class LabelEnds:
         return np.asarray(np.minimum(1.0 + model.speed_error, farthest))
 
 
-def _greatest(misses: Floats) -> Floats:
-    """Return the greatest modulus of least and greatest misses of shape (2, C, B, S), shape (B, S)."""
+def _max(misses: Floats) -> Floats:
+    """Return the maximum modulus of minimum and maximum misses of shape (2, C, B, S), shape (B, S)."""
     return np.asarray(np.hypot.reduce(np.maximum(misses[1], -misses[0]), axis=0))

@@ -19,7 +19,7 @@ from sim.scenario import Scenario, Sun
 from sim.truth_pair import TruthPair
 
 STEPS_BEYOND = 2
-"""Greatest number of simulated steps after the one in which x = 0."""
+"""Maximum number of simulated steps after the one in which x = 0."""
 
 
 class ScheduledMotion(KeplerMotion):
@@ -62,13 +62,13 @@ class PairNoise:
 
     Attributes
     ----------
-    greatest_share : float
-        Greatest error so far, in units of its bound; at most 1 if all errors are within their bounds.
+    max_share : float
+        Maximum error so far, in units of its bound; at most 1 if all errors are within their bounds.
     """
 
     def __init__(self, last_common_step: int) -> None:
         self.last_common_step = last_common_step
-        self.greatest_share = 0.0
+        self.max_share = 0.0
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
         """Measure the middle of each pair, or after the last common step the true values."""
@@ -79,7 +79,7 @@ class PairNoise:
             error = sensor.error(sight, measured[name])
             is_disc = isinstance(sensor, AngleSensor) and sensor.is_disc
             share = np.hypot(*error) if is_disc else np.abs(error)
-            self.greatest_share = max(self.greatest_share, float(share.max()))
+            self.max_share = max(self.max_share, float(share.max()))
         return measured
 
 
@@ -105,12 +105,12 @@ class PairFlight:
     """Outcome of the flight of a pair.
 
     Impulses at each step have the shape (steps, 2) or (steps, 2, 2), along y and z in space: step, axis, motion.
-    `greatest_error_share` is the greatest error of a common measurement, in units of its bound.
+    `max_error_share` is the maximum error of a common measurement, in units of its bound.
     """
 
     results: Results
     impulse_m_s: Floats
-    greatest_error_share: float
+    max_error_share: float
 
 
 def fly_pair(
@@ -132,4 +132,4 @@ def fly_pair(
     impulses: list[Floats] = []
     while flight.flying:
         flight.advance(lambda step: impulses.append(np.where(step.tracking, step.impulse_m_s, 0.0)))
-    return PairFlight(flight.results(np.arange(2)), np.array(impulses), noise.greatest_share)
+    return PairFlight(flight.results(np.arange(2)), np.array(impulses), noise.max_share)

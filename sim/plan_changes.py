@@ -1,4 +1,4 @@
-"""Changes of plans: from the plans with the greatest misses so far to new ones."""
+"""Changes of plans: from the plans with the maximum misses so far to new ones."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from infoset.arrays import Floats
 from sim.planned_flights import ANGLE, Flown, Plans, PlanSpace, range_m
 
-MOST_CHANGES = 3
-"""Greatest number of changes from a plan to the next."""
+MAX_CHANGES = 3
+"""Maximum number of changes from a plan to the next."""
 LATE_STEPS = 12.0
 """Mean distance from the end, in steps, of the changes near the end."""
 
@@ -40,7 +40,7 @@ class PlanChanges:
         ranks = np.floor(len(elite.value) * self._random.random(count) ** 2).astype(np.int64)
         plans = elite.plans.take(ranks)
         for i in range(count):
-            for _ in range(int(self._random.integers(1, MOST_CHANGES + 1))):
+            for _ in range(int(self._random.integers(1, MAX_CHANGES + 1))):
                 change = self._changes[int(self._random.integers(len(self._changes)))]
                 change(plans, i, elite)
         plans.changes[:] += 1

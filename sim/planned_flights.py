@@ -119,7 +119,7 @@ class PlannedTarget:
     Parameters
     ----------
     bound_m_s2 : ndarray, shape (axes,)
-        Greatest acceleration along each lateral axis, m/s^2.
+        Maximum acceleration along each lateral axis, m/s^2.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class PlanSpace:
     lower, upper : ndarray, shape (4,) or (6,)
         Limits of the starts.
     acceleration_m_s2 : ndarray, shape (axes,)
-        Greatest acceleration of the target along each axis, m/s^2; zero if the target is that of the scenario.
+        Maximum acceleration of the target along each axis, m/s^2; zero if the target is that of the scenario.
     """
 
     scenario: Scenario
@@ -218,7 +218,7 @@ class Flown:
     value : ndarray
         What the search maximises, m; -inf if the engagement does not count.
     miss_m, any_state_miss_m : ndarray
-        Miss of the true state, and greatest miss of a state of the set, m.
+        Miss of the true state, and maximum miss of a state of the set, m.
     errors : ndarray, shape (n, rows, axes, steps)
         Errors made, in units of their bounds.
     accelerations_m_s2 : ndarray, shape (n, axes, steps)

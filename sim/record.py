@@ -106,7 +106,7 @@ class Record:
     Parameters
     ----------
     scenario : Scenario
-        Simulated scenario, with the noise, tie rule and range meter of this engagement.
+        Simulated scenario, with the noise, tie rule and range sensor of this engagement.
     seed, run : int
         Root seed and run number; the same values give the same engagement.
     noise : str or None

@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import Checked, Fraction, Positive
-from sim.statistics import estimate_hits, least_count, number_text, shows
+from sim.statistics import estimate_hits, min_count, number_text, shows
 from sim.stopping_rule import DIGITS, NUMBER, QUANTITIES, QuantileName, parse_quantile
 
 CONFIDENCE = 0.95
-MOST_RUNS_NEEDED = 1_000_000
-"""Greatest number of runs that `Verdict.runs_needed` names."""
+MAX_RUNS_NEEDED = 1_000_000
+"""Maximum number of runs that `Verdict.runs_needed` names."""
 _TAIL = 0.5 * (1.0 - CONFIDENCE)
 _HIT = re.compile(rf"\s*hit\s*>=?{NUMBER}")
 DEFAULT_QUANTILE = "p99"
@@ -109,7 +109,7 @@ class HitRequirement(Checked):
     Parameters
     ----------
     share : float
-        Least share of the runs that hit, between 0 and 1.
+        Minimum share of the runs that hit, between 0 and 1.
 
     Raises
     ------
@@ -211,7 +211,7 @@ class Verdict:
         Ends of its 95 % confidence interval; None if the sample is too small to bound that side.
     runs_needed : int or None
         Approximate number of runs that decide with `watched=True`, if the share of runs that satisfy the bound stays
-        the same; None if it is over `MOST_RUNS_NEEDED`, because the estimate is at the bound.
+        the same; None if it is over `MAX_RUNS_NEEDED`, because the estimate is at the bound.
     known : int
         Runs with a value of the quantity; the others do not satisfy the bound.
     quantile, bound : float or None
@@ -342,8 +342,8 @@ def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Integers
 @functools.lru_cache(maxsize=32)
 def _critical_counts(first: int, last: int, share: float, watched: bool) -> tuple[Integers, Integers]:
     runs = np.arange(first, last + 1)
-    fewest_met = least_count(runs, lambda count: p_values(runs, count, share, watched=watched)[0] <= _TAIL)
-    most_missed = least_count(runs, lambda count: p_values(runs, count, share, watched=watched)[1] > _TAIL) - 1
+    fewest_met = min_count(runs, lambda count: p_values(runs, count, share, watched=watched)[0] <= _TAIL)
+    most_missed = min_count(runs, lambda count: p_values(runs, count, share, watched=watched)[1] > _TAIL) - 1
     for counts in (fewest_met, most_missed):
         counts.setflags(write=False)
     return fewest_met, most_missed
@@ -375,14 +375,14 @@ def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike, *, watched: bo
 def runs_needed(count: int, runs: int, share: float) -> int | None:
     """Return the approximate number of runs that decide a requirement with `watched=True`; see `Verdict`.
 
-    None is more than `MOST_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the least number that can decide.
+    None is more than `MAX_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the minimum number that can decide.
     """
 
     def deciding(sizes: Integers) -> Integers:
         values = p_values(sizes, count / runs * sizes, share, watched=True)
         return sizes[(np.minimum(*values) <= _TAIL) & (sizes > runs)]
 
-    sizes = np.unique(np.geomspace(1, MOST_RUNS_NEEDED, 2000).astype(np.int64))
+    sizes = np.unique(np.geomspace(1, MAX_RUNS_NEEDED, 2000).astype(np.int64))
     enough = deciding(sizes)
     if not enough.size:
         return None

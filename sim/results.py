@@ -31,7 +31,7 @@ class Outcome(Enum):
     With recovery the last consistent set is enlarged and guidance continues; without it no more impulses are given.
     """
     BUDGET_SPENT = "budget-spent"
-    """The budget fell below the least impulse while the strategy still commanded one."""
+    """The budget fell below the minimum impulse while the strategy still commanded one."""
     DIVERGED = "diverged"
     """The miss is greater than the nominal range."""
 
@@ -73,7 +73,7 @@ class Results:
 
     runs: Integers = field(metadata=columns(Column("run", "", "Run number", int)))
     miss_m: Floats = field(
-        metadata=columns(Column("miss_m", "m", "Least distance between the centres of mass", limits=NOT_NEGATIVE))
+        metadata=columns(Column("miss_m", "m", "Minimum distance between the centres of mass", limits=NOT_NEGATIVE))
     )
     impulse_m_s: Floats = field(
         metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' moduli", limits=NOT_NEGATIVE))

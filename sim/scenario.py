@@ -17,10 +17,10 @@ from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensor import Sensor
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
 
-_DIRECTION = Limits(least=-2.0 * math.pi, most=2.0 * math.pi)
-_ELEVATION = Limits(least=-0.5 * math.pi, most=0.5 * math.pi)
-MOST_STEPS = 100_000
-"""Greatest number of steps of a flight; all random numbers are drawn before it starts."""
+_DIRECTION = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
+_ELEVATION = Limits(minimum=-0.5 * math.pi, maximum=0.5 * math.pi)
+MAX_STEPS = 100_000
+"""Maximum number of steps of a flight; all random numbers are drawn before it starts."""
 
 
 @dataclass(frozen=True)
@@ -171,21 +171,21 @@ class Scenario:
         if self.information_set.is_guaranteed:
             _ = self.set_model.label_limits_m  # raises ValueError if the closing speed is too uncertain
         farthest_m, slowest_m_s = self.dispersion.x_m[1], -self.dispersion.vx_m_s[1]
-        if farthest_m > MOST_STEPS * (1.0 + 1e-9) * slowest_m_s * self.step_s:
+        if farthest_m > MAX_STEPS * (1.0 + 1e-9) * slowest_m_s * self.step_s:
             raise ValueError(
-                f"step_s must be long enough for at most {MOST_STEPS} steps from {farthest_m:g} m at "
+                f"step_s must be long enough for at most {MAX_STEPS} steps from {farthest_m:g} m at "
                 f"{slowest_m_s:g} m/s: got {self.step_s!r}"
             )
-        greatest = max(self.dispersion.x_m[1], self.uncertainty.x_m[1])
-        if self.sun is not None and self.sun.distance_m <= greatest:
+        maximum = max(self.dispersion.x_m[1], self.uncertainty.x_m[1])
+        if self.sun is not None and self.sun.distance_m <= maximum:
             raise ValueError(
-                f"sun.distance_m must be greater than the greatest possible range, {greatest:g} m: "
+                f"sun.distance_m must be greater than the maximum possible range, {maximum:g} m: "
                 f"got {self.sun.distance_m!r}"
             )
-        least = min(self.dispersion.x_m[0], self.uncertainty.x_m[0])
-        if self.body is not None and self.body.radius_m >= least:
+        minimum = min(self.dispersion.x_m[0], self.uncertainty.x_m[0])
+        if self.body is not None and self.body.radius_m >= minimum:
             raise ValueError(
-                f"body.radius_m must be less than the least possible range, {least:g} m: got {self.body.radius_m!r}"
+                f"body.radius_m must be less than the minimum possible range, {minimum:g} m: got {self.body.radius_m!r}"
             )
 
     @cached_property

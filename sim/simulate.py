@@ -9,7 +9,7 @@ import numpy as np
 
 from guidance import Strategy
 from infoset.limits import WHOLE, shown
-from sim.draws import draw, greatest_number_of_steps
+from sim.draws import draw, max_number_of_steps
 from sim.engagement import Engagements, Step
 from sim.results import Results, join
 from sim.scenario import Scenario, with_strategy
@@ -17,7 +17,7 @@ from sim.scenario import Scenario, with_strategy
 ENGAGEMENTS_AT_ONCE = 200
 SECTIONS_AT_ONCE = 6000
 STEPS_AT_ONCE = 500_000
-"""Greatest number of engagements of a batch times their steps; each takes about 600 bytes."""
+"""Maximum number of engagements of a batch times their steps; each takes about 600 bytes."""
 
 
 def simulate(
@@ -72,7 +72,7 @@ def simulate(
     parts = []
     # Small batches fit into the processor's cache; with very many sections or steps, larger ones would not fit into
     # memory.
-    by_steps = STEPS_AT_ONCE // greatest_number_of_steps(scenario)
+    by_steps = STEPS_AT_ONCE // max_number_of_steps(scenario)
     at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections, by_steps))
     for first in range(0, numbers.size, at_once):
         chunk = numbers[first : first + at_once]

@@ -149,7 +149,7 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
     levels : sequence of float
         In [0, 1].
     confidence : float
-        Least probability that an interval contains the true quantile, in (0, 1).
+        Minimum probability that an interval contains the true quantile, in (0, 1).
 
     Raises
     ------
@@ -220,7 +220,7 @@ def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate
     from scipy.special import betaincinv  # slow to load, and few commands need it
 
     COUNT.need("runs", runs)
-    Limits(least=0, most=runs, whole=True).need("hits", hits)
+    Limits(minimum=0, maximum=runs, whole=True).need("hits", hits)
     FRACTION.need("confidence", confidence)
     tail = 0.5 * (1.0 - confidence)
     lower = float(betaincinv(hits, runs - hits + 1, tail)) if hits else 0.0
@@ -259,18 +259,18 @@ def order_statistics(size: int, level: float, confidence: float) -> tuple[int, i
     # A quantile of level 0 or 1 is an end of the distribution; no value bounds it on the outside.
     if level in (0.0, 1.0):
         return (0, 1) if level == 0.0 else (size, size + 1)
-    return _least_count(size, level, tail), _least_count(size, level, 1.0 - tail) + 1
+    return _min_count(size, level, tail), _min_count(size, level, 1.0 - tail) + 1
 
 
-def _least_count(size: int, level: float, probability: float) -> int:
-    """Return the least k such that a binomial variable is at most k with at least this probability."""
+def _min_count(size: int, level: float, probability: float) -> int:
+    """Return the minimum k such that a binomial variable is at most k with at least this probability."""
     from scipy.special import bdtr  # slow to load, and few commands need it
 
-    return int(least_count(np.array(size), lambda count: bdtr(count, size, level) >= probability))
+    return int(min_count(np.array(size), lambda count: bdtr(count, size, level) >= probability))
 
 
-def least_count(most: Integers, is_enough: Callable[[Integers], Flags]) -> Integers:
-    """Return the least count from 0 to `most` that is enough, or `most` + 1; greater counts are enough too."""
+def min_count(most: Integers, is_enough: Callable[[Integers], Flags]) -> Integers:
+    """Return the minimum count from 0 to `most` that is enough, or `most` + 1; greater counts are enough too."""
     low, high = np.zeros_like(most), most + 1
     while (low < high).any():
         middle = np.minimum((low + high) // 2, most)

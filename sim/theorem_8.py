@@ -12,7 +12,7 @@ from infoset.arrays import Flags, Floats
 from infoset.section_law import BOUND_SLACK, PLANE, section_laws
 
 ONE_LABEL = 1e-7
-"""Greatest width of the interval of labels, in labels: the misses of all its labels are the same."""
+"""Maximum width of the interval of labels, in labels: the misses of all its labels are the same."""
 
 
 def has_theorem_8(model: SetModel, delay_steps: int) -> bool:
@@ -24,9 +24,9 @@ def has_theorem_8(model: SetModel, delay_steps: int) -> bool:
     is_planar_box = model.is_guaranteed and model.starts_as_box and len(model.axes) == 1
     if not is_planar_box or delay_steps or model.execution_error_relative > 0.0:
         return False
-    least, greatest = model.label_limits_m
+    minimum, maximum = model.label_limits_m
     fastest = max(-vx for vx in model.bounds.vx_m_s)
-    is_one = greatest - least <= ONE_LABEL * greatest and fastest == model.closing_speed_m_s
+    is_one = maximum - minimum <= ONE_LABEL * maximum and fastest == model.closing_speed_m_s
     return is_one and section_laws(model)[0].angles == PLANE
 
 
@@ -79,7 +79,7 @@ class Theorem8:
         if not situation.may_fire or angles is None:
             self.valid &= ~deciding | (not situation.may_fire)
             return
-        self.valid &= ~deciding | (seen & (situation.budget_left_m_s >= situation.thruster.greatest_impulse_m_s))
+        self.valid &= ~deciding | (seen & (situation.budget_left_m_s >= situation.thruster.max_impulse_m_s))
         e = self._law.closing_speed
         to_go_s = max(self._label_m / e - situation.time_s, 0.0)
         later = correctable_later_m(situation, np.full(len(deciding), e * to_go_s))
@@ -106,20 +106,20 @@ class Theorem8:
         # The box of the start, moved by the impulses.
         moved, doubt = from_first_s * self._given - moments, self._doubt_m_s * arrival_s
         drift = 0.5 * law.disturbance * arrival_s * (arrival_s + law.step)
-        box_upper = (law.z_greatest + law.vz_greatest * arrival_s + drift + doubt) - moved
-        box_lower = (law.z_least + law.vz_least * arrival_s - drift - doubt) - moved
+        box_upper = (law.z_max + law.vz_max * arrival_s + drift + doubt) - moved
+        box_lower = (law.z_min + law.vz_min * arrival_s - drift - doubt) - moved
         # Equation (34).
         share = to_go_s / np.where(since_s > 0.0, since_s, np.nan)
         x0, disturbed = law.closing_speed * from_first_s, 0.5 * law.disturbance * to_go_s * (from_first_s + law.step)
         disturbed = disturbed + self._doubt_m_s * to_go_s
         error = law.error_at_zero_range + law.error_slope * law.closing_speed * to_go_s
-        first_least, first_greatest = self._first_slopes
-        greatest = x0 * (np.tan(angles_rad + error) - first_least)
-        least = x0 * (np.tan(angles_rad - error) - first_greatest)
+        first_min, first_max = self._first_slopes
+        maximum = x0 * (np.tan(angles_rad + error) - first_min)
+        minimum = x0 * (np.tan(angles_rad - error) - first_max)
         # `fmin` and `fmax` ignore the first image, for which the share is not a number.
         upper, lower = (
-            np.fmin(box_upper, share * (greatest - moments) + disturbed),
-            np.fmax(box_lower, share * (least - moments) - disturbed),
+            np.fmin(box_upper, share * (maximum - moments) + disturbed),
+            np.fmax(box_lower, share * (minimum - moments) - disturbed),
         )
         return np.asarray(0.5 * (upper - lower))
 

@@ -43,12 +43,12 @@ class TruthPair:
         Position of the first motion relative to the middle of the two then, across x, with the same impulses, m; of a
         single motion relative to the x axis and without impulses.
     correction_m : float
-        Greatest change of one position across x at x = 0 by the impulses after `last_common_step`, for a single motion
+        Maximum change of one position across x at x = 0 by the impulses after `last_common_step`, for a single motion
         by all impulses, m.
     reserve_m : float
         Reserve for the second order of gravity, m; infinite if gravity is too strong for the proof.
     cosine : float
-        Least ratio of the miss to the distance across x at x = 0, with any impulses.
+        Minimum ratio of the miss to the distance across x at x = 0, with any impulses.
     position_m, velocity_m_s : ndarray, shape (2, 2) or (2, 3)
         (z, x) and (V_z, V_x) of the two motions at t = 0; (y, z, x) and (V_y, V_z, V_x) in space.
     acceleration_m_s2 : ndarray, shape (2, steps) or (2, 2, steps)
@@ -71,7 +71,7 @@ class TruthPair:
 
     @property
     def bound_m(self) -> float:
-        """Least distance, m, below which at least one of the two does not come with any strategy."""
+        """Minimum distance, m, below which at least one of the two does not come with any strategy."""
         return max(0.0, self.unlimited_bound_m)
 
     @property
@@ -156,7 +156,7 @@ class Approach:
         return np.asarray(last[np.unique(np.append(0, np.minimum(after_decisions, len(last) - 1)))])
 
     def _correction_m(self, last_common_step: int, late_s: float, reserve: GravityReserve) -> tuple[float, float]:
-        """Return the greatest change of the miss by impulses that are decided after a step, within the budget, m.
+        """Return the maximum change of the miss by impulses that are decided after a step, within the budget, m.
 
         The first value is that on straight lines until an arrival that is late, the second one what gravity adds to it.
         """
@@ -166,7 +166,7 @@ class Approach:
         return float(sizes @ arms_s), reserve.stretch_per_s2 * float(sizes @ arms_s**3)
 
     def pair(self, last_common_step: int, axes: Sequence[int]) -> TruthPair:
-        """Return the pair with the greatest distance at the end of those with the same measurements up to a step."""
+        """Return the pair with the maximum distance at the end of those with the same measurements up to a step."""
         offset, velocity = np.zeros((2, self.lateral))
         acceleration = np.zeros((self.lateral, self.steps))
         farthest = {each: each.farthest(last_common_step) for each in {self._programs[i] for i in axes}}
@@ -201,8 +201,8 @@ class Approach:
         by_start = np.stack([np.diag(onward[lateral, lateral]), np.diag(onward[lateral, motion.axes : -1])])
         start = 0.5 * side * self._widths * np.where(by_start < 0.0, -1.0, 1.0)
         by_push = np.stack([pushed[i, i] for i in range(self.lateral)])
-        greatest = np.array([planar.disturbance_m_s2 for planar in self._models])
-        acceleration = (side * greatest)[:, None] * np.where(by_push < 0.0, -1.0, 1.0)
+        maximum = np.array([planar.disturbance_m_s2 for planar in self._models])
+        acceleration = (side * maximum)[:, None] * np.where(by_push < 0.0, -1.0, 1.0)
         change = motion.difference(start[0], start[1], acceleration)
         track, last = (1.0 - MARGIN) * (motion.states + change), self.steps - 1
         far_m = float(np.hypot.reduce(track[lateral, -1]))
@@ -229,11 +229,11 @@ class Approach:
         return gravity_reserve(self.motion, difference, reach_m, disturbance, scenario.sun, scenario.thruster, step_s)
 
     def _by_manoeuvre(self, acceleration: Floats) -> Floats:
-        """Return the greatest changes of velocity by accelerations, along each axis, m/s."""
+        """Return the maximum changes of velocity by accelerations, along each axis, m/s."""
         return np.asarray(np.abs(acceleration).sum(axis=1) * self.scenario.set_model.step_s)
 
     def _slope(self, speeds_m_s: Floats, reserve: GravityReserve) -> float:
-        """Return the greatest ratio of the velocities across and along x, from those along the axes by the target."""
+        """Return the maximum ratio of the velocities across and along x, from those along the axes by the target."""
         across_m_s = float(np.hypot.reduce(speeds_m_s)) + reserve.impulses_m_s + reserve.across_m_s
         return across_m_s / reserve.closing_m_s
 
@@ -274,7 +274,7 @@ class Approach:
 
         The linear programs neglect the square of the slope of the line of sight, and what impulses change in gravity.
         """
-        motion, axes, greatest = self.motion, self.motion.axes, 1.0 - MARGIN
+        motion, axes, maximum = self.motion, self.motion.axes, 1.0 - MARGIN
         for name, sensor in self.scenario.sensors.items():
             due = self._due[name][self._due[name] <= last_common_step]
             x, c, apart = motion.range_m[due], motion.closing_speed_m_s[due], np.abs(difference[:, due])
@@ -300,18 +300,18 @@ class Approach:
                 slope=q,
                 closing_speed_m_s=fastest,
             )
-            greatest = max(greatest, float(sensor.share(seen).max(initial=0.0)))
-        return (1.0 - MARGIN) / greatest
+            maximum = max(maximum, float(sensor.share(seen).max(initial=0.0)))
+        return (1.0 - MARGIN) / maximum
 
 
 def later_impulses(scenario: Scenario, last_common_step: int, until_s: float) -> tuple[Floats, Floats]:
-    """Return times, s, and sizes, m/s, of the greatest impulses that are decided after a step: the earliest first."""
+    """Return times, s, and sizes, m/s, of the maximum impulses that are decided after a step: the earliest first."""
     thruster, steps, step_s = scenario.thruster, scenario.impulse_steps, scenario.set_model.step_s
     given = np.arange(thruster.delay_steps, math.ceil(until_s / step_s)) if steps is None else np.array(steps)
     given_s: Floats = step_s * given[given > last_common_step + thruster.delay_steps].astype(np.float64)
     given_s = given_s[given_s < until_s]
-    left = thruster.budget_m_s - thruster.greatest_impulse_m_s * np.arange(len(given_s))
-    return given_s, np.clip(left, 0.0, thruster.greatest_impulse_m_s)
+    left = thruster.budget_m_s - thruster.max_impulse_m_s * np.arange(len(given_s))
+    return given_s, np.clip(left, 0.0, thruster.max_impulse_m_s)
 
 
 def _climb(pair_of: Callable[[int], TruthPair], candidates: Integers, start: int) -> TruthPair:

@@ -48,7 +48,7 @@ class TruthSection:
         laws = section_laws(model)
         self._law, self._laws = laws[0], law_table(laws)
         self._exact_angles = model.is_guaranteed
-        self._least_range_m = model.least_range_m
+        self._min_range_m = model.min_range_m
         self._history = History(len(laws), batch)
         self._looks: list[_Look] = []
 
@@ -97,8 +97,8 @@ class TruthSection:
             margins.append(_if_measured(latest))
         return margins
 
-    def least_margin_m(self, arrival_s: Floats) -> MaskedFloats:
-        """Return the least signed margin of each true state, m; masked where nothing was measured."""
+    def min_margin_m(self, arrival_s: Floats) -> MaskedFloats:
+        """Return the minimum signed margin of each true state, m; masked where nothing was measured."""
         return _if_measured(self._margins(arrival_s).min(axis=0, initial=np.inf))
 
     def _margins(self, arrival_s: Floats) -> Floats:
@@ -111,10 +111,10 @@ class TruthSection:
         kinds = history.kinds[: history.events]
         measured, steps = np.isin(kinds, (ANGLE, RATE)), np.cumsum(kinds == PREDICTION)
         history.applies = history.applies[: history.events].copy()
-        history.applies[measured] &= (ranges >= self._least_range_m)[steps[measured]]
+        history.applies[measured] &= (ranges >= self._min_range_m)[steps[measured]]
         at = [look.step for look in looks]
         ranges = ranges[at]
-        where = np.reshape([look.where for look in looks], ranges.shape) & (ranges >= self._least_range_m)
+        where = np.reshape([look.where for look in looks], ranges.shape) & (ranges >= self._min_range_m)
         # Shape (L, C, B), then (C, L, B).
         each = (len(looks), len(self._laws), len(labels))
         slope = np.reshape([look.slope for look in looks], each).swapaxes(0, 1)

@@ -26,19 +26,19 @@ class _Cell:
 class UndecidedCells:
     """The chunks of a sweep that must still be simulated, and those that were simulated before an earlier chunk.
 
-    The number of runs in the manifest of the folder is the limit of each cell, `least_runs` its least number. The
+    The number of runs in the manifest of the folder is the limit of each cell, `min_runs` its minimum number. The
     requirement is decided for each noise, by the confidence sequence of `sim.requirement.judge`. A chunk is stored only
     if the chunks before it in its cell are stored and have not decided. The stored runs are therefore the same for any
     number of workers and after any interruption.
     """
 
     def __init__(
-        self, folder: CampaignWriter, requirement: AnyRequirement, noises: Sequence[str], least_runs: int
+        self, folder: CampaignWriter, requirement: AnyRequirement, noises: Sequence[str], min_runs: int
     ) -> None:
         self._folder = folder
         self._requirement = requirement
         self._noises = noises
-        self._least_runs = least_runs
+        self._min_runs = min_runs
         self._waiting: dict[int, tuple[Chunk, Results]] = {}
         zeros, none = [0] * len(noises), [False] * len(noises)
         self._cells = [_Cell(0, [*zeros], [*zeros], [*none]) for _ in range(folder.manifest.cells)]
@@ -79,7 +79,7 @@ class UndecidedCells:
     def _is_done(self, cell: int) -> bool:
         manifest, state = self._folder.manifest, self._cells[cell]
         runs = min(state.chunks * manifest.chunk, manifest.runs)
-        return runs == manifest.runs or (runs >= self._least_runs and all(state.decided))
+        return runs == manifest.runs or (runs >= self._min_runs and all(state.decided))
 
     def _advance(self, cell: int) -> None:
         """Judge the chunks of a cell in their order, up to the first unknown chunk or the decision of the cell."""

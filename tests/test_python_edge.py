@@ -52,7 +52,7 @@ from infoset import (
     StateBox,
     to_omega_alpha,
 )
-from infoset.limits import LARGEST
+from infoset.limits import MAXIMUM
 from rendezvous.multipoint import DriftingTargets, Tour
 from rendezvous.multipoint import Target as Visited
 from rendezvous.relative_motion import ClohessyWiltshire
@@ -121,8 +121,8 @@ MODEL: dict[str, Any] = {
 }
 THRUSTER: dict[str, Any] = {
     "budget_m_s": 1e3,
-    "least_impulse_m_s": 0.25,
-    "greatest_impulse_m_s": 7.5,
+    "min_impulse_m_s": 0.25,
+    "max_impulse_m_s": 7.5,
     "execution_error_relative": 0.0,
     "pointing_error_rad": 0.0,
     "last_impulse_s": 20.0,
@@ -207,7 +207,7 @@ ZERO_IS_SOUND = {
     "gravity_speed_change",
     "execution_error_relative",
     "budget_m_s",
-    "least_impulse_m_s",
+    "min_impulse_m_s",
     "acceleration_m_s2",
     "direction_rad",
     "elevation_rad",
@@ -287,7 +287,7 @@ def test_what_is_no_value_of_a_field(kind: Any, field: str) -> None:
         (lambda: AngleSensor(**SENSOR, first_image_s=1.0, last_image_s=2.0), "first_image_s"),
         (lambda: AngleSensor(**SENSOR, first_image_s=0.0), "first_image_s"),
         (lambda: AngleSensor(**SENSOR, miss_probability=1.0), "miss_probability"),
-        (lambda: Thruster(1e3, 8.0, 7.5), "least_impulse_m_s"),
+        (lambda: Thruster(1e3, 8.0, 7.5), "min_impulse_m_s"),
         (lambda: Thruster(1e3, 0.0, 7.5, 1.0), "execution_error_relative"),
         (lambda: Thruster(1e3, 0.0, 7.5, impulses_s=(30.0, 30.0)), "impulses_s"),
         (
@@ -735,4 +735,4 @@ def test_a_file_takes_whatever_python_takes_2000_times() -> None:
 
 
 def test_results_of_ordinary_size_are_far_from_the_limit() -> None:
-    assert float(np.abs(simulate(load_scenario("asteroid-1997"), 2).position_m).max()) < 1e-9 * LARGEST
+    assert float(np.abs(simulate(load_scenario("asteroid-1997"), 2).position_m).max()) < 1e-9 * MAXIMUM

@@ -29,8 +29,8 @@ def pursuit() -> pursuit_evasion.Solution:
 
 SHOWN: list[tuple[Callable[[], object], str]] = [
     (lambda: load_rendezvous("approach-cone").problem, "6 states and 3 controls in 12 periods: thrust in a box"),
-    (reachable, "least terminal norm"),
-    (lambda: reachable().optimal, "a set of dimension 6, least terminal norm"),
+    (reachable, "minimum terminal norm"),
+    (lambda: reachable().optimal, "a set of dimension 6, minimum terminal norm"),
     (lambda: reachable().sets, "exact sets in blocks of 4, 2 states"),
     (lambda: encounter().encounter, "craft=<3 items>, meeting_s=30"),
     (lambda: encounter().costs[0], "effort_slope=<shape (6, 2)>"),

@@ -52,7 +52,7 @@ for step in range(20):
 information
 
 # %%
-# One step, drawn before and after each of its stages. The measurement has the greatest allowed error, so its band cuts
+# One step, drawn before and after each of its stages. The measurement has the maximum allowed error, so its band cuts
 # off a large part of the section.
 
 time_s = 10.0

@@ -42,7 +42,7 @@ plt.show()
 
 # %%
 # At first the interval is wide and symmetric, so no impulse is needed. When a measurement cuts off one end, impulses of
-# the greatest size bring zero back to the middle. Afterwards measurements shrink the interval. Random errors are
+# the maximum size bring zero back to the middle. Afterwards measurements shrink the interval. Random errors are
 # sometimes close to their bounds and then cut the set. Game noise is chosen so that the worst corner stays in the set,
 # and the interval shrinks late:
 

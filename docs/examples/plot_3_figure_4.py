@@ -4,8 +4,8 @@ Fifty engagements per curve: figure 4 of the paper
 
 The distribution of miss and impulse over many engagements with random starts shows how good a strategy is.
 
-The four curves are those of the paper: random errors (1), random errors with a range meter (2), game noise (3), and
-game noise with a range meter (4). All have the same fifty starts.
+The four curves are those of the paper: random errors (1), random errors with a range sensor (2), game noise (3), and
+game noise with a range sensor (4). All have the same fifty starts.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ library_figure = draw_distributions(curves)
 
 # %%
 # Fifty runs determine a distribution function to within 0.19 at 95 % confidence, so the bands are wide. The conclusion
-# of the paper holds nevertheless: a range meter of 5 % helps little, and the difference between random errors and game
+# of the paper holds nevertheless: a range sensor of 5 % helps little, and the difference between random errors and game
 # noise is large.
 
 for curve in curves:

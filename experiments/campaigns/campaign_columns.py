@@ -25,7 +25,7 @@ class CampaignColumns:
     """
 
     noise: str
-    range_meter: bool
+    range_sensor: bool
     miss_m: Floats
     impulse_m_s: Floats
     guaranteed_miss_m: Floats

@@ -17,8 +17,8 @@ from experiments.campaigns.campaign_columns import CampaignColumns
 from experiments.campaigns.samples import noise_flags
 from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, separate_labels, style
 from experiments.common.screen import some_runs
-from experiments.interception.figures.b_plane import Cloud, draw_b_plane, greatest_guarantee
-from experiments.interception.figures.distributions import MOST_POINTS, Sample, axis_limit, beyond, draw_samples
+from experiments.interception.figures.b_plane import Cloud, draw_b_plane, max_guarantee
+from experiments.interception.figures.distributions import MAX_POINTS, Sample, axis_limit, beyond, draw_samples
 from infoset.arrays import Floats
 from sim import estimate_quantiles
 from sim.statistics import level_name, shows
@@ -26,7 +26,7 @@ from sim.storage import CampaignFolder
 
 CONVERGING = (0.5, 0.9, 0.99)
 RUNS_A_BIN = 100
-"""Least mean number of runs in a bin of the median and the 90 % quantile over the initial state."""
+"""Minimum mean number of runs in a bin of the median and the 90 % quantile over the initial state."""
 _LOOKS = 28
 _BINS = 24
 _SMALL_KM_S = 0.01
@@ -54,11 +54,11 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
     """Draw the distribution functions of the noises, at least one, with `draw_samples`."""
     samples = []
     for column in columns:
-        meter = "with" if column.range_meter else "no"
+        meter = "with" if column.range_sensor else "no"
         bound = "guaranteed miss" if column.guarantees else "the paper's $\\Phi$ (not a bound here)"
         samples.append(
             Sample(
-                f"{column.noise} noise, {meter} range meter, {some_runs(column.miss_m.size)}",
+                f"{column.noise} noise, {meter} range sensor, {some_runs(column.miss_m.size)}",
                 _look(column),
                 column.miss_m,
                 column.impulse_m_s,
@@ -76,7 +76,7 @@ def _clouds(folder: CampaignFolder) -> list[Cloud]:
     guaranteed = folder.manifest.scenario.set_model.is_guaranteed
     clouds = []
     for noise, rows in noise_flags(folder).items():
-        bound_m = greatest_guarantee(bounds_m[rows].tolist()) if guaranteed else None
+        bound_m = max_guarantee(bounds_m[rows].tolist()) if guaranteed else None
         clouds.append(Cloud(f"{noise} noise, {some_runs(len(miss_m[rows]))}", across_m[rows], miss_m[rows], bound_m))
     return [each for each in clouds if len(each.miss_m)]
 
@@ -134,7 +134,7 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
                 separate_labels(axes)
             row[0].set_ylabel("\n".join(["miss, m", *filter(None, [beyond("runs", [column.miss_m], 1.04 * limit)])]))
         most = max(column.miss_m.size for column in columns)
-        runs = f"runs (at most {MOST_POINTS} drawn)" if most > MOST_POINTS else "runs"
+        runs = f"runs (at most {MAX_POINTS} drawn)" if most > MAX_POINTS else "runs"
         handles = [Line2D([], [], linestyle="", marker=".", color=LIMIT, label=runs)]
         if binned:
             handles += [
@@ -168,8 +168,8 @@ def _convergence_legend(figure: Figure, drawn: set[float], banded: set[float]) -
 
 def _convergence(axes: Axes, sample: Floats, colour: str, drawn: set[float], banded: set[float]) -> None:
     """Draw the quantiles over the number of runs, and add the levels that are drawn, with and without interval."""
-    least = min(10, sample.size)
-    counts = np.unique(np.geomspace(least, sample.size, _LOOKS).astype(np.int64))
+    minimum = min(10, sample.size)
+    counts = np.unique(np.geomspace(minimum, sample.size, _LOOKS).astype(np.int64))
     looks = [estimate_quantiles(sample[:count], CONVERGING) for count in counts.tolist()]
     for index, level in enumerate(CONVERGING):
         known = [(runs, look[index]) for runs, look in zip(counts.tolist(), looks, strict=True) if shows(runs, level)]
@@ -185,7 +185,7 @@ def _convergence(axes: Axes, sample: Floats, colour: str, drawn: set[float], ban
             axes.fill_between(runs, lower, upper, facecolor=colour, alpha=0.18, linewidth=0.0, zorder=1.5 + 0.1 * index)
             for edge in (lower, upper):
                 axes.plot(runs, edge, color=colour, linestyle=_line(index), linewidth=0.5, alpha=0.6, zorder=2.0)
-    if sample.size >= 10 * least:
+    if sample.size >= 10 * minimum:
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     else:
@@ -194,24 +194,24 @@ def _convergence(axes: Axes, sample: Floats, colour: str, drawn: set[float], ban
         FuncFormatter(lambda tick, _: f"{tick:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}"))
     )
     axes.xaxis.set_minor_formatter(NullFormatter())
-    if least < sample.size:
-        axes.set_xlim(least, sample.size)
+    if minimum < sample.size:
+        axes.set_xlim(minimum, sample.size)
     bottom, top = axes.get_ylim()
     axes.set_ylim(bottom if bottom > 0.5 * top else 0.0, top)
 
 
 def _cloud(axes: Axes, start: Floats, miss: Floats, colour: str) -> bool:
     """Draw the runs, and their median and 90 % quantile if they are enough; return whether these are drawn."""
-    step = -(-miss.size // MOST_POINTS)
-    size = min(2.2, (MOST_POINTS / miss.size) ** 0.25) if step == 1 else 1.0
+    step = -(-miss.size // MAX_POINTS)
+    size = min(2.2, (MAX_POINTS / miss.size) ** 0.25) if step == 1 else 1.0
     look: dict[str, Any] = {"color": colour, "alpha": 0.4 * size, "markersize": 2.5 * size, "markeredgewidth": 0.0}
     axes.plot(start[::step], miss[::step], ".", zorder=2.0, rasterized=True, **look)
-    least, greatest = float(start.min()), float(start.max())
+    minimum, maximum = float(start.min()), float(start.max())
     bins = min(_BINS, miss.size // RUNS_A_BIN)
-    if bins < 2 or greatest <= least:
+    if bins < 2 or maximum <= minimum:
         return False
-    bin_of = np.minimum(((start - least) / (greatest - least) * bins).astype(np.int64), bins - 1)
-    middle = least + (np.arange(bins) + 0.5) * (greatest - least) / bins
+    bin_of = np.minimum(((start - minimum) / (maximum - minimum) * bins).astype(np.int64), bins - 1)
+    middle = minimum + (np.arange(bins) + 0.5) * (maximum - minimum) / bins
     for order, level in enumerate((0.5, 0.9)):
         filled = np.unique(bin_of)
         values = [np.quantile(miss[bin_of == number], level) for number in filled]

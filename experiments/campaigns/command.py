@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 import typer
 
 from experiments.common.options import FileOptions, Json, Overwrite, Quiet, Seed, Settings
-from experiments.interception.command import MOST_RUNS, RangeMeter, ScenarioName, StrategyName, StudyModel, TieName
+from experiments.interception.command import MAX_RUNS, RangeSensor, ScenarioName, StrategyName, StudyModel, TieName
 
-MOST_WORKERS = 1024
-MOST_AT_ONCE = 1_000_000
+MAX_WORKERS = 1024
+MAX_AT_ONCE = 1_000_000
 
 Required = Annotated[
     str | None,
@@ -20,8 +20,8 @@ Required = Annotated[
         "--require",
         metavar="RULE",
         help='Requirement: the upper bound of a quantile, "miss_m p99<10" (without a quantile p99: "miss_m<10"), or '
-        'the least probability of a hit, "hit>=0.95". Each cell meets it, does not meet it, or is undecided, with 95 % '
-        "confidence. Default: in a report, that of the sweep; otherwise hit>=0.95 if the body has a size, else "
+        'the minimum probability of a hit, "hit>=0.95". Each cell meets it, does not meet it, or is undecided, with '
+        "95 % confidence. Default: in a report, that of the sweep; otherwise hit>=0.95 if the body has a size, else "
         "miss_m p99<10.",
     ),
 ]
@@ -35,7 +35,7 @@ Shown = Annotated[
 ]
 
 
-_WORKERS: dict[str, Any] = {"metavar": "W", "min": 1, "max": MOST_WORKERS}
+_WORKERS: dict[str, Any] = {"metavar": "W", "min": 1, "max": MAX_WORKERS}
 _SOME_WORKERS = 4
 """Number in a message about a wrong number of workers."""
 
@@ -51,7 +51,7 @@ class Flight:
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs.")]
+    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs.")]
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")]
     noise: Annotated[
         Literal["random", "game", "mixed"] | None,
@@ -63,7 +63,7 @@ class Flight:
     strategy: StrategyName = None
     model: StudyModel = None
     tie: TieName = None
-    range_meter: RangeMeter = None
+    range_sensor: RangeSensor = None
     json: Json = None
     overwrite: Overwrite = False
     quiet: Quiet = False
@@ -76,7 +76,7 @@ class Flight:
             "Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
             metavar="N",
             min=1,
-            max=MOST_AT_ONCE,
+            max=MAX_AT_ONCE,
         ),
     ] = None
     workers: Annotated[
@@ -133,10 +133,10 @@ class Sweep(Flight):
     Forms of --vary: KEY=FROM:TO:COUNT, equal spacing; KEY=log:FROM:TO:COUNT, logarithmic spacing;
     KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.min or KEY.max, an end of a pair;
     angle_sensor.scale, a factor of all error bounds of a sensor. For example: --vary angle_sensor.scale=1:8:8 --vary
-    thruster.greatest_impulse_m_s=2.5:20:8.
+    thruster.max_impulse_m_s=2.5:20:8.
     """
 
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs of each cell.")] = 400
+    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each cell.")] = 400
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")] = Path("sweep")
     vary: Annotated[
         list[str],
@@ -150,14 +150,14 @@ class Sweep(Flight):
     until: Annotated[
         Literal["decided"] | None,
         typer.Option(
-            help="decided: add runs to each cell until the requirement is met or not met there, at most --most-runs. "
+            help="decided: add runs to each cell until the requirement is met or not met there, at most --max-runs. "
             "The confidence of the decisions holds although runs are added."
         ),
     ] = None
-    most_runs: Annotated[
+    max_runs: Annotated[
         int | None,
         typer.Option(
-            metavar="N", min=1, max=MOST_RUNS, help="Greatest number of runs of a cell with --until. Default: 2000."
+            metavar="N", min=1, max=MAX_RUNS, help="Maximum number of runs of a cell with --until. Default: 2000."
         ),
     ] = None
     show: Shown = None

@@ -37,8 +37,8 @@ RESUME_HINT = "; the stored runs are complete: continue with --resume"
 ESTIMATED_FROM = 50_000
 """Number of engagements from which time and disk space are estimated first."""
 
-MOST_WARNINGS = 5
-"""Greatest number of warnings shown for a sweep, whose cells have similar warnings."""
+MAX_WARNINGS = 5
+"""Maximum number of warnings shown for a sweep, whose cells have similar warnings."""
 BYTES_A_RUN, BYTES_A_SHARD = 66, 6_000
 _WARM_UP = 8
 
@@ -70,7 +70,7 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
     for line in notes:
         note(line)
-    for warning in warnings[: MOST_WARNINGS if campaign.cells else None]:
+    for warning in warnings[: MAX_WARNINGS if campaign.cells else None]:
         note(f"warning: {warning}")
     with workers_of(options, note) as workers, campaign_progress(campaign.kind, options.quiet) as progress:
         if campaign.engagements >= ESTIMATED_FROM:

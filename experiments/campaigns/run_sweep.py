@@ -20,7 +20,7 @@ from sim.storage import need_arrow, need_free
 
 ASK_FROM = 1_000_000
 """Number of engagements above which the command asks before it starts a sweep."""
-MOST_RUNS_A_CELL = 2000
+MAX_RUNS_A_CELL = 2000
 """Default limit of the runs of a cell that is undecided."""
 
 
@@ -51,7 +51,7 @@ def run(options: Options) -> None:
             guarantee=guarantee,
             chunk=options.chunk,
             until=required if options.until else None,
-            most_runs=_most_runs(options),
+            max_runs=_max_runs(options),
             require=required,
         )
         need_free(options.out, resume=options.resume)
@@ -68,27 +68,27 @@ def run(options: Options) -> None:
         say("no figure: a figure can show one or two keys only", options.quiet)
 
 
-def _most_runs(options: Options) -> int | None:
-    """Return the greatest number of runs of a cell; None without --until."""
+def _max_runs(options: Options) -> int | None:
+    """Return the maximum number of runs of a cell; None without --until."""
     if options.until is None:
-        if options.most_runs is not None:
-            raise InputError("--most-runs is the limit of --until; add --until decided, or omit it")
+        if options.max_runs is not None:
+            raise InputError("--max-runs is the limit of --until; add --until decided, or omit it")
         return None
-    if options.most_runs is not None and options.most_runs < options.runs:
+    if options.max_runs is not None and options.max_runs < options.runs:
         raise InputError(
-            f"--most-runs: must be at least --runs, {options.runs}, found {options.most_runs}; give a greater number"
+            f"--max-runs: must be at least --runs, {options.runs}, found {options.max_runs}; give a greater number"
         )
-    return max(MOST_RUNS_A_CELL, options.runs) if options.most_runs is None else options.most_runs
+    return max(MAX_RUNS_A_CELL, options.runs) if options.max_runs is None else options.max_runs
 
 
 def _ask(swept: Sweep) -> None:
     """Ask the user to confirm a long sweep; without a terminal, refuse it."""
     if swept.engagements <= ASK_FROM:
         return
-    cells = f"{len(swept.cells)} cells of {swept.greatest_runs} runs"
+    cells = f"{len(swept.cells)} cells of {swept.cell_runs} runs"
     question = f"{cells} are {swept.engagements} engagements, more than a million"
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        fewer = "--most-runs" if swept.until else "--runs"
+        fewer = "--max-runs" if swept.until else "--runs"
         raise InputError(f"{question}; give --yes to start the sweep, or fewer {fewer} or values")
     if not typer.confirm(f"{question}. Continue?", err=True):
         raise InputError("the sweep was not started; give fewer --runs or values")

@@ -144,7 +144,7 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
         "model": manifest.scenario.information_set.model.value,
         "strategy": manifest.strategy,
         "noise": manifest.noise.value,
-        "range_meter": manifest.scenario.range_sensor is not None,
+        "range_sensor": manifest.scenario.range_sensor is not None,
         "seed": manifest.seed,
         "runs": folder.finished_runs,
         "wanted_runs": folder.wanted_runs,

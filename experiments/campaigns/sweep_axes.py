@@ -16,11 +16,11 @@ from experiments.common.display_units import split_unit
 from experiments.common.errors import InputError, input_errors, shown
 from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
 from sim.scenario import Scenario
-from sim.storage import MOST_CELLS, Axis
+from sim.storage import MAX_CELLS, Axis
 
-MOST_AXES = 4
-MOST_VALUES = 1000
-EXAMPLE = "--vary angle_sensor.scale=1:8:8,thruster.greatest_impulse_m_s=2.5:20:8"
+MAX_AXES = 4
+MAX_VALUES = 1000
+EXAMPLE = "--vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
 
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
@@ -34,8 +34,8 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
     text has another form, or scenarios have no such key; the message suggests the most similar key.
     """
     pieces = [piece.strip() for piece in text.split(",")]
-    if len(pieces) > MOST_AXES:
-        raise InputError(f"--vary: at most {MOST_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
+    if len(pieces) > MAX_AXES:
+        raise InputError(f"--vary: at most {MAX_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
     axes = tuple(_axis(piece, scenario) for piece in pieces)
     bounds = _error_bounds(scenario)
     varied = [(key, tied) for axis in axes for tied in tied_keys(axis.key) for key in bounds.get(tied, {tied: 0.0})]
@@ -45,8 +45,8 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
             problem = "is named twice" if len(set(names)) == 1 else "vary the same value"
             raise InputError(f"--vary: {' and '.join(dict.fromkeys(names))} {problem}; name each key once")
     cells = math.prod(len(axis.values) for axis in axes)
-    if cells > MOST_CELLS:
-        raise InputError(f"--vary: {cells} cells are more than the limit of {MOST_CELLS}; give fewer values")
+    if cells > MAX_CELLS:
+        raise InputError(f"--vary: {cells} cells are more than the limit of {MAX_CELLS}; give fewer values")
     return axes
 
 
@@ -113,8 +113,8 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
         raise InputError(f"--vary: {key} must be greater than 0, found {shown(written)}")
     if scale == "log" and first <= 0:
         raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
-    if not re.fullmatch(r"[0-9]{1,9}", parts[2]) or not 2 <= int(parts[2]) <= MOST_VALUES:
-        problem = f"the count must be a whole number from 2 to {MOST_VALUES}, found {shown(parts[2])}"
+    if not re.fullmatch(r"[0-9]{1,9}", parts[2]) or not 2 <= int(parts[2]) <= MAX_VALUES:
+        problem = f"the count must be a whole number from 2 to {MAX_VALUES}, found {shown(parts[2])}"
         raise InputError(f"--vary: {key}: {problem}")
     count = int(parts[2])
     values = _spaced(first, last, count, scale, whole=whole)

@@ -51,8 +51,8 @@ from sim.storage import Axis
 
 Grid = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 
-MOST_NUMBERS = 120
-"""Greatest number of cells for which numbers are drawn in the cells."""
+MAX_NUMBERS = 120
+"""Maximum number of cells for which numbers are drawn in the cells."""
 
 DECISION_COLOURS = {Decision.MET: "#3f7fb5", Decision.UNDECIDED: "#ececec", Decision.NOT_MET: "#f2a65a"}
 """Colours that differ in grey too, and for colour-blind readers."""
@@ -67,7 +67,7 @@ _DASHES: tuple[Any, ...] = ("-", (0.0, (5.0, 1.5)), (0.0, (1.5, 1.2)), (0.0, (6.
 _NO_VALUE = "\N{EN DASH}"
 """Text in the cells whose runs do not show the quantile."""
 _LETTERS = "abcdefghijklmnopqrstuvwxyz"
-_MOST_TICKS = 8
+_MAX_TICKS = 8
 _HEAD_ROOM = 1.06
 """Factor by which an axis is extended, so that the arrow above the topmost point is visible."""
 _DIAMOND: dict[str, Any] = {
@@ -81,7 +81,7 @@ _LINE: dict[str, Any] = {"color": INK, "linewidth": 1.3}
 _CLOSED_FORM: dict[str, Any] = {"color": "#2f6b3a", "linewidth": 1.3, "linestyle": (0, (5, 1.5))}
 """Lines on which the estimate and the closed form equal the bound."""
 _CELLS: dict[str, Any] = {"edgecolors": "white", "linewidth": 0.3, "zorder": 1.0}
-_MOST_LEGEND_COLUMNS = 5
+_MAX_LEGEND_COLUMNS = 5
 _LINE_MM, _LETTER_MM = 3.6, 1.5
 """Height of a line of an axis label, and width of a letter of a tick label."""
 _STRIP = 0.045
@@ -90,8 +90,8 @@ _BAR_AT, _NUMBERS_AT = 0.2, (0.6, 0.5, 0.75, 0.35)
 """Heights of the limit, and possible heights of the number, in the cells of a map, as fractions of a row."""
 _NUMBER_WIDTH, _NUMBER_HEIGHT = 0.7, 0.36
 """Size of the number in a cell, as fractions of the cell."""
-_MOST_LETTERS = {"x": 52, "y": 36}
-"""Greatest number of letters of a line of an axis label."""
+_MAX_LETTERS = {"x": 52, "y": 36}
+"""Maximum number of letters of a line of an axis label."""
 _MM_PER_POINT = 25.4 / 72.0
 
 
@@ -282,7 +282,7 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
     figure.legend(
         handles=handles,
         loc="lower center",
-        ncols=max(1, len(handles) if len(handles) < _MOST_LEGEND_COLUMNS else -(-len(handles) // 2)),
+        ncols=max(1, len(handles) if len(handles) < _MAX_LEGEND_COLUMNS else -(-len(handles) // 2)),
         title=_map_notes(table, shown, noise),
         title_fontsize=7.0,
     )
@@ -292,7 +292,7 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
 def _map_notes(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> str:
     """Return the meaning of the numbers in the map of decisions, and of cells and quantiles that are not drawn."""
     required, notes = table.required, []
-    if len(table.cells) <= MOST_NUMBERS:
+    if len(table.cells) <= MAX_NUMBERS:
         level = f", {level_name(required.quantile.level)}" if isinstance(required, Requirement) else ""
         notes.append(f"numbers in (a): {QUANTITY_NAMES[required.quantity]}{level}")
     values = [table.grid(noise, quantile) for quantile in shown]
@@ -402,7 +402,7 @@ def _map_panel(figure: Figure, axes: Axes, table: SweepTable, noise: str, quanti
 
 def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, is_dark: Any, heights: Floats) -> None:
     """Write the values into the cells of a map at heights of shape (rows, columns), unless there are too many cells."""
-    if values.size > MOST_NUMBERS:
+    if values.size > MAX_NUMBERS:
         return
     room_mm = width_mm(axes) / len(across.values)
     size = min(6.5, room_mm / _MM_PER_POINT / 2.6)
@@ -461,7 +461,7 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
     if axis.scale == "log":
         (axes.set_xscale if which == "x" else axes.set_yscale)("log")
         one.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    if len(axis.values) <= _MOST_TICKS:
+    if len(axis.values) <= _MAX_TICKS:
         one.set_major_locator(FixedLocator(axis.values))
         one.set_minor_locator(NullLocator())
     one.set_major_formatter(FuncFormatter(lambda tick, _: _tick_text(axis, tick)))
@@ -476,7 +476,7 @@ def _axis_label(axis: Axis, which: str) -> str:
     name = key_label(axis.key).removesuffix(f", {unit}") if unit else key_label(axis.key)
     letters = f"10{power}\N{NO-BREAK SPACE}{unit}" if power else unit
     scaled = f"$10^{{{power}}}$ {unit}".strip() if power else unit
-    label = "\n".join(textwrap.wrap(f"{name}, {letters}" if letters else name, _MOST_LETTERS[which]))
+    label = "\n".join(textwrap.wrap(f"{name}, {letters}" if letters else name, _MAX_LETTERS[which]))
     return label.removesuffix(letters) + scaled
 
 
@@ -486,12 +486,12 @@ def _tick_text(axis: Axis, tick: float) -> str:
 
 
 def _power(axis: Axis) -> int:
-    """Return the power of ten of the labels of an axis: that of the least value if the values span a decade."""
+    """Return the power of ten of the labels of an axis: that of the minimum value if the values span a decade."""
     sizes = [abs(value) for value in axis.values]
-    greatest, least = max(sizes), min(sizes)
-    if 0.01 <= greatest < 1e5:
+    maximum, minimum = max(sizes), min(sizes)
+    if 0.01 <= maximum < 1e5:
         return 0
-    return math.floor(math.log10(least if 10.0 * least < greatest < 1000.0 * least else greatest))
+    return math.floor(math.log10(minimum if 10.0 * minimum < maximum < 1000.0 * minimum else maximum))
 
 
 def _look(levels: Sequence[float], level: float) -> Any:

@@ -31,8 +31,8 @@ from sim import QuantileName, Requirement
 from sim.requirement import CONFIDENCE, AnyRequirement, Decision, Verdict, parse_requirement
 from sim.storage import CampaignFolder
 
-MOST_SHOWN = 8
-MOST_LINES = 40
+MAX_SHOWN = 8
+MAX_LINES = 40
 FIXED = "a fixed number of runs"
 """Condition under which the confidence of an interval holds: no runs are added after a look at the results."""
 
@@ -170,19 +170,19 @@ class SweepReport:
             where = f" in {len(undecided) - len(more)} of them" if more else ""
             text += f"; the estimate is at the bound{where}: the number of runs that would decide is not known yet"
         hint = (
-            f"a greater --most-runs than {manifest.runs}"
+            f"a greater --max-runs than {manifest.runs}"
             if manifest.until
-            else "--until decided (--most-runs, by default 2000)"
+            else "--until decided (--max-runs, by default 2000)"
         )
         return [text, f"to add runs to these cells: repeat infoset sweep with --resume and {hint}"]
 
     def _answer_lines(self, noise: str) -> Iterator[str]:
         lines = answers(self.table, noise)
         yield f"along {self.table.axes[0].key}:"
-        for answer in lines[:MOST_LINES]:
+        for answer in lines[:MAX_LINES]:
             yield f"  {answer.met}{f' (at {answer.at})' if answer.at else ''}"
-        if len(lines) > MOST_LINES:
-            yield f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)"
+        if len(lines) > MAX_LINES:
+            yield f"  {len(lines) - MAX_LINES} more lines are in the JSON report (--json)"
 
 
 def _digest(folder: CampaignFolder, cell: int) -> int:
@@ -207,8 +207,8 @@ def _unknown_notes(verdicts: Sequence[Verdict | None], required: AnyRequirement)
     return [f"{known} of {runs} runs have a value of {required.quantity}; the others do not satisfy the bound"]
 
 
-def _range(least: int, most: int, name: Callable[[int], str]) -> str:
-    return " to ".join(dict.fromkeys((name(least), name(most))))
+def _range(minimum: int, most: int, name: Callable[[int], str]) -> str:
+    return " to ".join(dict.fromkeys((name(minimum), name(most))))
 
 
 def _about(count: int) -> str:
@@ -220,7 +220,7 @@ def _about(count: int) -> str:
 def _decision_tables(table: SweepTable, noise: str) -> Iterator[Part]:
     """Yield decisions and estimates as tables with titles: a row for each value of an axis, or a grid of two axes.
 
-    With more axes there is a grid for each combination of the other values, at most `MOST_LINES` grids.
+    With more axes there is a grid for each combination of the other values, at most `MAX_LINES` grids.
     """
     first, *others = table.axes
     if not others:
@@ -236,7 +236,7 @@ def _decision_tables(table: SweepTable, noise: str) -> Iterator[Part]:
     second, *rest = others
     shape = [len(axis.values) for axis in table.axes]
     cells = np.arange(len(table.cells)).reshape(shape)
-    for indices in itertools.islice(np.ndindex(*shape[2:]), MOST_LINES):
+    for indices in itertools.islice(np.ndindex(*shape[2:]), MAX_LINES):
         grid = cells[(slice(None), slice(None), *indices)]
         at = values_text(rest, indices)
         shown = number_table("", *(value_text(second, value) for value in second.values))
@@ -268,8 +268,8 @@ def quantile_options(
     default_shown = SHOWN if isinstance(required, Requirement) else SHOWN_WITH_HITS
     with input_errors("--show"):
         chosen = default_shown if show is None else tuple(QuantileName.parse(text) for text in show.split(","))
-    if len(chosen) > MOST_SHOWN:
-        raise InputError(f"--show: at most {MOST_SHOWN} quantiles can be drawn, found {len(chosen)}; leave some out")
+    if len(chosen) > MAX_SHOWN:
+        raise InputError(f"--show: at most {MAX_SHOWN} quantiles can be drawn, found {len(chosen)}; leave some out")
     first = (required.quantile,) if isinstance(required, Requirement) else ()
     return required, tuple(dict.fromkeys((*first, *chosen)))
 

@@ -30,8 +30,8 @@ QUANTITY_NAMES = {
     "hit": "probability of a hit",
 }
 _LOG_FROM = 30.0
-"""Ratio of the greatest to the least value from which the values have a logarithmic axis."""
-_MOST_WHOLE = 1e9
+"""Ratio of the maximum to the minimum value from which the values have a logarithmic axis."""
+_MAX_WHOLE = 1e9
 """Whole numbers below this one are printed with all digits."""
 
 
@@ -149,7 +149,7 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Seq
     radii_m = [cell.radius_m for cell in sweep_cells(folder.manifest.scenario, axes)] if is_varied else None
 
     def judged(noise: str, cell: int) -> Verdict | None:
-        """Return a verdict whose runs are those of all noises, like --runs and --most-runs; None without runs."""
+        """Return a verdict whose runs are those of all noises, like --runs and --max-runs; None without runs."""
         values = read(noise, cell)
         if not values.size:
             return None
@@ -251,7 +251,7 @@ def _digits(value: float, gap: float) -> int:
 
 def value_text(axis: Axis, value: float, digits: int = 4) -> str:
     """Return a value of an axis with `digits` digits, or more if neighbouring values would be equal."""
-    if value == round(value) and abs(value) < _MOST_WHOLE:
+    if value == round(value) and abs(value) < _MAX_WHOLE:
         return f"{value:.0f}"
     return f"{value:.{max(digits, 1 + separating_digits(axis))}g}"
 

@@ -68,6 +68,6 @@ def _checked(parameter: inspect.Parameter, hint: Any) -> Any:
     elif kinds[0] in (int, float):
         default = parameter.default
         number = default if isinstance(default, kinds[0]) else max(info.min or 0, *examples or [EXAMPLE])
-        limits = {"least": info.min, "greatest": info.max, "example": f"{option} {number}"}
+        limits = {"minimum": info.min, "maximum": info.max, "example": f"{option} {number}"}
         info.parser = partial(read_number, option, kinds[0], **limits)
     return Annotated[kind, info]

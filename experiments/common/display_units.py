@@ -19,8 +19,8 @@ def time_unit(span_s: float) -> Unit:
 
 def length_unit(size_m: float) -> Unit:
     """Return the unit for lengths up to a size."""
-    for name, metres, least in (("au", 149_597_870_700.0, 7.5e9), ("Mm", 1e6, 2e6), ("km", M_PER_KM, 3e3)):
-        if size_m > least:
+    for name, metres, minimum in (("au", 149_597_870_700.0, 7.5e9), ("Mm", 1e6, 2e6), ("km", M_PER_KM, 3e3)):
+        if size_m > minimum:
             return name, 1.0 / metres
     return "m", 1.0
 

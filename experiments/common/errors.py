@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 INTERRUPTED = 130
 """Exit code of a program that Ctrl-C ends."""
 LONGEST_SHOWN = 60
-"""Greatest length of a value in a message."""
+"""Maximum length of a value in a message."""
 _LONGEST_WORD = 100
 
 

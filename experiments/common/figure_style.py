@@ -36,7 +36,7 @@ CURVE_LOOKS: dict[int, dict[str, Any]] = {
     3: {"color": "#7f2704", "linestyle": "-"},
     4: {"color": "#f08a24", "linestyle": (0, (4, 1.5))},
 }
-"""Dark and solid without the range meter, light and dashed with it; blue random, brown game."""
+"""Dark and solid without the range sensor, light and dashed with it; blue random, brown game."""
 
 LINE_LOOKS: tuple[dict[str, Any], ...] = (
     {"color": TRUTH, "linestyle": "-", "marker": "o"},

@@ -31,7 +31,7 @@ PROBLEMS = {
     "observer": ProblemKind("observe", "observer", "load_observer"),
 }
 """Kinds of problems by the `kind` of their files."""
-LARGEST_FILE_BYTES = 100_000
+MAX_FILE_BYTES = 100_000
 """Size of the largest TOML file that is read."""
 LONGEST_LINE = 1000
 """Longest line of a TOML file: the parser's time grows as the square of the length of a dotted key."""
@@ -112,7 +112,7 @@ def use_of_file(path: Path) -> str | None:
     """Return what a file is, and the command that takes it; None if it is not recognized."""
     try:
         with path.open("rb") as file:
-            return use_of_content(file.read(LARGEST_FILE_BYTES + 1))
+            return use_of_content(file.read(MAX_FILE_BYTES + 1))
     except (OSError, ValueError):
         return None
 
@@ -121,7 +121,7 @@ def use_of_content(content: bytes) -> str | None:
     """Return what a file of this content is, and the command that takes it; None if it is not recognized."""
     if content.startswith(ZIP):
         return "this may be a record; use infoset replay FILE"
-    if len(content) > LARGEST_FILE_BYTES or max(map(len, content.split(b"\n"))) > LONGEST_LINE:
+    if len(content) > MAX_FILE_BYTES or max(map(len, content.split(b"\n"))) > LONGEST_LINE:
         return None
     try:
         kind = kind_of(tomllib.loads(content.decode("utf-8-sig")))
@@ -130,8 +130,8 @@ def use_of_content(content: bytes) -> str | None:
     return None if kind is None else taken_by(kind)
 
 
-def read_input(file: Path, noun: str, most_bytes: int, remedy: str, *, only_ordinary: bool = False) -> bytes:
-    """Return the content of a file of the user, at most `most_bytes`; raise `InputError` if it cannot be read.
+def read_input(file: Path, noun: str, max_bytes: int, remedy: str, *, only_ordinary: bool = False) -> bytes:
+    """Return the content of a file of the user, at most `max_bytes`; raise `InputError` if it cannot be read.
 
     The file may be a pipe or a device unless `only_ordinary`.
     """
@@ -141,7 +141,7 @@ def read_input(file: Path, noun: str, most_bytes: int, remedy: str, *, only_ordi
         if only_ordinary and file.exists() and not file.is_file():
             raise InputError(f"{file}: is not an ordinary file; {remedy}")
         # The buffer of a read has the size that is asked for.
-        size = min(most_bytes, file.stat().st_size) if only_ordinary else most_bytes
+        size = min(max_bytes, file.stat().st_size) if only_ordinary else max_bytes
         with file.open("rb") as stream:
             content = stream.read(size + 1)
     except FileNotFoundError:
@@ -151,8 +151,8 @@ def read_input(file: Path, noun: str, most_bytes: int, remedy: str, *, only_ordi
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise InputError(f"{shown(str(file))}: cannot be read: {reason}; check the path") from None
-    if len(content) > most_bytes:
-        raise InputError(f"{file}: has more than {most_bytes} bytes, more than any {noun}; {remedy}")
+    if len(content) > max_bytes:
+        raise InputError(f"{file}: has more than {max_bytes} bytes, more than any {noun}; {remedy}")
     return content
 
 

@@ -24,8 +24,8 @@ from pydantic import ValidationError
 
 from experiments.common.errors import InputError, nearest, shown
 from experiments.common.file_kinds import (
-    LARGEST_FILE_BYTES,
     LONGEST_LINE,
+    MAX_FILE_BYTES,
     SCENARIO,
     ZIP,
     built_in,
@@ -47,7 +47,7 @@ Kind = TypeVar("Kind")
 _IS_MISSING = "is missing"
 _UNTRAPPED = Context(prec=60, traps=[])
 """Products beyond the range of decimal numbers are infinite, which is refused as any infinite value."""
-_MOST_FAULTS = 50
+_MAX_FAULTS = 50
 
 
 class KeyField(NamedTuple):
@@ -152,7 +152,7 @@ class _Reading:
 
     def _unknown(self, path: KeyPath, known: Mapping[str, KeyField]) -> None:
         """Note a key that no field has, with the nearest one of its table, or the same key of another table."""
-        if len(self._faults) > _MOST_FAULTS:
+        if len(self._faults) > _MAX_FAULTS:
             return
         quantity, unit = quantity_and_unit(path[-1])
         by_quantity = {quantity_and_unit(name)[0]: name for name in known}
@@ -202,8 +202,8 @@ class _Reading:
                 self._invalid(details)
         if made is None or self._faults:
             lines = [f"{self._source}: {self._line(path, text)}" for path, text in self._faults.items()]
-            rest = ["... and more; correct these first"] if len(lines) > _MOST_FAULTS else []
-            raise InputError("\n".join([*lines[:_MOST_FAULTS], *rest]))
+            rest = ["... and more; correct these first"] if len(lines) > _MAX_FAULTS else []
+            raise InputError("\n".join([*lines[:_MAX_FAULTS], *rest]))
         return made
 
     def _invalid(self, details: Mapping[str, Any]) -> None:
@@ -322,7 +322,7 @@ def _scaled(value: Any, factor: Decimal) -> Any:
 def _text_of_file(path: str, noun: str) -> str:
     """Return the text of a file of the user; raise `InputError` if it is not a text."""
     remedy = f"check the path, or see `infoset {noun}s list` for the built-in names"
-    content = read_input(Path(path), f"{noun} file", LARGEST_FILE_BYTES, remedy)
+    content = read_input(Path(path), f"{noun} file", MAX_FILE_BYTES, remedy)
     if content.startswith(ZIP):
         raise InputError(f"{path}: {use_of_content(content)}")
     try:

@@ -93,7 +93,7 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
 
 
 def read_number(
-    option: str, kind: type[int] | type[float], text: Any, *, least: float | None, greatest: float | None, example: str
+    option: str, kind: type[int] | type[float], text: Any, *, minimum: float | None, maximum: float | None, example: str
 ) -> Any:
     """Return the number in a text; raise `InputError`, with an example, if it is none or outside the limits.
 
@@ -108,8 +108,8 @@ def read_number(
         value, quoted = math.nan, f'"{quoted}"'
     if not math.isfinite(value):
         problem = "a whole number" if kind is int else "a finite number"
-    elif (least is None or value >= least) and (greatest is None or value <= greatest):
+    elif (minimum is None or value >= minimum) and (maximum is None or value <= maximum):
         return value
     else:
-        problem = f"at least {least:g}" if greatest is None else f"from {least:g} to {greatest:.10g}"
+        problem = f"at least {minimum:g}" if maximum is None else f"from {minimum:g} to {maximum:.10g}"
     raise InputError(f"{option}: must be {problem}, found {quoted}; for example {example}")

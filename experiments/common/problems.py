@@ -17,11 +17,11 @@ from experiments.common.output import library_version
 from rendezvous.two_body import OrbitalElements, orbit_fault, semi_major_axis_m
 from sim.storage.codec import fingerprint
 
-MOST_RADIANS, LEAST_RADIANS = 1000.0, 1e-9
+MAX_RADIANS, MIN_RADIANS = 1000.0, 1e-9
 """Angles of the orbit during a problem, within which linear motion is meaningful."""
 EARTH_M3_S2, EARTH_RADIUS_M = 3.986004418e14, 6378137.0
-_MOST_RADII = 1000.0
-"""Greatest semi-major axis in radii of the planet: that of an orbit in metres, read as kilometres, is greater."""
+_MAX_RADII = 1000.0
+"""Maximum semi-major axis in radii of the planet: that of an orbit in metres, read as kilometres, is greater."""
 _STAR_M3_S2 = 1e19
 """Gravitational parameter between that of Jupiter, 1.27e17, and that of the Sun, 1.33e20."""
 
@@ -60,9 +60,9 @@ def check_names(table: str, names: Sequence[str]) -> None:
 def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
     """Raise ValueError if the orbit turns by an unlikely angle in a time; `key` is that of the time."""
     angle = duration_s * rate_rad_s
-    if not LEAST_RADIANS <= angle <= MOST_RADIANS:
+    if not MIN_RADIANS <= angle <= MAX_RADIANS:
         raise ValueError(
-            f"{key} is {angle:.3g} radians of the orbit, and {LEAST_RADIANS:g} to {MOST_RADIANS:g} make sense: check "
+            f"{key} is {angle:.3g} radians of the orbit, and {MIN_RADIANS:g} to {MAX_RADIANS:g} make sense: check "
             "its unit and that of the orbit's rate"
         )
 
@@ -80,8 +80,8 @@ def check_orbit(
     fault = orbit_fault(position, velocity, mu_m3_s2, densest_m if planet_radius_m is None else planet_radius_m)
     if fault is None and mu_m3_s2 < _STAR_M3_S2:
         radii = semi_major_axis_m(position, velocity, mu_m3_s2) / densest_m
-        if radii > _MOST_RADII:
-            fault = f"the orbit is {radii:.4g} times as large as the planet; at most {_MOST_RADII:g} times make sense"
+        if radii > _MAX_RADII:
+            fault = f"the orbit is {radii:.4g} times as large as the planet; at most {_MAX_RADII:g} times make sense"
     if fault is not None:
         raise ValueError(f"{key}: {fault}")
 

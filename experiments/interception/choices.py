@@ -13,7 +13,7 @@ from experiments.interception.scenario_file import load_scenario, with_model
 from guidance import Strategy, TieRule, strategy_names
 from guidance.registry import COMPARED
 from infoset import Model
-from infoset.model import MOST_SECTIONS
+from infoset.model import MAX_SECTIONS
 from sim import Scenario
 from sim.scenario import strategy_name
 
@@ -21,34 +21,34 @@ from sim.scenario import strategy_name
 def scenario_with(options: Any) -> Scenario:
     """Read the scenario of a command and replace what its options set; None keeps the value of the scenario.
 
-    The command may have the options `strategy`, `model`, `tie`, `sections` and `range_meter`. ``--strategy
+    The command may have the options `strategy`, `model`, `tie`, `sections` and `range_sensor`. ``--strategy
     FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it. Raise `InputError` if the scenario
     is unsound, or an option does not fit it.
     """
-    strategy, model, tie, sections, range_meter = (
-        getattr(options, name, None) for name in ("strategy", "model", "tie", "sections", "range_meter")
+    strategy, model, tie, sections, range_sensor = (
+        getattr(options, name, None) for name in ("strategy", "model", "tie", "sections", "range_sensor")
     )
     scenario = load_scenario(options.scenario, options.settings)
     if strategy is not None and not is_own_strategy(strategy):
         scenario = replace(scenario, strategy=choice("--strategy", strategy, strategy_names()))
     if tie is not None:
         scenario = replace(scenario, tie=TieRule(tie))
-    if range_meter and scenario.range_sensor is None:
+    if range_sensor and scenario.range_sensor is None:
         raise InputError(
-            f"--range-meter: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
-            "example period_s = 2.0 and relative_error = 0.05, or omit --range-meter"
+            f"--range-sensor: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
+            "example period_s = 2.0 and relative_error = 0.05, or omit --range-sensor"
         )
-    if range_meter is False:
+    if range_sensor is False:
         scenario = replace(scenario, range_sensor=None)
     if model is not None:
         scenario = with_model(scenario, Model(model))
     settings = scenario.information_set
     if sections is not None:
         fewest = settings.fewest_sections
-        if not fewest <= sections <= MOST_SECTIONS:
+        if not fewest <= sections <= MAX_SECTIONS:
             raise InputError(
                 f"--sections: must be from {fewest}, the scenario's information_set.fewest_sections, to "
-                f"{MOST_SECTIONS}, found {sections}; for example --sections {max(29, fewest)}"
+                f"{MAX_SECTIONS}, found {sections}; for example --sections {max(29, fewest)}"
             )
         settings = replace(settings, sections=sections)
     return replace(scenario, information_set=settings)

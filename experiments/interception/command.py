@@ -10,7 +10,7 @@ import typer
 
 from experiments.common.options import Csv, FileOptions, Html, Out, Overwrite, Quiet, Seed, Settings
 
-MOST_RUNS = 10_000_000
+MAX_RUNS = 10_000_000
 
 ScenarioName = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A built-in scenario (see: infoset scenarios), or a scenario file.")
@@ -55,11 +55,11 @@ TieName = Annotated[
     Literal["upper", "lower", "alternate", "random"] | None,
     typer.Option("--tie", help="How game noise breaks ties. Default: that of the scenario."),
 ]
-RangeMeter = Annotated[
+RangeSensor = Annotated[
     bool | None,
     typer.Option(
-        "--range-meter/--no-range-meter",
-        help="Simulate with or without the scenario's range meter. Default: with it, if there is one.",
+        "--range-sensor/--no-range-sensor",
+        help="Simulate with or without the scenario's range sensor. Default: with it, if there is one.",
     ),
 ]
 SetTimes = Annotated[
@@ -78,7 +78,7 @@ RecordFile = Annotated[
 
 @dataclass(frozen=True)
 class Experiment(FileOptions):
-    """Simulate many runs of four cases (curves): random or game noise, without or with the range meter.
+    """Simulate many runs of four cases (curves): random or game noise, without or with the range sensor.
 
     Game noise is measurement errors chosen against the guidance. Run K starts from the same state in all four cases,
     and is the same engagement as in: infoset engage --run K. Without --out, --json or --csv no file is written.
@@ -86,7 +86,7 @@ class Experiment(FileOptions):
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs of each case.")] = 50
+    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each case.")] = 50
     seed: Seed = 0
     strategy: StrategyName = None
     model: ModelName = None
@@ -110,12 +110,12 @@ class Engage(FileOptions):
     noise: Annotated[
         Literal["random", "game", "both"] | None, typer.Option(help="Measurement noise. Default: that of the scenario.")
     ] = None
-    range_meter: RangeMeter = None
+    range_sensor: RangeSensor = None
     strategy: StrategyName = None
     model: ModelName = None
     tie: TieName = None
     seed: Seed = 0
-    run: Annotated[int, typer.Option(metavar="K", min=0, max=MOST_RUNS - 1, help="Number of the run, from 0.")] = 0
+    run: Annotated[int, typer.Option(metavar="K", min=0, max=MAX_RUNS - 1, help="Number of the run, from 0.")] = 0
     record: Annotated[
         Path | None,
         typer.Option(
@@ -140,11 +140,11 @@ class Compare(FileOptions):
     settings: Settings = None
     strategies: Strategies = None
     runs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs for each strategy and noise.")
+        int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs for each strategy and noise.")
     ] = 50
     seed: Seed = 0
     model: StudyModel = None
-    range_meter: RangeMeter = None
+    range_sensor: RangeSensor = None
     csv: Csv = None
 
 
@@ -153,11 +153,11 @@ class Bound(FileOptions):
     """Compute a lower bound of the guaranteed miss of all strategies, and simulate the pairs of states that prove it.
 
     Two true states whose measurements are equal until some step receive equal impulses until that step, so at least
-    one of them misses. The bound is the greatest miss, the least distance of the flight, that such pairs prove. In
+    one of them misses. The bound is the maximum miss, the minimum distance of the flight, that such pairs prove. In
     space, the two states differ along both axes if the errors of the angles are in a box, and along one axis if they
     are in a disc. Each strategy is simulated with these pairs, and in the searches of infoset adversary. Where range
     and closing speed are known and there is no gravity, the bound is the value of the game up to a reserve, which is
-    printed; otherwise the least of the greatest misses found is. Without --out or --json no file is written.
+    printed; otherwise the minimum of the maximum misses found is. Without --out or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -169,7 +169,7 @@ class Bound(FileOptions):
         typer.Option(
             metavar="N",
             min=0,
-            max=MOST_RUNS,
+            max=MAX_RUNS,
             help="Number of engagements in the search for the worst one, for each strategy; 0 skips the search.",
         ),
     ] = 500
@@ -178,11 +178,11 @@ class Bound(FileOptions):
 
 @dataclass(frozen=True)
 class Adversary(FileOptions):
-    """Search for the initial state, the measurement errors and the target that give the greatest miss of a strategy.
+    """Search for the initial state, the measurement errors and the target that give the maximum miss of a strategy.
 
     The search covers all initial states that the scenario allows, all errors within their bounds and, in the model
     guaranteed, targets that accelerate at the bound of the model. Two misses of the worst engagement are printed: the
-    greatest one of any state that the set contains when control ends, and that of the simulated truth. Greater misses
+    maximum one of any state that the set contains when control ends, and that of the simulated truth. Greater misses
     may exist. If the set became empty in some engagements, a second search includes them, and both results are printed.
     The same seed and budget give the same result; infoset bound has the searches with --objective fixed-truth. Without
     --out, --json or --record no file is written.
@@ -192,14 +192,14 @@ class Adversary(FileOptions):
     settings: Settings = None
     strategy: StrategyName = None
     model: StudyModel = None
-    range_meter: RangeMeter = None
+    range_sensor: RangeSensor = None
     budget: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of engagements in a search.")
+        int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of engagements in a search.")
     ] = 2000
     objective: Annotated[
         Literal["any-state", "fixed-truth"],
         typer.Option(
-            help="What the search maximises: the greatest miss of any state of the set when control ends, which agrees "
+            help="What the search maximises: the maximum miss of any state of the set when control ends, which agrees "
             "with all measurements until then, or the miss of the simulated truth."
         ),
     ] = "any-state"
@@ -224,7 +224,7 @@ class Replay:
     frames: Annotated[
         int,
         typer.Option(
-            metavar="N", min=2, max=1000, help="Greatest number of frames of an animation; fewer make a smaller file."
+            metavar="N", min=2, max=1000, help="Maximum number of frames of an animation; fewer make a smaller file."
         ),
     ] = 40
     width: Annotated[

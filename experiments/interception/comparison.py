@@ -29,12 +29,12 @@ class Comparison:
 
     @property
     def miss_m(self) -> Floats:
-        """Greatest miss of each run over the tie rules, m, shape (N,)."""
+        """Maximum miss of each run over the tie rules, m, shape (N,)."""
         return np.asarray(np.max([each.miss_m for each in self.results.values()], axis=0), dtype=np.float64)
 
     @property
     def impulse_m_s(self) -> Floats:
-        """Greatest impulse spent of each run over the tie rules, m/s, shape (N,)."""
+        """Maximum impulse spent of each run over the tie rules, m/s, shape (N,)."""
         return np.asarray(np.max([each.impulse_m_s for each in self.results.values()], axis=0), dtype=np.float64)
 
     @property

@@ -18,11 +18,11 @@ from sim.adversary import WORST_FOUND
 from sim.engagement import Step
 from sim.results import ending
 
-MOST_STEPS = 400
+MAX_STEPS = 400
 """Number of steps above which a flight is long: its time axis is logarithmic in the time before the arrival."""
 
-MOST_COURSES = 1000
-"""Greatest number of runs whose courses are kept."""
+MAX_COURSES = 1000
+"""Maximum number of runs whose courses are kept."""
 
 UNITS = (("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0))
 """Units of times before the arrival."""
@@ -40,7 +40,7 @@ class Clock:
     @classmethod
     def of(cls, records: Sequence[Record]) -> Clock:
         """Return the time axis for records: logarithmic for long flights, and if times before arrival are scheduled."""
-        return cls(any(len(record.steps) > MOST_STEPS or marks(record.scenario) for record in records))
+        return cls(any(len(record.steps) > MAX_STEPS or marks(record.scenario) for record in records))
 
     def at(self, record: Record, times_s: ArrayLike | None = None) -> Floats:
         """Return the positions of times on the axis, s; None is the times of the steps.
@@ -50,22 +50,22 @@ class Clock:
         times = np.asarray([step.time_s for step in record.steps] if times_s is None else times_s, dtype=np.float64)
         if not self.counts_down:
             return times
-        return np.maximum(record.scenario.nominal_arrival_s - times, least_to_go_s(record.scenario))
+        return np.maximum(record.scenario.nominal_arrival_s - times, min_to_go_s(record.scenario))
 
     def text(self, record: Record, time_s: float) -> str:
         """Return a time of a step as text."""
         if not self.counts_down:
             return f"t = {time_s:g} s"
         left_s = record.scenario.nominal_arrival_s - time_s
-        if abs(left_s) < least_to_go_s(record.scenario):
+        if abs(left_s) < min_to_go_s(record.scenario):
             return "at the nominal arrival"
         return (
             f"{duration_text(left_s)} before arrival" if left_s > 0.0 else f"{-left_s:.3g} s after the nominal arrival"
         )
 
 
-def least_to_go_s(scenario: Scenario) -> float:
-    """Return the least time before the arrival of a logarithmic axis, s."""
+def min_to_go_s(scenario: Scenario) -> float:
+    """Return the minimum time before the arrival of a logarithmic axis, s."""
     return 0.5 * scenario.set_model.step_s
 
 
@@ -76,21 +76,21 @@ def evenly(places: NDArray[Any], count: int) -> Integers:
 
 
 def kept_steps(record: Record) -> list[int]:
-    """Return the steps that pages and terminals show: all, or of a long flight at most `MOST_STEPS`.
+    """Return the steps that pages and terminals show: all, or of a long flight at most `MAX_STEPS`.
 
-    The first and last step and image, and up to a quarter of `MOST_STEPS` impulses are among them. The others are
+    The first and last step and image, and up to a quarter of `MAX_STEPS` impulses are among them. The others are
     evenly distributed, half over the steps and half over the logarithm of the time before arrival.
     """
     count = len(record.steps)
-    if count <= MOST_STEPS:
+    if count <= MAX_STEPS:
         return list(range(count))
     fired = np.flatnonzero([step.impulse_m_s for step in record.steps])
-    if len(fired) > MOST_STEPS // 4:
-        fired = fired[evenly(np.arange(len(fired)), MOST_STEPS // 4)]
+    if len(fired) > MAX_STEPS // 4:
+        fired = fired[evenly(np.arange(len(fired)), MAX_STEPS // 4)]
     seen = np.flatnonzero(["angle" in step.measured for step in record.steps])
     kept = {0, count - 1, *fired.tolist(), *seen[[0, -1] if len(seen) else []].tolist()}
     places = -np.log(Clock(counts_down=True).at(record))
-    half = (MOST_STEPS - len(kept)) // 2
+    half = (MAX_STEPS - len(kept)) // 2
     return sorted(kept.union(evenly(places, half).tolist(), evenly(np.arange(count), half).tolist()))
 
 
@@ -108,7 +108,7 @@ def marks(scenario: Scenario) -> dict[str, float]:
 
 
 def duration_text(seconds: float) -> str:
-    """Return a time in the greatest unit of which it has exactly one or at least two: ``2.5 min``, ``100 s``."""
+    """Return a time in the maximum unit of which it has exactly one or at least two: ``2.5 min``, ``100 s``."""
     fitting = ((name, unit) for name, unit in UNITS if seconds == unit or seconds >= 2.0 * unit)
     name, unit = next(fitting, UNITS[-1])
     return f"{seconds / unit:.3g} {name}"
@@ -136,11 +136,11 @@ def possible_misses(record: Record) -> tuple[Floats, Mapping[str, Floats]]:
     """
     known = []
     model = record.scenario.set_model
-    least_range_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
+    min_range_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
     for index, step in enumerate(record.steps):
         if step.predicted_miss_m is not None:
             known.append(index)
-        if step.sections and step.sections[0].range_m < least_range_m:
+        if step.sections and step.sections[0].range_m < min_range_m:
             break
     axes = record.scenario.set_model.axes
     return np.array(known, dtype=np.int64), {
@@ -152,29 +152,29 @@ def possible_misses(record: Record) -> tuple[Floats, Mapping[str, Floats]]:
 class Courses:
     """Possible misses and impulses of many runs of a scenario over time, an observer of `simulate`.
 
-    At most `MOST_COURSES` runs are kept.
+    At most `MAX_COURSES` runs are kept.
 
     Attributes
     ----------
     steps : ndarray of int, shape (n,)
-        Steps until the nominal arrival, of a long flight at most about `MOST_STEPS`, with those of scheduled impulses.
+        Steps until the nominal arrival, of a long flight at most about `MAX_STEPS`, with those of scheduled impulses.
     possible_m : ndarray, shape (runs, n)
-        Greatest possible miss without further impulses, m; NaN if the set is empty, or after its first section left.
+        Maximum possible miss without further impulses, m; NaN if the set is empty, or after its first section left.
     impulse_m_s : ndarray, shape (runs, n)
-        Modulus of the greatest impulse since the step before, m/s.
+        Modulus of the maximum impulse since the step before, m/s.
     """
 
     def __init__(self, scenario: Scenario, runs: int) -> None:
         self.scenario = scenario
         every = np.arange(math.ceil(scenario.nominal_arrival_s / scenario.set_model.step_s))
         self.steps = every
-        if len(every) > MOST_STEPS:
+        if len(every) > MAX_STEPS:
             places = -np.log(len(every) - every)
             fired = scenario.impulse_steps or ()
             scheduled = fired if scenario.thruster.impulses_s else ()
-            half = MOST_STEPS // 2
+            half = MAX_STEPS // 2
             self.steps = np.unique([*evenly(places, half), *evenly(every, half), *scheduled]).astype(np.int64)
-        self.possible_m = np.full((min(runs, MOST_COURSES), len(self.steps)), np.nan)
+        self.possible_m = np.full((min(runs, MAX_COURSES), len(self.steps)), np.nan)
         self.impulse_m_s = np.zeros_like(self.possible_m)
 
     @property
@@ -197,8 +197,8 @@ class Courses:
         nearest_m, _ = step.information.stored_range_interval_m()
         leaving = nearest_m < model.range_threshold_m + model.closing_speed_m_s * model.step_s
         known = step.tracking & miss.exists & ~leaving
-        greatest = modulus(np.maximum(np.abs(miss.lower_m), np.abs(miss.upper_m)))
-        possible[:, column] = np.where(known, greatest, np.nan)[:count]
+        maximum = modulus(np.maximum(np.abs(miss.lower_m), np.abs(miss.upper_m)))
+        possible[:, column] = np.where(known, maximum, np.nan)[:count]
         if column:
             possible[np.isnan(possible[:, column - 1]), column] = np.nan
 
@@ -207,9 +207,9 @@ _OUTCOMES = {Outcome.SET_EMPTY: "set empty", Outcome.BUDGET_SPENT: "budget spent
 
 
 def noise_title(record: Record) -> str:
-    """Return the title of the noise of an engagement: `random noise`, or `game noise, range meter`."""
+    """Return the title of the noise of an engagement: `random noise`, or `game noise, range sensor`."""
     name = "worst errors found" if record.noise == WORST_FOUND else f"{record.noise_name} noise"
-    return name + (", range meter" if record.scenario.range_sensor is not None else "")
+    return name + (", range sensor" if record.scenario.range_sensor is not None else "")
 
 
 def record_titles(records: Sequence[Record]) -> list[str]:

@@ -11,11 +11,11 @@ from sim import Results, Scenario
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve of the experiment: 1 random noise, 2 random with range meter, 3 game noise, 4 game with range meter."""
+    """Curve of the experiment: 1 random noise, 2 random with range sensor, 3 game noise, 4 game with range sensor."""
 
     number: int
     noise: NoiseKind
-    range_meter: bool
+    range_sensor: bool
     results: Results
 
 

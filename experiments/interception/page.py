@@ -16,8 +16,8 @@ from experiments.interception.course import (
     angle_name,
     duration_text,
     kept_steps,
-    least_to_go_s,
     marks,
+    min_to_go_s,
     outcome_title,
     possible_misses,
     record_titles,
@@ -29,7 +29,7 @@ from infoset.sensors import SENSORS
 from sim import Record, Scenario
 from sim.gravity import on_board_model
 
-MOST_RECORDS = 2
+MAX_RECORDS = 2
 TOLERANCE = 5e-4
 """Tolerance of outlines in a page of a long flight, as a part of their box: about 0.2 pixels on a screen."""
 _PASSES = (1, 0) * 4
@@ -83,14 +83,14 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "facts": f"{record.strategy} strategy, {model.model.value} model, seed {record.seed}, "
         f"run {record.run}{thinned}",
         "arrival_s": scenario.nominal_arrival_s,
-        "least_to_go_s": least_to_go_s(scenario),
+        "min_to_go_s": min_to_go_s(scenario),
         "marks": [[name, duration_text(time), time] for name, time in marks(scenario).items()],
         "guaranteed_miss_m": record.result.guaranteed_miss_m.tolist()[0] if record.result.guarantees else None,
         "theorem_8_miss_m": record.result.theorem_8_miss_m.tolist()[0],
         "closing_speed_m_s": model.closing_speed_m_s,
         "range_error_relative": scenario.range_sensor.relative_error if scenario.range_sensor is not None else None,
         "rate_error_rad_s": scenario.rate_sensor.error_rad_s if scenario.rate_sensor is not None else None,
-        "greatest_impulse_m_s": thruster.greatest_impulse_m_s,
+        "max_impulse_m_s": thruster.max_impulse_m_s,
         "budget_m_s": thruster.budget_m_s,
         "radius_m": scenario.radius_m,
         "time_s": [step.time_s for step in steps],
@@ -240,7 +240,7 @@ def _of_batch(values: Sequence[float]) -> Floats:
 def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:
     """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX` across the box.
 
-    An outline has at least one vertex. A box is the least of each coordinate, then the greatest. Vertices are left out
+    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum. Vertices are left out
     that are nearer than `tolerance`, a part of the box, to the line through their neighbours.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
@@ -248,13 +248,13 @@ def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[
         return {"boxes": "", "counts": "", "vertices": ""}
     points = np.concatenate(outlines)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    least, greatest = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
-    width = np.where(greatest > least, greatest - least, 1.0)
-    share = (points - np.repeat(least, counts, axis=0)) / np.repeat(width, counts, axis=0)
+    minimum, maximum = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+    width = np.where(maximum > minimum, maximum - minimum, 1.0)
+    share = (points - np.repeat(minimum, counts, axis=0)) / np.repeat(width, counts, axis=0)
     if tolerance > 0.0:
         share, counts = _simplified(share, counts, tolerance)
     return {
-        "boxes": _packed(np.concatenate([least, greatest], axis=1), "<f8"),
+        "boxes": _packed(np.concatenate([minimum, maximum], axis=1), "<f8"),
         "counts": _packed(counts, "<u4"),
         "vertices": _packed(np.rint(share * STEPS_OF_A_BOX), "<u2"),
     }

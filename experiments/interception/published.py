@@ -20,7 +20,7 @@ from sim.storage.codec import fingerprint
 PAPER = "interception"
 SINGLE, MANY = "asteroid-1997-single", "asteroid-1997"
 ONE_RUN = "section 8, one run"
-"""Miss and impulse of the two engagements from z = -8 km, without a range meter."""
+"""Miss and impulse of the two engagements from z = -8 km, without a range sensor."""
 RUNS = 200
 """A curve of figure 4, or runs of one engagement with random errors."""
 RANDOM_TIE_RUNS = 50

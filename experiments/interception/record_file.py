@@ -32,17 +32,17 @@ from experiments.common.input_file import read_text, to_toml
 from experiments.common.output import library_version, write_file
 from infoset import ConvexPolygons, Section
 from infoset.arrays import Floats, Integers
-from infoset.limits import LARGEST
+from infoset.limits import MAXIMUM
 from infoset.sensors import SENSORS
-from infoset.set_queries import LEAST_RANGE_M
+from infoset.set_queries import MIN_RANGE_M
 from sim import AxisStep, Inconsistency, Record, Results, Scenario, StepRecord
 from sim.columns import Column, columns_of, columns_with_values, values_of
 from sim.storage.codec import from_json, to_json
 
 FORMAT = "infoset-record"
 SCHEMA = 2
-LARGEST_FILE_BYTES = 1 << 30
-LARGEST_HEADER_BYTES = 1_000_000
+MAX_FILE_BYTES = 1 << 30
+MAX_HEADER_BYTES = 1_000_000
 LONGEST_NAME, LONGEST_LIBRARY_REASON, LONGEST_REASON = 200, 200, 1000
 REMEDY = "make a record with `infoset engage --record FILE.npz`"
 
@@ -99,7 +99,7 @@ _OFFSETS = {
     "vertex_offsets": ("vertex_v_m_s_z_m", 1),
     "vertex_y_offsets": ("vertex_v_m_s_y_m", 1),
 }
-"""By member of offsets: the member whose rows they divide, and the least number of rows between two offsets."""
+"""By member of offsets: the member whose rows they divide, and the minimum number of rows between two offsets."""
 _RESULT: dict[str, list[Column]] = {}
 """Columns of the result in the header by key; the two components of a start have one key."""
 for _column in columns_of(Results):
@@ -168,9 +168,9 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
     header["sha256"] = _checksum(header, arrays)
     text = json.dumps(header, allow_nan=False).encode()
     content = _pack({"header": np.frombuffer(text, dtype=np.uint8), **arrays})
-    if len(content) > LARGEST_FILE_BYTES:
+    if len(content) > MAX_FILE_BYTES:
         raise InputError(
-            f"{file}: the record would take {len(content)} bytes, more than the {LARGEST_FILE_BYTES} that can be read "
+            f"{file}: the record would take {len(content)} bytes, more than the {MAX_FILE_BYTES} that can be read "
             "back; take fewer sections or longer steps"
         )
     write_file(file, content, overwrite=overwrite)
@@ -185,7 +185,7 @@ def load_record(path: str | os.PathLike[str]) -> Record:
         If the file is not a record, or has changed since it was written.
     """
     file = Path(path)
-    content = read_input(file, "record", LARGEST_FILE_BYTES, REMEDY, only_ordinary=True)
+    content = read_input(file, "record", MAX_FILE_BYTES, REMEDY, only_ordinary=True)
     try:
         arrays = _unpack(content)
         header = _read_header(arrays.pop("header"))
@@ -348,7 +348,7 @@ def _read_array(content: bytes, name: str) -> NDArray[Any]:
 
 
 def _read_header(header: NDArray[Any]) -> dict[str, Any]:
-    if header.size > LARGEST_HEADER_BYTES:
+    if header.size > MAX_HEADER_BYTES:
         raise ValueError("its header is too long")
     with _library_errors("its header is not JSON"):
         values = json.loads(header.tobytes().decode())
@@ -380,7 +380,7 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays) -> Record:
     arrays = {name: np.zeros(steps, dtype=member.kind) for name, member in _MEASURED.items()} | arrays
     _check(arrays)
     first = engagement.inconsistency
-    if first is not None and not (0 <= first.step < steps and abs(first.label_m) <= LARGEST):
+    if first is not None and not (0 <= first.step < steps and abs(first.label_m) <= MAXIMUM):
         raise ValueError("its header is wrong: inconsistency is not at a step of the record")
     return Record(scenario=scenario, result=result, steps=_to_steps(arrays, scenario), **vars(engagement))
 
@@ -392,24 +392,24 @@ def _check(arrays: Arrays) -> None:
         wanted = sizes.get(MEMBERS[name].rows, len(values))
         if len(values) != wanted:
             raise ValueError(f"{name} has {len(values)} rows, not {wanted}")
-        if values.dtype.kind == "f" and not (np.abs(values) <= LARGEST).all():
-            raise ValueError(f"{name} holds a number that is not finite, or more than {LARGEST:g} in size")
+        if values.dtype.kind == "f" and not (np.abs(values) <= MAXIMUM).all():
+            raise ValueError(f"{name} holds a number that is not finite, or more than {MAXIMUM:g} in size")
     if steps == 0:
         raise ValueError("it has no step")
     if arrays["time_s"][0] < 0.0 or (np.diff(arrays["time_s"]) <= 0.0).any():
         raise ValueError("time_s does not rise from a time of at least 0")
-    for name, (indexed, least) in _OFFSETS.items():
+    for name, (indexed, minimum) in _OFFSETS.items():
         if name not in arrays:
             continue
         offsets, size = arrays[name], len(arrays[indexed])
         # The ends are compared before the differences, and one by one: a difference may overflow.
         if offsets[0] != 0 or offsets[-1] != size or (offsets < 0).any() or (offsets > size).any():
             raise ValueError(f"{name} does not run from 0 to {size}")
-        if (np.diff(offsets) < least).any():
+        if (np.diff(offsets) < minimum).any():
             raise ValueError(f"{name} does not rise")
-    for name, least_m in (("section_range_m", LEAST_RANGE_M), ("measured_range_m", 0.0), ("true_range_m", 0.0)):
-        if (arrays[name] < least_m).any():
-            raise ValueError(f"{name} holds a range below {least_m:g}")
+    for name, min_m in (("section_range_m", MIN_RANGE_M), ("measured_range_m", 0.0), ("true_range_m", 0.0)):
+        if (arrays[name] < min_m).any():
+            raise ValueError(f"{name} holds a range below {min_m:g}")
 
 
 def _result_from_json(values: object, run: int, scenario: Scenario) -> Results:

@@ -95,10 +95,10 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
             f"thruster.impulses_s: the impulses at {late} s before the arrival are after the cut-off "
             f"thruster.last_impulse_s, {thruster.last_impulse_s:g} s: they are not given"
         )
-    if thruster.budget_m_s < thruster.least_impulse_m_s:
+    if thruster.budget_m_s < thruster.min_impulse_m_s:
         lines.append(
-            f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.least_impulse_m_s, "
-            f"{thruster.least_impulse_m_s:g}: no impulse can be given"
+            f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.min_impulse_m_s, "
+            f"{thruster.min_impulse_m_s:g}: no impulse can be given"
         )
     return lines
 

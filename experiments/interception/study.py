@@ -61,9 +61,9 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
 
 
 def scenario_title(scenario: Scenario) -> str:
-    """Return the name of a scenario, with its range meter and its model."""
+    """Return the name of a scenario, with its range sensor and its model."""
     meter = "with" if scenario.range_sensor is not None else "without"
-    return f"{scenario.name}, {meter} range meter, model {scenario.information_set.model.value}"
+    return f"{scenario.name}, {meter} range sensor, model {scenario.information_set.model.value}"
 
 
 def study_title(scenario: Scenario, strategy: str, seed: int) -> str:
@@ -100,8 +100,8 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
     )
 
 
-def greatest_guarantee_m(results: Results) -> float | None:
-    """Return the greatest guaranteed miss of runs, m; None if a run has no guarantee."""
+def max_guarantee_m(results: Results) -> float | None:
+    """Return the maximum guaranteed miss of runs, m; None if a run has no guarantee."""
     bounds = results.guaranteed_miss_m
     known = results.guarantees and not np.ma.getmaskarray(bounds).any()
     return float(bounds.max()) if known else None

@@ -30,7 +30,7 @@ from infoset.arrays import Floats
 
 _TRACK_POINTS = 241
 _COMPONENTS = tuple({**look, "marker": "none"} for look in LINE_LOOKS[:3])
-_MOST_NAMED = 12
+_MAX_NAMED = 12
 _SUN_M3_S2 = 1.32712440018e20
 _TARGET: dict[str, Any] = {"color": LIMIT, "linewidth": 0.7, "linestyle": (0, (3, 2))}
 _TARGET_START: dict[str, Any] = {"color": LIMIT, "marker": "."}
@@ -43,7 +43,7 @@ _DOTTED: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (2, 2))}
 def draw_all(report: Report, curves: list[CostCurve]) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other; `curves` are those of `draw_times`."""
     yield draw_path(report.scene)
-    yield draw_control(report.scene, report.problem.greatest_control_m_s2)
+    yield draw_control(report.scene, report.problem.max_control_m_s2)
     yield draw_costates(report.scene)
     yield draw_times(report.scene, curves)
 
@@ -111,7 +111,7 @@ def _mark_visits(panel: Axes, scene: Scene, line: Floats, visits: Floats) -> Non
     """Mark the visits with their names in a plane, for a path and visits of shapes (n, 2)."""
     for visit, rendezvous in zip(visits, scene.path.nodes.rendezvous, strict=True):
         panel.plot(*visit, marker="D" if rendezvous else "o", zorder=5, **_NODE)
-    if len(visits) <= _MOST_NAMED:
+    if len(visits) <= _MAX_NAMED:
         labels = [(name, visit[None], line) for name, visit in zip(scene.names, visits, strict=True)]
         place_labels(panel, labels, np.vstack([visits, line[:1]]), fontsize=7.0, zorder=6)
 
@@ -183,7 +183,7 @@ def _mark_times(scene: Scene, above: Axes, below: Axes) -> None:
                            ha="center", va="bottom", fontsize=7.0)  # fmt: skip
         panel.set_xlim(scene.tour.start_s * per_s, scene.end_s * per_s)
         panel.annotate(f"({letter})", (0.0, 1.0), xycoords="axes fraction", xytext=(-24, 2), textcoords="offset points")
-    if len(scene.order) <= _MOST_NAMED:
+    if len(scene.order) <= _MAX_NAMED:
         for time, target in zip(arrive, scene.names, strict=True):
             above.annotate(target, (time, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
                            textcoords="offset points", ha="center", fontsize=7.0)  # fmt: skip

@@ -73,7 +73,7 @@ class MultipointProblem:
         Mean motion of the reference orbit, which makes the axes those of Hill; its eccentricity and anomaly at t = 0.
     gravitational_parameter_m3_s2 : float
         Gravity of the attracting point, in place of `orbit_rate_rad_s`, which makes the axes inertial.
-    greatest_control_m_s2 : float or None
+    max_control_m_s2 : float or None
         Bound on the control.
     optimise_times : bool
         Whether the times of the visits are optimised.
@@ -92,7 +92,7 @@ class MultipointProblem:
     eccentricity: Part = 0.0
     true_anomaly_rad: Number = 0.0
     gravitational_parameter_m3_s2: Positive | None = None
-    greatest_control_m_s2: Positive | None = None
+    max_control_m_s2: Positive | None = None
     optimise_times: bool = False
     chaser: BodyTable
     target: Annotated[tuple[TargetTable, ...], Field(max_length=200)]

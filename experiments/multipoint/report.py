@@ -22,7 +22,7 @@ _POINTS = 1601
 _CURVE_POINTS = 41
 _NEAREST = 0.12
 _JUMP = 0.3
-_MOST_CURVES = 9
+_MAX_CURVES = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ def cost_curves(scene: Scene, progress: Callable[[float], None] = lambda _done: 
 
     A curve ends where no path exists, or where the path jumps to another local minimum.
     """
-    count = min(len(scene.order), _MOST_CURVES)
+    count = min(len(scene.order), _MAX_CURVES)
     curves = []
     for visit in range(count):
         curves.append(_cost_curve(scene, visit))

@@ -16,8 +16,8 @@ from experiments.multipoint.command import BEST, GIVEN, Multipoint
 from experiments.multipoint.file import MultipointProblem, load_multipoint
 from experiments.multipoint.page import multipoint_page
 from experiments.multipoint.report import Report, Scene, Search, cost_curves, report_json, report_parts, trajectories
-from rendezvous.multipoint import MOST_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
-from rendezvous.piecewise import greatest_control
+from rendezvous.multipoint import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
+from rendezvous.piecewise import max_control
 
 FIGURES = ("figure-path", "figure-control", "figure-costates", "figure-times")
 
@@ -39,7 +39,7 @@ def run(options: Multipoint) -> None:
         if written.wants("--csv"):
             written.save(TRAJECTORIES, trajectories(report.scene), "--csv")
         if options.html is not None:
-            page = multipoint_page(problem.name, report.scene, problem.greatest_control_m_s2)
+            page = multipoint_page(problem.name, report.scene, problem.max_control_m_s2)
             written.deliver("--html", page)
         if options.out is not None:
             from experiments.multipoint.figures import draw_all
@@ -52,10 +52,10 @@ def run(options: Multipoint) -> None:
 def _check(problem: MultipointProblem, search: Search) -> None:
     """Refuse a search that is impossible or too long."""
     targets, times_s = problem.tour.targets.targets, problem.times_s
-    if search.order == BEST and len(targets) > MOST_TARGETS:
+    if search.order == BEST and len(targets) > MAX_TARGETS:
         raise InputError(
             f"--order best: {len(targets)} targets have {_large(math.factorial(len(targets)))} orders; the search "
-            f"takes at most {MOST_TARGETS} targets, with {_large(math.factorial(MOST_TARGETS))} orders and already "
+            f"takes at most {MAX_TARGETS} targets, with {_large(math.factorial(MAX_TARGETS))} orders and already "
             "some minutes; list fewer targets, or list them in a good order"
         )
     if search.times == BEST:
@@ -75,12 +75,12 @@ def _large(number: int) -> str:
 def _solve(problem: MultipointProblem, search: Search, progress: Progress) -> Report:
     with input_errors(problem.name):
         best = _best(problem, search, progress)
-        path, peak = best.path, greatest_control(best.path.control, best.path.breaks())
+        path, peak = best.path, max_control(best.path.control, best.path.breaks())
     need_finite(problem, path.cost, best.objective, path.costate_start, path.arrival_states, path.time_gradient)
-    bound = problem.greatest_control_m_s2
+    bound = problem.max_control_m_s2
     if bound is not None and peak > bound:
         raise InputError(
-            f"{problem.name}: greatest_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
+            f"{problem.name}: max_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
             f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
         )
     return Report(problem, search, Scene(problem.axes, problem.tour, best.order, path), best, peak)

@@ -11,7 +11,7 @@ import typer
 
 from experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings
 
-MOST_STEPS = 10_000
+MAX_STEPS = 10_000
 
 
 class Errors(Enum):

@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from experiments.common.errors import InputError, shown
-from experiments.observer.command import MOST_STEPS, Errors
+from experiments.observer.command import MAX_STEPS, Errors
 from experiments.observer.file import ObserverProblem
 from infoset import Zonotope
 from infoset.arrays import Floats
-from infoset.limits import LARGEST
+from infoset.limits import MAXIMUM
 from infoset.observer_sets import Set, polytope_of
 
-LARGEST_CSV_BYTES = 10_000_000
-LARGEST_STATE = 1e40
-"""Greatest state of which sets are computed."""
+MAX_CSV_BYTES = 10_000_000
+MAX_STATE = 1e40
+"""Maximum state of which sets are computed."""
 _STEP = re.compile(r"[0-9]{1,15}")
 
 
@@ -70,9 +70,9 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
 
 def need_size(where: str, *values: Floats) -> None:
     """Raise an error if a state is too large; NaN is not."""
-    if any((np.abs(numbers) > LARGEST_STATE).any() for numbers in values):
+    if any((np.abs(numbers) > MAX_STATE).any() for numbers in values):
         raise InputError(
-            f"{where}: a state is larger than {LARGEST_STATE:g}; the system is unstable: correct A, or use fewer steps"
+            f"{where}: a state is larger than {MAX_STATE:g}; the system is unstable: correct A, or use fewer steps"
         )
 
 
@@ -108,9 +108,9 @@ def read_csv(file: Path, outputs: int, inputs: int) -> Data:
     """
     try:
         with file.open("rb") as opened:
-            content = opened.read(LARGEST_CSV_BYTES + 1)
-        if len(content) > LARGEST_CSV_BYTES:
-            raise InputError(f"--data: {file}: is larger than {LARGEST_CSV_BYTES} bytes; divide it")
+            content = opened.read(MAX_CSV_BYTES + 1)
+        if len(content) > MAX_CSV_BYTES:
+            raise InputError(f"--data: {file}: is larger than {MAX_CSV_BYTES} bytes; divide it")
         rows = list(csv.reader(io.StringIO(content.decode("utf-8-sig"), newline="")))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else "is not a CSV file in UTF-8"
@@ -130,8 +130,8 @@ def read_csv(file: Path, outputs: int, inputs: int) -> Data:
         rows.pop()
     # In a file of one column an empty line is an empty cell.
     body = [(line, row or [""]) for line, row in enumerate(rows[1:], start=2) if row or len(header) == 1]
-    if not 1 <= len(body) <= MOST_STEPS:
-        raise InputError(f"--data: {file}: has {len(body)} steps; 1 to {MOST_STEPS} are possible")
+    if not 1 <= len(body) <= MAX_STEPS:
+        raise InputError(f"--data: {file}: has {len(body)} steps; 1 to {MAX_STEPS} are possible")
     if "k" in header:
         _need_successive(file, body, header.index("k"))
     values = np.array([_numbers(file, line, row, header, wanted) for line, row in body])
@@ -162,9 +162,9 @@ def _numbers(file: Path, line: int, row: list[str], header: list[str], wanted: l
         except ValueError:
             number = math.inf
         is_missing = not text and name.startswith("y")
-        if not is_missing and not abs(number) <= LARGEST:
+        if not is_missing and not abs(number) <= MAXIMUM:
             raise InputError(
-                f"--data: {file}: line {line}, {name}: must be a number of at most {LARGEST:g} in size, found "
+                f"--data: {file}: line {line}, {name}: must be a number of at most {MAXIMUM:g} in size, found "
                 f"{shown(text)}; an empty cell of y is a missing measurement; an input of zero is written 0"
             )
         numbers.append(number)

@@ -16,7 +16,7 @@ from experiments.observer.report import Report, times
 from infoset import Estimate
 from infoset.arrays import Floats
 
-_MOST_OUTLINES = 60
+_MAX_OUTLINES = 60
 
 
 def draw_all(report: Report) -> Iterator[Figure]:
@@ -88,7 +88,7 @@ def draw_sets(report: Report) -> Figure:
     """Draw the sets of two states, the first ones light and the last ones dark, at most 60 of them."""
     figure, (panel,) = figure_grid(110.0, 1, 1, (18.0, 6.0, 12.0, 8.0), (0.0, 0.0))
     shown = [estimate for estimate in report.estimates if not estimate.is_empty]
-    shown = shown[:: -(-len(shown) // _MOST_OUTLINES)] if shown else []
+    shown = shown[:: -(-len(shown) // _MAX_OUTLINES)] if shown else []
     outlines = [estimate.polygons.polygon() for estimate in shown]
     edges = [str(shade) for shade in np.linspace(0.75, 0.2, len(outlines))]
     fill = PolyCollection(outlines, facecolors=SET_FILL, edgecolors=edges, linewidths=0.8, alpha=0.55)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from experiments.common.input_file import read_file
-from experiments.observer.command import MOST_STEPS
+from experiments.observer.command import MAX_STEPS
 from infoset import ConvexPolygons, LinearObserver, Zonotope
 from infoset.arrays import Floats
 from infoset.limits import NOT_NEGATIVE, NUMBER, WHOLE, Description, Limits, Line, Name, Positive, real_values
@@ -90,7 +90,7 @@ class MeasurementTable:
 class SimulationTable:
     """[simulation]: number of measurements that are simulated if there are none, and steps without one."""
 
-    steps: Annotated[int, Limits(least=1, most=MOST_STEPS, whole=True)] = 30
+    steps: Annotated[int, Limits(minimum=1, maximum=MAX_STEPS, whole=True)] = 30
     missing: tuple[Annotated[int, WHOLE], ...] = ()
 
 

@@ -18,7 +18,7 @@ from infoset.arrays import Floats
 
 _SHOWN_STEPS = 12
 _ROUNDING = 1e-12
-"""Share of the greatest bound of a state below which a bound that is shown is zero."""
+"""Share of the maximum bound of a state below which a bound that is shown is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ def times(report: Report) -> tuple[Floats, str]:
 def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
     """Return the lower and upper bounds of the states, shape (N, 2, n), to be read; NaN for the empty set.
 
-    Bounds within the rounding errors of the greatest bounds of a state are zero.
+    Bounds within the rounding errors of the maximum bounds of a state are zero.
     """
     bounds = np.array([[estimate.lower, estimate.upper] for estimate in estimates])
     bounds[np.abs(bounds) < _ROUNDING * np.abs(np.nan_to_num(bounds)).max(axis=(0, 1))] = 0.0

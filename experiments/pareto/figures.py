@@ -29,15 +29,15 @@ from rendezvous.pareto import (
 _PLANES = ((1, 0), (1, 2), (0, 2))
 _POINTS = 241
 _MARKS = 4
-_LEAST_WEIGHT = 1e-9
+_MIN_WEIGHT = 1e-9
 _SET_POINTS = 1200
 _CHOICES = {
-    "least_group_loss": ("*", "least group loss"),
-    "least_sum_of_costs": ("P", "least sum of costs"),
-    "least_greatest_excess": ("X", "least greatest excess"),
+    "min_group_loss": ("*", "minimum group loss"),
+    "min_sum_of_costs": ("P", "minimum sum of costs"),
+    "minimax_excess": ("X", "minimax excess"),
     "preferred": ("h", "nearest to the preferred meeting"),
 }
-_MOST_NAMED = 8
+_MAX_NAMED = 8
 _MEETING: dict[str, Any] = {"label": "meeting", "marker": "*", "markersize": 9.0, "color": INK, "linestyle": "none"}
 _HOLLOW: dict[str, Any] = {"linestyle": "none", "color": "white", "markeredgecolor": INK}
 _DOTTED: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (2, 2))}
@@ -60,7 +60,7 @@ def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
     solution = report.solution
     yield draw_trajectories(solution)
-    yield draw_controls(solution, report.problem.greatest_control_m_s2)
+    yield draw_controls(solution, report.problem.max_control_m_s2)
     yield draw_front(solution, report.selections, report.sweep)
     yield draw_costs(solution, report.coalitions, report.impulses_m_s)
 
@@ -93,7 +93,7 @@ def draw_trajectories(solution: EncounterSolution) -> Figure:
         plane.set(xlabel=f"{AXIS_TITLES[first]}, {unit}", ylabel=f"{AXIS_TITLES[second]}, {unit}")
         plane.set_title(f"({letter})", loc="left")
         plane.margins(0.08)
-    if len(paths) <= _MOST_NAMED:
+    if len(paths) <= _MAX_NAMED:
         planes[0].legend(loc="best")
     return figure
 
@@ -128,7 +128,7 @@ def draw_controls(solution: EncounterSolution, bound_m_s2: float | None = None) 
     panels[3].set_ylim(bottom=0.0)
     for panel in panels[2:]:
         panel.set_xlabel("time, s")
-    if len(solution.costs) <= _MOST_NAMED:
+    if len(solution.costs) <= _MAX_NAMED:
         panels[0].legend(loc="best")
     return figure
 
@@ -163,7 +163,7 @@ def _draw_set(axes: Axes, solution: EncounterSolution, points: Floats, selection
     else:
         axes.plot(*positions[np.argsort(points[:, 0])].T, color=SET_EDGE, zorder=1)
     for index, cost in enumerate(solution.costs):
-        name = f"ideal meeting of {cost.craft.name}" if len(solution.costs) <= _MOST_NAMED else None
+        name = f"ideal meeting of {cost.craft.name}" if len(solution.costs) <= _MAX_NAMED else None
         axes.plot(*position(cost.ideal), label=name, markersize=4.5, **{**_look(index), "linestyle": "none"})
     for choice, point in selections.items():
         marker, label = _CHOICES[choice]
@@ -227,7 +227,7 @@ def _edges(solution: EncounterSolution) -> list[Floats]:
     """Return the excesses where one of three craft has almost no weight: they bound the front."""
     share = np.linspace(0.0, 1.0, _POINTS)
     pairs = np.column_stack([share, 1.0 - share])
-    weights = [np.clip(np.insert(pairs, without, 0.0, axis=1), _LEAST_WEIGHT, None) for without in range(3)]
+    weights = [np.clip(np.insert(pairs, without, 0.0, axis=1), _MIN_WEIGHT, None) for without in range(3)]
     return [np.asarray(pareto_set(solution, edge).excess) for edge in weights]
 
 
@@ -251,7 +251,7 @@ def _draw_sweep(axes: Axes, solution: EncounterSolution, sweep: DurationSweep) -
         ylabel=f"$J^2$ and group loss, {_COST}",
     )
     axes.margins(x=0.0)
-    if len(solution.costs) <= _MOST_NAMED:
+    if len(solution.costs) <= _MAX_NAMED:
         axes.legend(loc="best", fontsize=6.5)
     axes.set_title("(c) costs against time", loc="left")
 
@@ -268,7 +268,7 @@ def draw_costs(solution: EncounterSolution, coalitions: Coalitions | None, impul
     bars.bar(columns, ideal, 0.55, color=SET_EDGE, label="cheapest meeting of the craft, $J^{*2}$")
     hatched: dict[str, Any] = {"color": SET_FILL, "edgecolor": SET_EDGE, "hatch": "///", "linewidth": 0.6}
     bars.bar(columns, excess, 0.55, bottom=ideal, label="excess of the common meeting", **hatched)
-    bars.set_xticks(columns, names, rotation=0 if count <= _MOST_NAMED else 90)
+    bars.set_xticks(columns, names, rotation=0 if count <= _MAX_NAMED else 90)
     bars.set_ylabel(f"$J^2$, {_COST}")
     bars.grid(axis="x", visible=False)
     bars.legend(loc="best")

@@ -62,7 +62,7 @@ class ParetoProblem:
         Free components of the meeting, of x, y, z, vx, vy, vz.
     meet : Meeting
         A rendezvous, or an intercept: the same position, and any velocities.
-    greatest_control_m_s2 : float or None
+    max_control_m_s2 : float or None
         Bound on the control of each craft.
     terminal : TerminalTable
         Components that are not free.
@@ -77,7 +77,7 @@ class ParetoProblem:
     duration_s: Positive
     free: tuple[Literal["x", "y", "z", "vx", "vy", "vz"], ...]
     meet: Meeting = Meeting.RENDEZVOUS
-    greatest_control_m_s2: Positive | None = None
+    max_control_m_s2: Positive | None = None
     terminal: TerminalTable = TerminalTable()
     craft: Annotated[tuple[CraftTable, ...], Field(max_length=50)]
 

@@ -89,8 +89,8 @@ def _craft_json(report: Report, index: int) -> dict[str, object]:
     if report.bounds:
         check = report.bounds[index]
         bound = {
-            "greatest_control_m_s2": report.problem.greatest_control_m_s2,
-            "least_peak_control_m_s2": check.least_peak_m_s2,
+            "max_control_m_s2": report.problem.max_control_m_s2,
+            "min_peak_control_m_s2": check.min_peak_m_s2,
             "feasibility": check.feasibility,
         }
     return {
@@ -182,11 +182,11 @@ def report_parts(report: Report) -> Iterator[Part]:
 
 def _exceeded(report: Report) -> list[str]:
     """Return a line for each craft whose minimum-energy control exceeds the bound."""
-    bound = report.problem.greatest_control_m_s2 or 0.0
+    bound = report.problem.max_control_m_s2 or 0.0
     return [
         f"{cost.craft.name}: the minimum-energy control exceeds the bound {bound:g} m/s^2 by "
         f"{check.peak_m_s2 / bound - 1.0:.2%}; another control satisfies the bound (the smallest possible peak is "
-        f"{check.least_peak_m_s2:.6g} m/s^2)"
+        f"{check.min_peak_m_s2:.6g} m/s^2)"
         for cost, check in zip(report.solution.costs, report.bounds, strict=False)
         if check.feasibility is Feasibility.ANOTHER_CONTROL
     ]

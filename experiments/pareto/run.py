@@ -17,22 +17,22 @@ from experiments.pareto.file import TERMINAL, ParetoProblem, load_pareto
 from experiments.pareto.page import pareto_page
 from experiments.pareto.report import Report, report_json, report_parts, trajectories
 from infoset.arrays import Floats
-from infoset.limits import LARGEST
+from infoset.limits import MAXIMUM
 from rendezvous.pareto import (
     BoundCheck,
     EncounterSolution,
     Feasibility,
     analyse_coalitions,
     check_bound,
-    least_greatest_excess,
-    least_sum_of_costs,
+    min_sum_of_costs,
+    minimax_excess,
     nearest_to,
     peak_control,
     solve_encounter,
     sweep_meeting_time,
     total_impulse,
 )
-from rendezvous.pareto.coalitions import MOST_CRAFT
+from rendezvous.pareto.coalitions import MAX_CRAFT
 
 FIGURES = ("figure-trajectories", "figure-controls", "figure-front", "figure-costs")
 SWEEP = (0.5, 2.0, 31)
@@ -79,8 +79,8 @@ def _preferred(text: str, problem: ParetoProblem) -> Floats:
     missing = [key for key in keys if key not in values]
     if missing:
         raise InputError(f"--prefer: {' and '.join(missing)} is missing; for example {example}")
-    if not all(math.isfinite(value) and abs(value) <= LARGEST for value in values.values()):
-        raise InputError(f"--prefer: values must be finite and at most {LARGEST:g} in size; for example {example}")
+    if not all(math.isfinite(value) and abs(value) <= MAXIMUM for value in values.values()):
+        raise InputError(f"--prefer: values must be finite and at most {MAXIMUM:g} in size; for example {example}")
     return np.array([values[key] for key in keys])
 
 
@@ -94,7 +94,7 @@ def _solve(problem: ParetoProblem, preferred: Floats | None, progress: Callable[
     bounds = _bounds(problem, solution)
     progress(0.4)
     plans = [solution.plan(index) for index in range(len(solution.costs))]
-    coalitions = analyse_coalitions(solution) if len(plans) <= MOST_CRAFT else None
+    coalitions = analyse_coalitions(solution) if len(plans) <= MAX_CRAFT else None
     progress(0.9)
     latest_s = max(craft.start_s for craft in encounter.craft)
     durations = latest_s + (encounter.meeting_s - latest_s) * np.linspace(*SWEEP)
@@ -113,9 +113,9 @@ def _solve(problem: ParetoProblem, preferred: Floats | None, progress: Callable[
 def _selections(problem: ParetoProblem, solution: EncounterSolution, preferred: Floats | None) -> dict[str, Floats]:
     """Return Pareto-optimal meetings by the rule of their choice."""
     selections = {
-        "least_group_loss": solution.point,
-        "least_sum_of_costs": least_sum_of_costs(solution),
-        "least_greatest_excess": least_greatest_excess(solution),
+        "min_group_loss": solution.point,
+        "min_sum_of_costs": min_sum_of_costs(solution),
+        "minimax_excess": minimax_excess(solution),
     }
     if preferred is not None:
         with input_errors(f"{problem.name}: --prefer"):
@@ -125,14 +125,14 @@ def _selections(problem: ParetoProblem, solution: EncounterSolution, preferred: 
 
 def _bounds(problem: ParetoProblem, solution: EncounterSolution) -> tuple[BoundCheck, ...]:
     """Return the check of the bound for each craft; refuse a bound that no control keeps."""
-    bound, encounter = problem.greatest_control_m_s2, problem.encounter
+    bound, encounter = problem.max_control_m_s2, problem.encounter
     if bound is None:
         return ()
-    where = f"{problem.name}: greatest_control_m_s2"
+    where = f"{problem.name}: max_control_m_s2"
     with input_errors(where):
         checks = [check_bound(solution.plan(index), bound, encounter.common) for index in range(len(solution.costs))]
-    worst = max(range(len(checks)), key=lambda index: checks[index].least_peak_m_s2)
-    need = checks[worst].least_peak_m_s2
+    worst = max(range(len(checks)), key=lambda index: checks[index].min_peak_m_s2)
+    need = checks[worst].min_peak_m_s2
     if checks[worst].feasibility is Feasibility.IMPOSSIBLE:
         raise InputError(
             f"{where}: no control of at most {bound:g} m/s^2 brings the craft {encounter.craft[worst].name} to the "

@@ -26,7 +26,7 @@ _START: dict[str, Any] = {"marker": "o", "markersize": 4.0, "linestyle": "none"}
 _STAR: dict[str, Any] = {"marker": "*", "markersize": 9.0, "color": IMPULSE, "linestyle": "none"}
 _LEVEL: dict[str, Any] = {"color": LIMIT, "linewidth": 0.8, "linestyle": "--"}
 
-_ARROWS, _ARROW_LENGTH, _LEAST_HEIGHT = 14, 0.17, 0.15
+_ARROWS, _ARROW_LENGTH, _MIN_HEIGHT = 14, 0.17, 0.15
 
 
 def draw_all(report: Report) -> Iterator[Figure | None]:
@@ -53,7 +53,7 @@ def draw_orbits(sampled: History) -> Figure:
     for axes, point in ((space, end), (flat, end[:2])):
         axes.plot(*point[:, None], label="capture", **_STAR)
     low, high = space.get_zlim()
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), _LEAST_HEIGHT * size_m * per_m)
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low), _MIN_HEIGHT * size_m * per_m)
     space.set_zlim(middle - half, middle + half)
     for name, title in zip("xyz", INERTIAL_TITLES, strict=True):
         getattr(space, f"set_{name}label")(f"{title}, {unit}", labelpad=-4.0)
@@ -146,7 +146,7 @@ def draw_distance(solution: Solution) -> Figure:
     if solution.verdict is Verdict.CAPTURED:
         left.plot(time[-1], radius, zorder=5, clip_on=False, **_STAR)
     left.set(ylabel="distance $l(T)$ at the end, km", title=f"(a) {solution.verdict.value}")
-    right.plot(time, curve.least_curvature, **dots)
+    right.plot(time, curve.min_curvature, **dots)
     right.set(ylabel="smallest curvature of $h_P - h_E + l$", title="(b) saddle point if positive")
     for axes in (left, right):
         axes.set_ylim(bottom=0.0)

@@ -23,7 +23,7 @@ from rendezvous.pursuit_evasion import STATUSES, CaptureMap, Game, PointStatus, 
 from rendezvous.two_body import OrbitalElements
 
 FIGURE = "figure-map"
-MOST_VALUES, MOST_POINTS = 2000, 100_000
+MAX_VALUES, MAX_POINTS = 2000, 100_000
 RATIOS = ("phase_deg", "thrust_ratio", "mass_ratio")
 """Parameters besides the keys of a file: lead of the evader in true longitude, its thrust and mass by the pursuer's."""
 COLUMNS = "phase_deg=-30:30:61"
@@ -52,8 +52,8 @@ def run(options: PursuitMap) -> None:
     if x.parameter == y.parameter:
         raise InputError(f"--y: {y.parameter} is also the parameter of --x; choose another, for example --y {ROWS}")
     points = len(x.values) * len(y.values)
-    if points > MOST_POINTS:
-        raise InputError(f"--x and --y: {points} points are over {MOST_POINTS}; choose fewer")
+    if points > MAX_POINTS:
+        raise InputError(f"--x and --y: {points} points are over {MAX_POINTS}; choose fewer")
     with output_of(options, ("problem.toml", "results.json", "map.csv", *figure_files(FIGURE))) as written:
         began_s = perf_counter()
         with progress_bar(options.quiet) as begin:
@@ -74,8 +74,8 @@ def run(options: PursuitMap) -> None:
             written.figure(FIGURE, draw_map(solved, x.parameter, y.parameter))
     lines = [f"{problem.name}: {points} points in {elapsed_s:.1f} s: {counted(solved)}"]
     if solved.capture_s.count():
-        least, greatest = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))
-        lines.append(f"capture times from {least:.4f} to {greatest:.4f} h")
+        minimum, maximum = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))
+        lines.append(f"capture times from {minimum:.4f} to {maximum:.4f} h")
     if written.wants("--json") or written.wants("--csv"):
         words = (f'"{status.value}" is {STATUS_WORDS[status]}' for status in _COMPUTED)
         lines.append(f"status in the files: {', '.join(words)}")
@@ -149,8 +149,8 @@ def read_axis(option: str, text: str) -> Axis:
         raise InputError(f"{option}: must be KEY=FROM:TO:N, found {shown(text)}; {example}") from None
     if not (math.isfinite(low) and math.isfinite(high) and low < high and max(abs(low), abs(high)) <= 1e15):
         raise InputError(f"{option}: must go from a number to a larger one, found {shown(span)}; {example}")
-    if not 2 <= count <= MOST_VALUES:
-        raise InputError(f"{option}: must have from 2 to {MOST_VALUES} values, found {shown(parts[2])}; {example}")
+    if not 2 <= count <= MAX_VALUES:
+        raise InputError(f"{option}: must have from 2 to {MAX_VALUES} values, found {shown(parts[2])}; {example}")
     return Axis(key, np.linspace(low, high, count))
 
 

@@ -32,7 +32,7 @@ from rendezvous.pursuit_evasion import (
 )
 
 INERTIAL_AXES = "inertial, z along the planet's axis"
-_LEVELS = ("least", "10%", "50%", "90%", "greatest")
+_LEVELS = ("minimum", "10%", "50%", "90%", "maximum")
 _FEWEST = 10
 """Number of simulations from which quantiles are printed."""
 _METHODS = {
@@ -97,7 +97,7 @@ def report_json(report: Report) -> dict[str, object]:
         "distance_curve": {
             "duration_s": solution.curve.duration_s,
             "distance_km": solution.curve.distance_m / M_PER_KM,
-            "least_curvature": solution.curve.least_curvature,
+            "min_curvature": solution.curve.min_curvature,
         },
         **({"feedback": _feedback_json(report.feedback)} if report.feedback is not None else {}),
     }
@@ -136,10 +136,10 @@ def _certificate_json(certificate: Certificate) -> dict[str, object]:
         "hamiltonian_drift": certificate.hamiltonian_drift,
         "second_integrator_gap_m": certificate.integrator_gap_m,
         "closing_speed_km_s": certificate.closing_speed_m_s / M_PER_KM,
-        "least_curvature": certificate.least_curvature,
+        "min_curvature": certificate.min_curvature,
         "no_conjugate_point": certificate.no_conjugate_point,
         "no_earlier_capture": certificate.no_earlier_capture,
-        "least_distance_from_centre_km": certificate.least_distance_m / M_PER_KM,
+        "min_distance_from_centre_km": certificate.min_distance_m / M_PER_KM,
         "above_the_planet": certificate.above_the_planet,
         "pursuer_alone_s": certificate.pursuer_alone_s,
         "evader_deviations": [
@@ -148,7 +148,7 @@ def _certificate_json(certificate: Certificate) -> dict[str, object]:
         ],
         "directions_found": certificate.directions_found,
         "directions_tried": certificate.directions_tried,
-        "greatest_excess_m": certificate.greatest_excess_m,
+        "max_excess_m": certificate.max_excess_m,
     }
 
 
@@ -269,7 +269,7 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
     )
     yield (
         f"no earlier capture: {'confirmed' if certificate.no_earlier_capture else 'not confirmed'}; smallest distance "
-        f"from the planet's centre {certificate.least_distance_m / M_PER_KM:.1f} km"
+        f"from the planet's centre {certificate.min_distance_m / M_PER_KM:.1f} km"
     )
     if certificate.pursuer_alone_s is not None:
         yield f"earliest capture if only the pursuer deviates: {certificate.pursuer_alone_s:.3f} s"
@@ -280,7 +280,7 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
     if answers:
         yield f"captures if the evader deviates and the pursuer responds: {', '.join(answers)}"
     if certificate.directions_tried:
-        excess = certificate.greatest_excess_m
+        excess = certificate.max_excess_m
         largest = "no other extremal" if excess is None else f"largest excess over the capture radius {excess:.2g} m"
         yield (
             f"directions: {certificate.directions_found} of {certificate.directions_tried} compared; {largest}, "

@@ -17,7 +17,7 @@ from experiments.pursuit.report import Feedback, Report, report_json, report_par
 from rendezvous.pursuit_evasion import Observation, PathError, Solution, certify, fly_many, solve
 
 FIGURES = ("figure-orbits", "figure-relative", "figure-control", "figure-distance", "figure-feedback")
-REPLAN_S, LEAST_PLANS, MOST_PLANS = 600.0, 50, 2000
+REPLAN_S, MIN_PLANS, MAX_PLANS = 600.0, 50, 2000
 """Default time between plans, and the smallest and largest number of plans in a game."""
 
 Begin = Callable[[str], Callable[[float], None]]
@@ -98,10 +98,10 @@ def _fly(solution: Solution, options: Pursuit, evader: EvaderPolicy, begin: Begi
 
 def _time_between_plans(game_s: float, asked_s: float | None) -> float:
     if asked_s is None:
-        return max(min(REPLAN_S, game_s / LEAST_PLANS), game_s / MOST_PLANS)
-    if asked_s * MOST_PLANS < game_s:
+        return max(min(REPLAN_S, game_s / MIN_PLANS), game_s / MAX_PLANS)
+    if asked_s * MAX_PLANS < game_s:
         raise InputError(
-            f"--replan-s: {asked_s:g} makes more than {MOST_PLANS} plans in a game of {game_s:.6g} s; "
-            f"choose {game_s / MOST_PLANS:.3g} or more"
+            f"--replan-s: {asked_s:g} makes more than {MAX_PLANS} plans in a game of {game_s:.6g} s; "
+            f"choose {game_s / MAX_PLANS:.3g} or more"
         )
     return asked_s

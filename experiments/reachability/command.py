@@ -14,7 +14,7 @@ from experiments.common.options import FileOptions, Html, ProblemName, Seed, Set
 class Reach(FileOptions):
     """Compute all optimal controls of a rendezvous under constraints, and its reachable sets.
 
-    The results are the least terminal norm, the forward sets, the tube of all optimal trajectories, and the set of
+    The results are the minimum terminal norm, the forward sets, the tube of all optimal trajectories, and the set of
     all optimal controls. Selected optimal controls are simulated on the linear and on the nonlinear model. Without
     --out, --json, --csv or --html no file is written.
 
@@ -27,8 +27,8 @@ class Reach(FileOptions):
         str,
         typer.Option(
             metavar="A,B,C",
-            help="Optimal controls to simulate: energy, l1, norms (least sum of squares, of absolute values, of "
-            "Euclidean norms), peak (least peak), chebyshev, analytic (centres of the set), vertices, samples:N "
+            help="Optimal controls to simulate: energy, l1, norms (minimum sum of squares, of absolute values, of "
+            "Euclidean norms), peak (minimum peak), chebyshev, analytic (centres of the set), vertices, samples:N "
             "(N random ones).",
         ),
     ] = "energy,l1,norms,peak,chebyshev,analytic"

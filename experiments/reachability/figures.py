@@ -33,25 +33,25 @@ from experiments.reachability.report import Member, Report
 from infoset.arrays import Floats
 from rendezvous.reachability import SetKind
 
-Shadow = tuple[list[int], Floats]
+Projection = tuple[list[int], Floats]
 """Times at which a set is the same, and its vertices."""
 
 _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
 """Relative error of the drawn sets."""
-_MOST_TIMES, _MOST_TIMES_IN_SPACE = 6, 4
+_MAX_TIMES, _MAX_TIMES_IN_SPACE = 6, 4
 _MANY_EDGES = 120
 _OUTLINE_POINTS, _ANCHORS = 96, 4
 """Points of an outline that labels avoid, and the step between those at which its own label can stand."""
 _SHARP = np.cos(np.radians(4.0))
 _NAMES = {
-    "energy": "least energy",
-    "l1": "least L1",
-    "norms": "least norms",
-    "peak": "least peak",
+    "energy": "minimum energy",
+    "l1": "minimum L1",
+    "norms": "minimum norms",
+    "peak": "minimum peak",
     "chebyshev": "Chebyshev centre",
     "analytic": "analytic centre",
 }
-_MOST_MEMBERS = 4
+_MAX_MEMBERS = 4
 _START: dict[str, Any] = {
     "color": INK,
     "marker": "o",
@@ -61,7 +61,7 @@ _START: dict[str, Any] = {
     "zorder": 7,
     "label": "start",
 }
-_END: dict[str, Any] = {"color": INK, "marker": "*", "linestyle": "none", "label": "terminal state of least norm"}
+_END: dict[str, Any] = {"color": INK, "marker": "*", "linestyle": "none", "label": "terminal state of minimum norm"}
 _LABEL: dict[str, Any] = {"fontsize": 6.5, "color": SET_EDGE, "zorder": 8}
 _SET: dict[str, Any] = {"facecolor": SET_FILL, "edgecolor": SET_EDGE, "linewidth": 0.7}
 _AXES = (*AXIS_TITLES, *component_titles("v"))
@@ -71,14 +71,14 @@ _PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
 def _shown(report: Report) -> list[tuple[dict[str, Any], Member, Floats]]:
     """Return the line style, the member and the trajectory of each member drawn."""
     looks = [{**look, "linewidth": 1.0} for look in LINE_LOOKS]
-    return [(look, *pair) for look, pair in zip(looks, report.shown[:_MOST_MEMBERS], strict=False)]
+    return [(look, *pair) for look, pair in zip(looks, report.shown[:_MAX_MEMBERS], strict=False)]
 
 
 def _title(member: Member) -> str:
     return _NAMES.get(member.name, member.name)
 
 
-def shown_times(periods: int, most: int = _MOST_TIMES) -> list[int]:
+def shown_times(periods: int, most: int = _MAX_TIMES) -> list[int]:
     """Return the times at which sets are drawn: all of a few, or evenly spaced ones, and never the last."""
     if periods <= most + 1:
         return list(range(1, periods))
@@ -92,12 +92,12 @@ def _units(report: Report) -> tuple[list[str], Floats]:
     return names, np.array([per_m] * 3 + [1.0] * 3)
 
 
-def _shadows(report: Report, axes: Sequence[int], most_times: int, tolerance: float) -> list[Shadow]:
+def _projections(report: Report, axes: Sequence[int], max_times: int, tolerance: float) -> list[Projection]:
     """Return the projections of the tube on some axes, in their units; equal ones are joined."""
     factors = _units(report)[1][list(axes)]
-    groups: list[Shadow] = []
-    for t in shown_times(report.solution.problem.periods, most_times):
-        points = report.solution.sets.shadow(SetKind.TUBE, t, axes, tolerance) * factors
+    groups: list[Projection] = []
+    for t in shown_times(report.solution.problem.periods, max_times):
+        points = report.solution.sets.projection(SetKind.TUBE, t, axes, tolerance) * factors
         signs = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(factors))))
         directions = signs / np.maximum(np.ptp(points, axis=0), 1e-12)
         support = (directions @ points.T).max(axis=1)
@@ -123,8 +123,8 @@ def draw_space(report: Report, first: int) -> Figure:
     axes: Any = figure.add_axes((-0.03, 0.0, 0.74, 1.0), projection="3d", computed_zorder=False)
     states, (titles, per_si) = slice(first, first + 3), _units(report)
     factors = per_si[states]
-    shadows = _shadows(report, range(first, first + 3), _MOST_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE)
-    for _, points in shadows:
+    projections = _projections(report, range(first, first + 3), _MAX_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE)
+    for _, points in projections:
         _draw_body(axes, points)
     for look, member, path in _shown(report):
         line = {**look, "marker": "none", "linewidth": None, "zorder": 5}
@@ -140,7 +140,7 @@ def draw_space(report: Report, first: int) -> Figure:
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(6))
     axes.view_init(elev=22.0, azim=-58.0)
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.0)
-    seen = [_on_paper(axes, points) for _, points in shadows]
+    seen = [_on_paper(axes, points) for _, points in projections]
     paths = [_on_paper(axes, path[:, states] * factors) for _, _, path in _shown(report)]
     labels = [
         (
@@ -148,7 +148,7 @@ def draw_space(report: Report, first: int) -> Figure:
             points[np.argsort(-points[:, 1])],
             np.vstack([*paths, *(other for other in seen if other is not points)]),
         )
-        for (times, _), points in zip(shadows, seen, strict=True)
+        for (times, _), points in zip(projections, seen, strict=True)
     ]
     place_labels(axes, labels, _on_paper(axes, np.stack([start, end])), **_LABEL)
     handles, _ = axes.get_legend_handles_labels()
@@ -200,8 +200,8 @@ def draw_planes(report: Report) -> Figure:
     titles, per_si = _units(report)
     for axes, plane, letter in zip(panels, map(list, _PLANES), "abcd", strict=True):
         factors, outlines = per_si[plane], []
-        shadows = _shadows(report, tuple(plane), _MOST_TIMES, _TOLERANCE)
-        for _, points in shadows:
+        projections = _projections(report, tuple(plane), _MAX_TIMES, _TOLERANCE)
+        for _, points in projections:
             _draw_polygon(axes, points)
             outlines.append(_along(_in_order(points) if len(points) > 2 else points))
         for look, member, path in _shown(report):
@@ -215,7 +215,7 @@ def draw_planes(report: Report) -> Figure:
         axes.set(xlabel=titles[plane[0]], ylabel=titles[plane[1]])
         axes.margins(0.07)
         axes.xaxis.set_major_locator(MaxNLocator(6))
-        names = [_name(times) for times, _ in shadows]
+        names = [_name(times) for times, _ in projections]
         paths = [(path[:, plane] * factors) for _, _, path in _shown(report)]
         anchors = [edge[np.argsort(-edge[:, 1])[::_ANCHORS]] for edge in outlines]
         place_labels(

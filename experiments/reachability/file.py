@@ -17,7 +17,7 @@ from experiments.common.problems import check_angle, check_orbit
 from infoset.arrays import Floats
 from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive, check_fields
 from rendezvous.reachability import (
-    MOST_PERIODS,
+    MAX_PERIODS,
     MotionModel,
     NonlinearMotion,
     ReachabilityProblem,
@@ -30,7 +30,7 @@ from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerH
 from rendezvous.two_body import OrbitalElements
 
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
-_MOST_REACH = 1e4
+_MAX_REACH = 1e4
 _INSTANTS = 12
 """Instants within a period at which selected controls are checked."""
 
@@ -42,7 +42,7 @@ def _for_each_axis(value: Any) -> Any:
 Vector = tuple[float, float, float]
 Bound = Annotated[Vector, POSITIVE, BeforeValidator(_for_each_axis)]
 """A positive number for each axis; a file may have one number for all."""
-Period = Annotated[int, Limits(least=0, most=MOST_PERIODS, whole=True)]
+Period = Annotated[int, Limits(minimum=0, maximum=MAX_PERIODS, whole=True)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ class Orbit:
 
     semi_major_axis_m: Positive
     eccentricity: Part
-    true_anomaly_rad: Annotated[float, Limits(least=-2.0 * math.pi, most=2.0 * math.pi)]
+    true_anomaly_rad: Annotated[float, Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)]
     gravitational_parameter_m3_s2: Positive
 
     def __post_init__(self) -> None:
@@ -87,7 +87,7 @@ class Cone:
     apex_m: Vector
     axis: Vector
     half_angle_rad: Annotated[float, Limits(above=0.0, below=0.5 * math.pi)]
-    faces: Annotated[int, Limits(least=3, most=24, whole=True)] = 8
+    faces: Annotated[int, Limits(minimum=3, maximum=24, whole=True)] = 8
     from_period: Period = 0
 
     def __post_init__(self) -> None:
@@ -158,12 +158,12 @@ class Rendezvous:
 
     name: Name = "rendezvous"
     description: Description = ""
-    periods: Annotated[int, Limits(least=1, most=MOST_PERIODS, whole=True)]
+    periods: Annotated[int, Limits(minimum=1, maximum=MAX_PERIODS, whole=True)]
     period_s: Positive
     acceleration_m_s2: Positive
     model: MotionModel = MotionModel.FROZEN
     thrust: ThrustShape = ThrustShape.BOX
-    checks_between_periods: Annotated[int, Limits(least=0, most=10, whole=True)] = 0
+    checks_between_periods: Annotated[int, Limits(minimum=0, maximum=10, whole=True)] = 0
     orbit: Orbit
     initial: Start
     bounds: Bounds
@@ -181,10 +181,10 @@ class Rendezvous:
         reach = max(
             change_m_s / min(self.bounds.velocity_m_s), change_m_s * self.period_s / min(self.bounds.position_m)
         )
-        if reach > _MOST_REACH:
+        if reach > _MAX_REACH:
             raise ValueError(
                 f"acceleration_m_s2: full thrust over a period changes a state by {reach:.3g} times its bound; "
-                f"rounding decides the result beyond {_MOST_REACH:g}"
+                f"rounding decides the result beyond {_MAX_REACH:g}"
             )
         _ = self.problem  # raises ValueError if it is none
 
@@ -214,7 +214,7 @@ class Rendezvous:
     @property
     def longer(self) -> ReachabilityProblem:
         """The problem with up to four times as many periods."""
-        return self._problem(min(4 * self.periods, MOST_PERIODS))
+        return self._problem(min(4 * self.periods, MAX_PERIODS))
 
     @cached_property
     def instants(self) -> Floats:

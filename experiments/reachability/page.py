@@ -11,7 +11,7 @@ from infoset.arrays import Floats
 from rendezvous.reachability import SetKind
 
 _TOLERANCE = 1e-2
-_MOST_SETS = 24
+_MAX_SETS = 24
 _ZERO = 1e-10
 """Controls smaller than the errors of the optimization are shown as zero."""
 _VIEWS = (
@@ -48,7 +48,7 @@ def reachability_page(report: Report) -> str:
     about = [
         *filter(None, [rendezvous.description]),
         f"axes: {AXES}",
-        f"least terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; trajectories of the nonlinear model",
+        f"minimum terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; trajectories of the nonlinear model",
     ]
     names = [member.name for member in members]
     return motion_page(f"Rendezvous {rendezvous.name}", about, time_s, views, graphs, names)
@@ -57,11 +57,13 @@ def reachability_page(report: Report) -> str:
 def _view(report: Report, time_s: Floats, caption: str, first: int, plane: tuple[int, int] | None) -> View:
     """Return a view of the three states from ``first`` on: positions (0) or velocities (3)."""
     periods, states = report.rendezvous.problem.periods, slice(first, first + 3)
-    times = sorted({round(t) for t in np.linspace(0, periods, min(periods, _MOST_SETS) + 1)})
+    times = sorted({round(t) for t in np.linspace(0, periods, min(periods, _MAX_SETS) + 1)})
     nearest = [int(np.abs(np.array(times) - time / report.rendezvous.period_s).argmin()) for time in time_s]
     axes = tuple(first + axis for axis in (plane or (0, 1, 2)))
-    shadows = [report.solution.sets.shadow(SetKind.TUBE, t, axes, _TOLERANCE) for t in times]
-    tube = Sets("states of all optimal controls, at whole periods", [faces_of(points) for points in shadows], nearest)
+    projections = [report.solution.sets.projection(SetKind.TUBE, t, axes, _TOLERANCE) for t in times]
+    tube = Sets(
+        "states of all optimal controls, at whole periods", [faces_of(points) for points in projections], nearest
+    )
     tracks = [Track(member.name, look, path[:, states], look) for look, (member, path) in enumerate(report.shown)]
     end = Mark("end of the optimal trajectories", report.tube[-1, states].mean(axis=1))
     unit = report.length_unit if first == 0 else ("m/s", 1.0)

@@ -22,7 +22,7 @@ from sim.storage.codec import fingerprint
 
 PAPER = "reachability"
 PROBLEM = "rendezvous-2021"
-CHOICES = {"table 1": "least energy", "table 2": "least L1", "table 3": "nearest optimal"}
+CHOICES = {"table 1": "minimum energy", "table 2": "minimum L1", "table 3": "nearest optimal"}
 """Optimal control that a table is compared with."""
 COLUMNS = ("table", "ours", "quantity", "printed", "corrected", "computed")
 _U, _LINEAR, _NONLINEAR = slice(0, 12), slice(12, 36), slice(36, 60)
@@ -77,7 +77,7 @@ class TableComparison:
     printed: Member
 
     @property
-    def largest_difference(self) -> float:
+    def max_difference(self) -> float:
         """Return the largest difference of a control."""
         return float(np.abs(self.ours.controls - self.printed.controls).max())
 
@@ -112,5 +112,5 @@ def compare_published(rendezvous: Rendezvous, solution: Solution) -> Sequence[Ta
 
 
 def _ours(choice: str, optimal: OptimalControls, printed: Floats) -> Floats:
-    choices = {"least energy": minimum_energy, "least L1": minimum_l1}
+    choices = {"minimum energy": minimum_energy, "minimum L1": minimum_l1}
     return choices[choice](optimal) if choice in choices else nearest(optimal, printed)

@@ -71,8 +71,8 @@ def published_motion(orbit: EllipticOrbit, radius_m: float = PUBLISHED_RADIUS_M)
 def flown_controls(problem: ReachabilityProblem, comparisons: Sequence[TableComparison]) -> Floats:
     """Return the controls to which the states of tables 1 to 3 belong, in Hill's axes, shape (3, 4, 3).
 
-    Table 1: the control of least energy, which is an independent computation. Tables 2 and 3: the printed controls with
-    corrections; controls of table 2 that its states contradict are those that the states imply.
+    Table 1: the control of minimum energy, which is an independent computation. Tables 2 and 3: the printed controls
+    with corrections; controls of table 2 that its states contradict are those that the states imply.
     """
     first, second, third = comparisons
     implied = to_paper(_implied(problem, second.table))

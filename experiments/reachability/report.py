@@ -33,7 +33,7 @@ from rendezvous.reachability import (
     chebyshev_centre,
     effort,
     feedback_plan,
-    least_periods,
+    min_periods,
     minimum_energy,
     minimum_l1,
     minimum_norms,
@@ -55,12 +55,12 @@ SINGLE = {
     "chebyshev": chebyshev_centre,
     "analytic": analytic_centre,
 }
-"""Selections of one control each: least sum of squares, of absolute values, of Euclidean norms, and so on."""
+"""Selections of one control each: minimum sum of squares, of absolute values, of Euclidean norms, and so on."""
 VERTICES, SAMPLES = "vertices", "samples"
-MOST_SAMPLES = 1000
+MAX_SAMPLES = 1000
 POINTS = 24
 """Points of a displayed trajectory per period."""
-_MOST_SHOWN, _ALIKE = 5, 1e-4
+_MAX_SHOWN, _ALIKE = 5, 1e-4
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ class Member:
 class Robustness:
     """Plans under the unknown acceleration.
 
-    `fixed_miss` is the least terminal norm without disturbance, by controls that keep the constraints without feedback,
-    and `plan` the plan with feedback. If there is none, `conflict` and `refusal` are the reasons.
+    `fixed_miss` is the minimum terminal norm without disturbance, by controls that keep the constraints without
+    feedback, and `plan` the plan with feedback. If there is none, `conflict` and `refusal` are the reasons.
     """
 
     fixed_miss: float | None
@@ -117,14 +117,14 @@ class Robustness:
 class Report:
     """Results of one command.
 
-    `least_periods` is the least number of periods, up to `searched_periods`, in which the terminal norm is zero.
+    `min_periods` is the minimum number of periods, up to `searched_periods`, in which the terminal norm is zero.
     `forward` and `tube`, shape (T + 1, 6, 2), are bounds of the sets, `ranges`, shape (T, 3, 2), those of the optimal
     controls. `flight` is the simulation in closed loop, `noisy` are those with navigation errors.
     """
 
     rendezvous: Rendezvous
     solution: Solution
-    least_periods: int | None
+    min_periods: int | None
     searched_periods: int
     forward: Floats
     tube: Floats
@@ -147,7 +147,7 @@ class Report:
         for member in self.members:
             if all(np.abs(member.controls - other.controls).max() > _ALIKE for other in chosen):
                 chosen.append(member)
-        return tuple((member, self._trajectory(member)) for member in chosen[:_MOST_SHOWN])
+        return tuple((member, self._trajectory(member)) for member in chosen[:_MAX_SHOWN])
 
     def _trajectory(self, member: Member) -> Floats:
         rendezvous = self.rendezvous
@@ -178,7 +178,7 @@ def _report(rendezvous: Rendezvous, request: Request, progress: Progress) -> Rep
     solution = solve(rendezvous.problem, request.route)
     progress(0.2)
     searched = rendezvous.problem if solution.optimal.miss == 0.0 else rendezvous.longer
-    least = least_periods(searched)
+    minimum = min_periods(searched)
     progress(0.3)
     forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))
     progress(0.5)
@@ -198,7 +198,7 @@ def _report(rendezvous: Rendezvous, request: Request, progress: Progress) -> Rep
     return Report(
         rendezvous,
         solution,
-        least,
+        minimum,
         searched.periods,
         forward,
         tube,
@@ -327,8 +327,8 @@ def report_json(report: Report) -> dict[str, object]:
         "route_reason": solution.reason,
         "optimal_miss": solution.optimal.miss,
         "optimal_dimension": solution.optimal.dimension,
-        "least_periods": report.least_periods,
-        "least_periods_searched": report.searched_periods,
+        "min_periods": report.min_periods,
+        "min_periods_searched": report.searched_periods,
         "sets": [
             {
                 "period": t,
@@ -372,7 +372,7 @@ def _flight_json(rendezvous: Rendezvous, flight: Flight, noisy: Sequence[Flight]
         "expected_misses": flight.expected_misses,
         "relaxations": flight.relaxations,
         "noisy_misses": [noisy_flight.miss for noisy_flight in noisy],
-        "noisy_largest_relaxations": [noisy_flight.relaxations.max() for noisy_flight in noisy],
+        "noisy_max_relaxations": [noisy_flight.relaxations.max() for noisy_flight in noisy],
     }
 
 

@@ -25,7 +25,7 @@ from experiments.reachability.printed_tables import (
     is_published,
 )
 from experiments.reachability.report import (
-    MOST_SAMPLES,
+    MAX_SAMPLES,
     SAMPLES,
     SINGLE,
     VERTICES,
@@ -88,7 +88,7 @@ def _selection(text: str) -> tuple[list[str], int]:
             raise InputError(f"--select: {name} is named twice; name each choice once")
         if name == SAMPLES:
             count = read_number(
-                f"--select {SAMPLES}", int, digits, least=1, greatest=MOST_SAMPLES, example="--select samples:20"
+                f"--select {SAMPLES}", int, digits, minimum=1, maximum=MAX_SAMPLES, example="--select samples:20"
             )
         elif digits:
             raise InputError(f"--select {name}: takes no number, found {digits[:20]!r}; write --select {name}")
@@ -97,12 +97,12 @@ def _selection(text: str) -> tuple[list[str], int]:
 
 
 def _summary(report: Report) -> Iterator[str]:
-    solution, least = report.solution, report.least_periods
+    solution, minimum = report.solution, report.min_periods
     dimension = solution.optimal.dimension
     reached = f"norm 0 not reached in {report.searched_periods} periods"
-    if least is not None:
-        reached = f"norm 0 needs at least {least} period{'s' if least > 1 else ''}"
-    yield f"{report.rendezvous.name}: least terminal norm {solution.optimal.miss:.9g} {_NORM}; {reached}"
+    if minimum is not None:
+        reached = f"norm 0 needs at least {minimum} period{'s' if minimum > 1 else ''}"
+    yield f"{report.rendezvous.name}: minimum terminal norm {solution.optimal.miss:.9g} {_NORM}; {reached}"
     yield f"route: {solution.route.value} ({solution.reason})"
     yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
     yield f"axes: {AXES}"
@@ -182,6 +182,6 @@ def _published_table(comparisons: Sequence[TableComparison]) -> Table:
     for comparison in comparisons:
         printed = comparison.table.numbers[-1].value
         misses = (printed, comparison.printed.nonlinear_miss, comparison.ours.nonlinear_miss)
-        row = [f"{comparison.largest_difference:.5f}", *(f"{miss:.4g}" for miss in misses)]
+        row = [f"{comparison.max_difference:.5f}", *(f"{miss:.4g}" for miss in misses)]
         table.add_row(comparison.name, CHOICES[comparison.name], *row)
     return table

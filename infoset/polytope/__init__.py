@@ -9,7 +9,7 @@ from infoset.polytope._affine_hull import (
     null_space_basis,
     relative_interior,
 )
-from infoset.polytope.operations import product, shadow
+from infoset.polytope.operations import polytope_from_support, product
 from infoset.polytope.polytope import Polytope
 
 __all__ = [
@@ -20,7 +20,7 @@ __all__ = [
     "UnboundedPolytopeError",
     "UncertainHullError",
     "null_space_basis",
+    "polytope_from_support",
     "product",
     "relative_interior",
-    "shadow",
 ]

@@ -21,7 +21,7 @@ HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e
 class EmptyPolytopeError(ValueError):
     """No point satisfies the constraints.
 
-    `relaxation` is the least relaxation of every constraint, its normal of unit length, with which a point satisfies
+    `relaxation` is the minimum relaxation of every constraint, its normal of unit length, with which a point satisfies
     all; 0 if it is not known.
     """
 
@@ -49,7 +49,7 @@ class Frame:
     """Coordinates y = (x - centre) basis / extents of an affine subspace of dimension d in R^n.
 
     `centre` is the mean of the points, `basis`, shape (n, d), has orthonormal columns, and `extents`, shape (d,), are
-    the greatest distances of a point from the centre along them. `across`, shape (n, n - d), completes the basis.
+    the maximum distances of a point from the centre along them. `across`, shape (n, n - d), completes the basis.
     """
 
     centre: Floats
@@ -81,7 +81,7 @@ def frame_of(points: Floats, flat: float = FLAT) -> Frame:
     """Return the frame of the affine hull of points, shape (k, n), at least one.
 
     A singular-value decomposition, O(k n^2). A direction counts where the points are wider along it than `flat` times
-    their greatest width, and wider than the rounding of their coordinates.
+    their maximum width, and wider than the rounding of their coordinates.
     """
     varies = (points != points[0]).any(axis=0)
     if not varies.all():  # the other coordinates are exact, without the rounding errors of those that vary
@@ -94,8 +94,8 @@ def frame_of(points: Floats, flat: float = FLAT) -> Frame:
     # With fewer points than coordinates all right singular vectors are needed, and the left ones are few.
     directions = np.linalg.svd(centred, full_matrices=len(points) < points.shape[1])[2]
     extents = np.abs(centred @ directions.T).max(axis=0)
-    least = max(flat * float(extents.max(initial=0.0)), ROUNDING * float(np.abs(points).max(initial=0.0)))
-    wide = extents > least
+    minimum = max(flat * float(extents.max(initial=0.0)), ROUNDING * float(np.abs(points).max(initial=0.0)))
+    wide = extents > minimum
     return Frame(centre, directions[wide].T, extents[wide], directions[~wide].T)
 
 
@@ -150,7 +150,7 @@ def relative_interior(
         if not len(across):
             raise
         rows, limits = np.vstack([normals, across, -across]), np.concatenate([offsets, levels, -levels])
-        relaxation = least_relaxation(rows, limits) or error.relaxation
+        relaxation = min_relaxation(rows, limits) or error.relaxation
     raise EmptyPolytopeError(relaxation)
 
 
@@ -209,7 +209,7 @@ def chebyshev_ball(rows: Floats, limits: Floats, sizes: Floats | float = 1.0) ->
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}, rows of unit length.
 
     `sizes` are the lengths of the rows in the coordinates in which the ball is round, if these are others. The radius
-    is negative if the set is empty; its absolute value is the least relaxation of the rows that has a point. An
+    is negative if the set is empty; its absolute value is the minimum relaxation of the rows that has a point. An
     UncertainHullError is raised if the linear program (HiGHS) was not solved, for example because the set has balls of
     any size.
     """
@@ -223,8 +223,8 @@ def chebyshev_ball(rows: Floats, limits: Floats, sizes: Floats | float = 1.0) ->
     return optimum.x[:-1], float(optimum.x[-1])
 
 
-def least_relaxation(rows: Floats, limits: Floats) -> float:
-    """Return the least relaxation of half-spaces, rows of unit length, that has a point; 0 if it is not known.
+def min_relaxation(rows: Floats, limits: Floats) -> float:
+    """Return the minimum relaxation of half-spaces, rows of unit length, that has a point; 0 if it is not known.
 
     One linear program (HiGHS).
     """
@@ -241,7 +241,7 @@ def least_relaxation(rows: Floats, limits: Floats) -> float:
 
 
 def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:
-    """Return the solution of least norm of equations, which may be dependent, and a basis of the null space.
+    """Return the solution of minimum norm of equations, which may be dependent, and a basis of the null space.
 
     An EmptyPolytopeError is raised if the equations are inconsistent.
     """
@@ -281,7 +281,7 @@ def _need_bounded(rows: Floats, limits: Floats, slack: float, basis: Floats) -> 
         if optimum.status != 0 or optimum.fun >= -1e-6:
             return
         direction = optimum.x / np.linalg.norm(optimum.x)
-    # The least relaxation of the rows with which a point satisfies all.
+    # The minimum relaxation of the rows with which a point satisfies all.
     matrix = np.column_stack([rows, -np.ones(len(rows))])
     cost = np.append(np.zeros(rows.shape[1]), 1.0)
     bounds = [(None, None)] * rows.shape[1] + [(0.0, None)]

@@ -12,7 +12,7 @@ from infoset.arrays import Floats
 from infoset.polytope._affine_hull import chebyshev_ball, frame_of
 from infoset.polytope._scaling import LocalAxes
 
-_MOST_STEPS = 1000
+_MAX_STEPS = 1000
 _PRECISION = 1e-14
 
 
@@ -38,18 +38,18 @@ def simplices_of(vertices: Floats, axes: LocalAxes | None) -> tuple[Floats, Floa
     return vertices[corners], sizes / sizes.sum()
 
 
-def largest_ball(vertices: Floats, normals: Floats, offsets: Floats, axes: LocalAxes | None) -> tuple[Floats, float]:
+def max_ball(vertices: Floats, normals: Floats, offsets: Floats, axes: LocalAxes | None) -> tuple[Floats, float]:
     """Return the centre, shape (n,), and the radius of a largest ball within the affine hull."""
     frame = frame_of(vertices if axes is None else axes.inward(vertices))
     if not frame.dimension:
         return vertices[0], 0.0
-    if axes is not None:  # in coordinates of the frame; the unit of the radius is the least distance of a facet
+    if axes is not None:  # in coordinates of the frame; the unit of the radius is the minimum distance of a facet
         steps = axes.spread((frame.basis * frame.extents).T)
         middle, rows = vertices.mean(axis=0), normals @ steps.T
         sizes = np.abs(rows).max(axis=1)
-        least = float(sizes.min())
-        inner, radius = chebyshev_ball(rows / sizes[:, None], (offsets - normals @ middle) / sizes, least / sizes)
-        return middle + inner @ steps, least * max(0.0, radius)
+        minimum = float(sizes.min())
+        inner, radius = chebyshev_ball(rows / sizes[:, None], (offsets - normals @ middle) / sizes, minimum / sizes)
+        return middle + inner @ steps, minimum * max(0.0, radius)
     scale = float(frame.extents.max())
     rows = normals @ frame.basis
     sizes = np.linalg.norm(rows, axis=1)
@@ -68,7 +68,7 @@ def nearest_difference(one: Floats, two: Floats) -> Floats:
     size = max(float(np.abs(one - two[0]).max()), float(np.abs(two - two[0]).max()), 1e-300)
     corral = (one[:1] - two[:1]) / size
     shares = np.ones(1)
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         x = shares @ corral
         p = one[int((one @ x).argmin())]
         q = two[int((two @ x).argmax())]

@@ -23,16 +23,16 @@ _ROUND = 30.0
 MERGE = 1e-10
 """Points nearer than this are one point, in coordinates in which the width of the set is about one."""
 _APART = 1e-9
-"""Greatest distance between both representations of a set."""
-_LEAST_ON, _MOST_ON = 1e-14, 1e-7
+"""Maximum distance between both representations of a set."""
+_MIN_ON, _MAX_ON = 1e-14, 1e-7
 """Limits of the distance, in the same coordinates, below which a point is on a plane."""
 _OTHERWISE_ON = (1e-11, 1e-10, 1e-12, 1e-13, 1e-9, 1e-8)
-_LEAST_RANK = 1e-11
+_MIN_RANK = 1e-11
 _ENTRIES = 4_000_000
 _APART_BY_ROUNDING = 1e-7
 _ON_PLANE = 1e-13
-_MOST_JOGGLED = 200
-"""Greatest number of joggled vertices. Their facets are simplices: 915 vertices in 8 dimensions have 3.7 million."""
+_MAX_JOGGLED = 200
+"""Maximum number of joggled vertices. Their facets are simplices: 915 vertices in 8 dimensions have 3.7 million."""
 
 
 def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
@@ -99,9 +99,9 @@ def _corners(rows: Floats, limits: Floats, centre: Floats, again: int = 3) -> tu
     If the vertices of a long set were too inexact to find coordinates in which it is round, they are found `again`.
     """
     if rows.shape[1] == 1:
-        least = float((limits[rows[:, 0] < 0] / rows[rows[:, 0] < 0, 0]).max())
+        minimum = float((limits[rows[:, 0] < 0] / rows[rows[:, 0] < 0, 0]).max())
         most = float((limits[rows[:, 0] > 0] / rows[rows[:, 0] > 0, 0]).min())
-        return np.array([[least], [most]]), np.array([[-1.0], [1.0]]), np.array([-least, most])
+        return np.array([[minimum], [most]]), np.array([[-1.0], [1.0]]), np.array([-minimum, most])
     first = _intersect(rows, limits, centre)
     frame = frame_of(first)
     if frame.dimension == rows.shape[1] and frame.extents.max() > _ROUND * frame.extents.min():
@@ -148,7 +148,7 @@ def _met(points: Floats, rows: Floats, limits: Floats) -> Floats:
         if np.ptp(points[members], axis=0).max() <= MERGE:
             continue
         on = (np.abs(limits - points[members] @ rows.T) <= _ON_PLANE).any(axis=0)
-        common = np.linalg.lstsq(rows[on], limits[on], rcond=_LEAST_RANK)[0]
+        common = np.linalg.lstsq(rows[on], limits[on], rcond=_MIN_RANK)[0]
         if on.any() and np.abs(rows[on] @ common - limits[on]).max() <= _ON_PLANE:
             joined[members] = common
     return joined
@@ -191,7 +191,7 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
     lengths = np.linalg.norm(normals, axis=1)
     normals, offsets = normals / lengths[:, None], offsets / lengths
     gaps = offsets - points @ normals.T
-    if float(gaps.min()) < -_MOST_ON:
+    if float(gaps.min()) < -_MAX_ON:
         raise UncertainHullError(f"a vertex is {-float(gaps.min()):.2g} outside its own facets")
     failed = UncertainHullError("no tolerance fits")
     labels = together(points, MERGE)
@@ -202,7 +202,7 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
         on = np.zeros((len(kept), len(normals)), dtype=bool)
         np.logical_or.at(on, labels, gaps <= near)
         try:
-            corners, facets = _agreeing(points, normals, offsets, on, max(near, _LEAST_RANK))
+            corners, facets = _agreeing(points, normals, offsets, on, max(near, _MIN_RANK))
         except UncertainHullError as error:
             failed = error
         else:
@@ -215,7 +215,7 @@ def _agreeing(
 ) -> tuple[Integers, Integers]:
     """Return which points are vertices and which planes facets, given which points are on which planes."""
     size = points.shape[1]
-    facets = _largest(on, size)
+    facets = _max(on, size)
     members = on[:, facets].T
     means = (members @ points) / members.sum(axis=1)[:, None]
     spans = _ranks(
@@ -232,7 +232,7 @@ def _agreeing(
         raise UncertainHullError(f"a facet of a polytope in R^{size} has fewer than {size} vertices")
     if size == 2 and len(corners) != len(facets):
         raise UncertainHullError(f"{len(corners)} vertices and {len(facets)} sides are no polygon")
-    few_facets = len(facets) < len(corners) and len(corners) > _MOST_JOGGLED
+    few_facets = len(facets) < len(corners) and len(corners) > _MAX_JOGGLED
     if not (few_facets and _meet_in(points, corners, normals[facets], offsets[facets], on[:, facets])):
         _need_agreement(points, corners, on[:, facets])
     return corners, facets
@@ -282,7 +282,7 @@ def _surface(vertices: Floats) -> ConvexHull:
         return ConvexHull(vertices)
     except QhullError as error:
         failed = error
-    if len(vertices) <= _MOST_JOGGLED:
+    if len(vertices) <= _MAX_JOGGLED:
         try:
             return ConvexHull(vertices, qhull_options=_OPTIONS[1])
         except QhullError as error:
@@ -293,8 +293,8 @@ def _surface(vertices: Floats) -> ConvexHull:
 def _widest_gap(gaps: Floats) -> float:
     """Return the geometric mean of the ends of the widest gap among small distances."""
     sizes = np.abs(gaps)
-    small = np.log(np.sort(sizes[(sizes > _LEAST_ON) & (sizes < _MOST_ON)]))
-    ends = np.concatenate([[np.log(_LEAST_ON)], small, [np.log(_MOST_ON)]])
+    small = np.log(np.sort(sizes[(sizes > _MIN_ON) & (sizes < _MAX_ON)]))
+    ends = np.concatenate([[np.log(_MIN_ON)], small, [np.log(_MAX_ON)]])
     widest = int(np.diff(ends).argmax())
     return float(np.exp(0.5 * (ends[widest] + ends[widest + 1])))
 
@@ -307,9 +307,9 @@ def together(points: Floats, within: float) -> Integers:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _largest(on: Flags, least: int) -> Integers:
+def _max(on: Flags, minimum: int) -> Integers:
     """Return the planes whose points are not all on another plane; of planes with the same points, the first."""
-    planes = np.flatnonzero(on.sum(axis=0) >= least)
+    planes = np.flatnonzero(on.sum(axis=0) >= minimum)
     held = on[:, planes].astype(np.float32)
     counts, order = held.sum(axis=0), np.arange(len(planes))
     kept = np.ones(len(planes), dtype=bool)

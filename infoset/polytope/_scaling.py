@@ -22,12 +22,12 @@ from infoset.polytope._affine_hull import (
 )
 from infoset.polytope._qhull import Description, hull_of_points, intersection_of_halfspaces
 
-MOST_RATIO = 100.0
-"""Greatest ratio of widths along the axes, and of coordinates to widths, for which no local axes are needed."""
-_LEAST = 3e-12
+MAX_RATIO = 100.0
+"""Maximum ratio of widths along the axes, and of coordinates to widths, for which no local axes are needed."""
+_MIN = 3e-12
 """A width along an axis that is less than this part of the width along another one may be rounding: the set is flat,
 unless it is known to be solid."""
-_MOST_PASSES = 5
+_MAX_PASSES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,8 @@ class LocalAxes:
     def of_box(cls, lower: Floats, upper: Floats, solid: Floats | None = None) -> LocalAxes:
         """Return axes for a set with these bounds, in sets that have an interior and the widths `solid`, if known."""
         widths, sizes = np.abs(upper - lower), np.maximum(np.abs(lower), np.abs(upper))
-        least = _LEAST * (widths.max() if solid is None else solid)
-        wide = (widths > 10.0 * ROUNDING * sizes) & (widths > least)
+        minimum = _MIN * (widths.max() if solid is None else solid)
+        wide = (widths > 10.0 * ROUNDING * sizes) & (widths > minimum)
         return cls(0.5 * lower + 0.5 * upper, powers_of_two(np.where(wide, widths, 1.0)), wide)
 
     @classmethod
@@ -61,7 +61,7 @@ class LocalAxes:
         sizes = np.maximum(np.abs(lower), np.abs(upper))
         widths = np.where(axes.wide, axes.scale, 0.0 if around is None else around)
         widths = widths[widths > 0.0] if widths.any() else sizes[sizes > 0.0]
-        if not len(widths) or max(widths.max(), sizes.max()) < MOST_RATIO * widths.min():
+        if not len(widths) or max(widths.max(), sizes.max()) < MAX_RATIO * widths.min():
             return None
         return axes
 
@@ -120,15 +120,15 @@ class LocalAxes:
             raise EmptyPolytopeError(self._relaxation(normals, offsets, across, levels)) from None
 
     def _relaxation(self, normals: Floats, offsets: Floats, across: Floats, levels: Floats) -> float:
-        """Return the least relaxation of constraints that no point satisfies, their normals of unit length in R^n."""
+        """Return the minimum relaxation of constraints that no point satisfies, their normals of unit length in R^n."""
         rows, limits = np.vstack([normals, across, -across]), np.concatenate([offsets, levels, -levels])
         limits, units = limits - rows @ self.middle, np.linalg.norm(rows * self.scale, axis=1)
         used = units > 0.0
         sizes = np.linalg.norm(rows[used], axis=1) / units[used]
-        least = float(1.0 / sizes.max())
+        minimum = float(1.0 / sizes.max())
         inner = rows[used] * self.scale / units[used, None]
         with contextlib.suppress(UncertainHullError):
-            return max(0.0, -least * chebyshev_ball(inner, limits[used] / units[used], sizes * least)[1])
+            return max(0.0, -minimum * chebyshev_ball(inner, limits[used] / units[used], sizes * minimum)[1])
         return 0.0
 
     def described(self, points: Floats, normals: Floats, _offsets: Floats, across: Floats) -> Description:
@@ -196,7 +196,7 @@ def bounds_of_constraints(
         axes = LocalAxes.of_box(bounds[0], bounds[1], np.zeros(space))
         middle, scale = np.where(axes.wide, axes.middle, middle), np.where(axes.wide, axes.scale, scale)
     known: Floats | None = None
-    for _ in range(_MOST_PASSES):
+    for _ in range(_MAX_PASSES):
         parts = []
         for part, limits in ((normals, offsets), (across, levels)):
             units = np.linalg.norm(part * scale, axis=1)
@@ -223,7 +223,7 @@ def bounds_of_constraints(
 
 
 def _bounds_of_axes(rows: Floats, limits: Floats) -> Floats:
-    """Return the least and the greatest coordinates that the rows along the axes allow, shape (2, n)."""
+    """Return the minimum and the maximum coordinates that the rows along the axes allow, shape (2, n)."""
     along = rows[np.count_nonzero(rows, axis=1) == 1]
     ends = limits[np.count_nonzero(rows, axis=1) == 1, None]
     ends = np.divide(ends, along, out=np.zeros_like(along), where=along != 0.0)
@@ -232,9 +232,9 @@ def _bounds_of_axes(rows: Floats, limits: Floats) -> Floats:
 
 
 def tightened(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """Return bounds of {x: rows x <= limits, lower <= x <= upper}, from each row alone; they need not be the least."""
-    least = np.minimum(rows * lower, rows * upper)
-    ends = limits[:, None] - (least.sum(axis=1)[:, None] - least)
+    """Return bounds of {x: rows x <= limits, lower <= x <= upper}, from each row alone; not always the tightest."""
+    minimum = np.minimum(rows * lower, rows * upper)
+    ends = limits[:, None] - (minimum.sum(axis=1)[:, None] - minimum)
     ends = np.divide(ends, rows, out=np.zeros_like(rows), where=rows != 0.0)
     most = np.where(rows > 0.0, ends, np.inf).min(axis=0, initial=np.inf)
     return np.where(rows < 0.0, ends, -np.inf).max(axis=0, initial=-np.inf).clip(lower), most.clip(max=upper)
@@ -301,4 +301,4 @@ def _mixed(rows: Floats, limits: Floats, across: Floats) -> bool:
     columns = np.ones(1)
     if table.any(axis=0).all():
         columns = np.exp(np.mean(np.log(np.where(table != 0.0, np.abs(table), 1.0)), axis=0, where=table != 0.0))
-    return bool(columns.max() >= 1e3 * columns.min() or (len(sizes) and sizes.max() >= MOST_RATIO * sizes.min()))
+    return bool(columns.max() >= 1e3 * columns.min() or (len(sizes) and sizes.max() >= MAX_RATIO * sizes.min()))

@@ -104,13 +104,13 @@ class PolytopeArrays:
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
         """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds are equal. Exact."""
-        least, most = box_ends(lower, upper, "n")
-        unit, wide = np.eye(len(least)), least < most
-        corners = list(itertools.product(*(dict.fromkeys(pair) for pair in zip(least, most, strict=True))))
+        minimum, most = box_ends(lower, upper, "n")
+        unit, wide = np.eye(len(minimum)), minimum < most
+        corners = list(itertools.product(*(dict.fromkeys(pair) for pair in zip(minimum, most, strict=True))))
         return cls(
             np.array(corners),
             np.vstack([unit[wide], -unit[wide]]),
-            np.concatenate([most[wide], -least[wide]]),
+            np.concatenate([most[wide], -minimum[wide]]),
             unit[~wide],
             most[~wide],
         )
@@ -193,7 +193,7 @@ class PolytopeArrays:
         Raises
         ------
         EmptyPolytopeError
-            If it is empty; the error has the least relaxation of the constraints.
+            If it is empty; the error has the minimum relaxation of the constraints.
         """
         if self.is_empty:
             raise EmptyPolytopeError(self.relaxation)

@@ -20,13 +20,13 @@ EPSILON = float(np.finfo(np.float64).eps)
 _ON = 64.0 * EPSILON
 """Distance of a vertex from a plane that contains it, relative to the terms of the distance."""
 _THIN = 3e-8
-"""Least thickness of a set, relative to its coordinates."""
+"""Minimum thickness of a set, relative to its coordinates."""
 _ENTRIES = 20_000_000
-"""Greatest size of a working array."""
+"""Maximum size of a working array."""
 _PARALLEL = 1e-14
 _INCIDENT = 1e-8
 _SINGULAR = 1e-6
-"""Least singular value of a matrix, relative to the greatest one, with which facets are mapped."""
+"""Minimum singular value of a matrix, relative to the maximum one, with which facets are mapped."""
 _HULL = 1e-8
 """Enlargement of a hull, relative to the size of the set along each axis: it may have merged points."""
 _ROUNDED = 1e-13
@@ -50,7 +50,7 @@ class FacetsAndVertices:
 
     @classmethod
     def of(cls, polytope: Polytope, sizes: Floats | float = 0.0) -> FacetsAndVertices:
-        """Return a polytope; a flat one is widened by 3e-8 of its greatest coordinates, or of `sizes`, shape (n,)."""
+        """Return a polytope; a flat one is widened by 3e-8 of its maximum coordinates, or of `sizes`, shape (n,)."""
         vertices, normals = polytope.vertices, polytope.normals
         depth = (heights := vertices @ normals.T).max(axis=0) - heights
         incidence, offsets = depth <= _INCIDENT * depth.max(axis=0), heights.max(axis=0)
@@ -75,7 +75,7 @@ class FacetsAndVertices:
     def enlarged(self, slack: float, sizes: Floats | float = 0.0) -> FacetsAndVertices:
         """Return the set scaled about its centre, so that each facet moves outward by at least `slack` ulp.
 
-        The ulp is that of the terms of normal . x, in which x has the greatest coordinates of the set or `sizes`, shape
+        The ulp is that of the terms of normal . x, in which x has the maximum coordinates of the set or `sizes`, shape
         (n,), if these are greater. A set about as thin as rounding errors is widened by 1e-12 of these coordinates.
         """
         sizes = np.maximum(np.abs(self.vertices).max(axis=0), sizes)

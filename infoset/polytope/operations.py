@@ -11,18 +11,18 @@ from infoset._set_arguments import need_set
 from infoset.arrays import Floats
 from infoset.polytope.polytope import Polytope
 
-_MOST_ROUNDS = 200
+_MAX_ROUNDS = 200
 _FLAT = 1e-7
 
 
-def shadow(
-    furthest: Callable[[Floats], Floats], space: int, tolerance: float = 1e-9, most_facets: int = 10_000
+def polytope_from_support(
+    furthest: Callable[[Floats], Floats], space: int, tolerance: float = 1e-9, max_facets: int = 10_000
 ) -> Polytope:
     """Return a polytope from its support vectors: a projection of a set that is known only by programs over it.
 
     `furthest` returns a point of the set furthest along a direction, both of shape (space,). `space` is 2 or 3; more
     works but the cost grows fast. Vertices of the result are points of the set; the set extends beyond its facets, at
-    most `most_facets`, by no more than the relative `tolerance`.
+    most `max_facets`, by no more than the relative `tolerance`.
 
     The hull of the points known is enlarged: each facet (and each direction across it, where it is flat) beyond which
     the set extends gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a
@@ -36,12 +36,12 @@ def shadow(
     unit = np.eye(space)
     points = np.array([furthest(direction) for direction in np.vstack([unit, -unit])])
     known: set[tuple[float, ...]] = set()
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         hull = Polytope.from_vertices(points, _FLAT)
         size = max(float(np.ptp(points, axis=0).max()), 1e-12 * float(np.abs(points).max()))
         rows, limits = hull.constraints()
-        if len(rows) > most_facets:
-            raise ArithmeticError(f"the projection has over {most_facets} facets")
+        if len(rows) > max_facets:
+            raise ArithmeticError(f"the projection has over {max_facets} facets")
         new = []
         for row, limit in zip(rows, limits, strict=True):
             key = tuple((row + 0.0).round(10))

@@ -22,8 +22,8 @@ from infoset._set_arguments import (
 )
 from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, real_values
-from infoset.polytope._affine_hull import EmptyPolytopeError, least_relaxation
-from infoset.polytope._measures import largest_ball, nearest_difference, simplices_of, volume_of
+from infoset.polytope._affine_hull import EmptyPolytopeError, min_relaxation
+from infoset.polytope._measures import max_ball, nearest_difference, simplices_of, volume_of
 from infoset.polytope._scaling import LocalAxes, described, tightened, without_far
 from infoset.polytope.arrays import PolytopeArrays
 
@@ -42,9 +42,9 @@ class Polytope(PolytopeArrays):
     matter, except that points whose width along one axis is 3e-12 times that along another one, or less, count as flat.
     Rounding of the coordinates limits sets far from the origin: a thickness below 1e-13 of a coordinate counts as flat.
 
-    An empty set has no vertices; `relaxation` is then the least relaxation of the constraints that made it empty, their
-    normals of unit length, with which a point satisfies them; 0 if it is not known. Operations on it give the empty
-    set; points such as its centroid do not exist, and an EmptyPolytopeError is raised.
+    An empty set has no vertices; `relaxation` is then the minimum relaxation of the constraints that made it empty,
+    their normals of unit length, with which a point satisfies them; 0 if it is not known. Operations on it give the
+    empty set; points such as its centroid do not exist, and an EmptyPolytopeError is raised.
 
     All arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
     (ValueError). Operations are exact up to rounding: about 1e-12 of the size of the set, and 2e-9 at most. Their cost
@@ -126,12 +126,12 @@ class Polytope(PolytopeArrays):
             raise ValueError("the difference with an empty set is unbounded")
         rows, limits = self.constraints()
         limits = limits - other.support_function(rows)
-        most, least = np.split(limits[len(self.normals) :], 2)
+        most, minimum = np.split(limits[len(self.normals) :], 2)
         sizes = np.maximum(np.abs(self.vertices).max(axis=0), np.abs(other.vertices).max(axis=0))
-        if (most + least < -_FLAT_WIDTH * np.abs(self.across) @ sizes).any():
-            return self.empty(self.space, least_relaxation(rows, limits))
+        if (most + minimum < -_FLAT_WIDTH * np.abs(self.across) @ sizes).any():
+            return self.empty(self.space, min_relaxation(rows, limits))
         (lower, upper), (start, end) = self.bounding_box(), other.bounding_box()
-        sides = self.normals, limits[: len(self.normals)], self.across, 0.5 * (most - least)
+        sides = self.normals, limits[: len(self.normals)], self.across, 0.5 * (most - minimum)
         return self._in_box(sides, lower - start, upper - end, upper - lower, solid=self.dimension == self.space)
 
     def intersection(self, *others: Polytope) -> Polytope:
@@ -188,7 +188,7 @@ class Polytope(PolytopeArrays):
         """
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
-        least, most = (
+        minimum, most = (
             np.broadcast_to(bound_values(name, bound, (), (len(rows),)), len(rows))
             for name, bound in (("lower", lower), ("upper", upper))
         )
@@ -196,14 +196,14 @@ class Polytope(PolytopeArrays):
         if self.is_empty:
             return self
         wider = slack_ulp * _EPS * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
-        rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - least])
+        rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - minimum])
         cuts = self.support_function(rows) > limits
         if not cuts.any():
             return self
-        if np.isneginf(limits).any() or (least > most).any():
+        if np.isneginf(limits).any() or (minimum > most).any():
             own_rows, own_limits = self.constraints()
             rows, limits = np.vstack([own_rows, rows[cuts]]), np.concatenate([own_limits, limits[cuts]])
-            return self.empty(self.space, least_relaxation(rows, limits))
+            return self.empty(self.space, min_relaxation(rows, limits))
         lower, upper = self.bounding_box()
         sides = np.vstack([self.normals, rows[cuts]]), np.concatenate([self.offsets, limits[cuts]])
         ends = tightened(rows[cuts], limits[cuts], lower, upper)
@@ -230,7 +230,7 @@ class Polytope(PolytopeArrays):
         It starts with the bounding box. Then it is cut by the facet of the set beyond which a vertex is farthest,
         until it has `cap` facets: one intersection for each.
         """
-        Limits(least=2 * self.space, whole=True).need("cap", cap)
+        Limits(minimum=2 * self.space, whole=True).need("cap", cap)
         if self.is_empty or len(self.normals) <= cap:
             return self
         outer = self.from_box(*self.bounding_box())
@@ -289,7 +289,7 @@ class Polytope(PolytopeArrays):
         return LocalAxes.needed(lower, upper, upper - lower if self.dimension == self.space else None)
 
     def excess(self, points: ArrayLike) -> Floats:
-        """Return the greatest distance of `points`, shape (..., n), beyond a facet or from the affine hull.
+        """Return the maximum distance of `points`, shape (..., n), beyond a facet or from the affine hull.
 
         It has shape (...), and is at most 0 inside, also for the vertices: the rounding of a scalar product, and of the
         representation (distances of vertices beyond facets), is subtracted. Infinite for the empty set.
@@ -329,7 +329,7 @@ class Polytope(PolytopeArrays):
         return self.is_subset(other, tolerance) and other.is_subset(self, tolerance)
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the least and the greatest coordinates of the vertices, each of shape (n,). O(v n), exact."""
+        """Return the minimum and the maximum coordinates of the vertices, each of shape (n,). O(v n), exact."""
         return self.needed().vertices.min(axis=0), self.vertices.max(axis=0)
 
     def volume(self) -> float:
@@ -357,10 +357,10 @@ class Polytope(PolytopeArrays):
 
         A linear program (HiGHS) in coordinates about the centre of the vertices.
         """
-        return largest_ball(self.needed().vertices, self.normals, self.offsets, self._axes)
+        return max_ball(self.needed().vertices, self.normals, self.offsets, self._axes)
 
     def diameter(self) -> float:
-        """Return the greatest distance between two vertices; 0 for the empty set. O(v^2 n)."""
+        """Return the maximum distance between two vertices; 0 for the empty set. O(v^2 n)."""
         return float(cdist(self.vertices, self.vertices).max(initial=0.0))
 
     def closest_point(self, point: ArrayLike) -> Floats:

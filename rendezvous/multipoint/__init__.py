@@ -1,13 +1,13 @@
 """Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their order."""
 
 from rendezvous.multipoint.kepler import KeplerTargets, KeplerTour
-from rendezvous.multipoint.order import MOST_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
+from rendezvous.multipoint.order import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
 from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, solve_segments
 from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times
 from rendezvous.multipoint.tour import DriftingTargets, Meet, MovingTargets, Target, Tour, Visits, nodes_of
 
 __all__ = [
-    "MOST_TARGETS",
+    "MAX_TARGETS",
     "BestOrder",
     "BestTimes",
     "DriftingTargets",

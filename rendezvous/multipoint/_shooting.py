@@ -15,18 +15,18 @@ from rendezvous.multipoint.segments import Nodes, Path
 from rendezvous.two_body import coast
 
 STEP_RAD = 0.1
-MOST_STEPS = 50_000
-LEAST_RADIUS = 0.02
+MAX_STEPS = 50_000
+MIN_RADIUS = 0.02
 """A trajectory nearer to the centre, relative to its initial distance, counts as falling into it."""
 TOLERANCE = 1e-11
 ON_THE_WAY = 1e-4
 ROUNDING = 1e-8
 """A smaller residual that no longer decreases is rounding."""
-LEAST_STEP = 1.0 / 64.0
-LEAST_STEP_FROM_NEAR = 1.0 / 8.0
+MIN_STEP = 1.0 / 64.0
+MIN_STEP_FROM_NEAR = 1.0 / 8.0
 _ROUNDS = 12
 _FAST = 0.2
-_GREATEST_CORRECTION = 0.5
+_MAX_CORRECTION = 0.5
 _FIRST_STEP = 0.3
 
 
@@ -76,9 +76,9 @@ def propagate(z: Floats, duration: float) -> bool:
     slopes, z_next = np.zeros((STAGES, *z.shape)), np.zeros(z.shape)
     no_y, no_slopes = np.zeros(0), np.zeros((STAGES, 0))
     left = duration
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         radius = np.sqrt(z[0, 0] ** 2 + z[1, 0] ** 2 + z[2, 0] ** 2)
-        if not radius > LEAST_RADIUS:
+        if not radius > MIN_RADIUS:
             return False
         step = min(left, STEP_RAD * radius * np.sqrt(radius))
         if left - step < 1e-3 * step:
@@ -243,9 +243,9 @@ def shoot(block: Block, near: Floats | None = None) -> Shot | None:
     coasting orbit.
     """
     coasting = np.zeros(3 + 3 * len(block.time_s))
-    initials = [] if near is None else [(near, LEAST_STEP_FROM_NEAR)]
-    for initial, least_step in (*initials, (coasting, LEAST_STEP)):
-        unknowns = _follow(block, initial, least_step)
+    initials = [] if near is None else [(near, MIN_STEP_FROM_NEAR)]
+    for initial, min_step in (*initials, (coasting, MIN_STEP)):
+        unknowns = _follow(block, initial, min_step)
         if unknowns is not None:
             return Shot(block, unknowns)
     return None
@@ -289,7 +289,7 @@ def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> F
     return residual if np.isfinite(residual).all() and (slopes is None or np.isfinite(slopes).all()) else None
 
 
-def _follow(block: Block, initial: Floats, least_step: float) -> Floats | None:
+def _follow(block: Block, initial: Floats, min_step: float) -> Floats | None:
     """Continue unknowns to a residual of zero, in steps as long as Newton's method converges."""
     slopes = np.empty((len(initial), len(initial)))
     first = _residual(block, initial, slopes)
@@ -306,7 +306,7 @@ def _follow(block: Block, initial: Floats, least_step: float) -> Floats | None:
             if solved is not None:
                 break
             step *= 0.5
-            if step < least_step:
+            if step < min_step:
                 return None
         unknowns, rounds = solved
         if share == 1.0:
@@ -326,7 +326,7 @@ def _newton(block: Block, unknowns: Floats, share: float, goal: Floats, slopes: 
         size = float(np.abs(residual - goal).max())
         if size <= (TOLERANCE if share == 1.0 else ON_THE_WAY) or (fresh and size <= ROUNDING and size > 0.3 * before):
             return unknowns, rounds
-        if size > _GREATEST_CORRECTION or size > 2.0 * before:
+        if size > _MAX_CORRECTION or size > 2.0 * before:
             return None
         fresh = size > _FAST * before
         if fresh and _residual(block, unknowns, slopes) is None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats, Integers
 from rendezvous._repr import short_repr
-from rendezvous.multipoint._shooting import LEAST_RADIUS, ROUNDING, ShotPath, blocks_of, shoot, unknowns_of
+from rendezvous.multipoint._shooting import MIN_RADIUS, ROUNDING, ShotPath, blocks_of, shoot, unknowns_of
 from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, check_times, solve_segments
 from rendezvous.multipoint.tour import MovingTargets, Target, Visits, nodes_of
 from rendezvous.relative_motion import TimeVaryingMotion
@@ -19,18 +19,18 @@ from rendezvous.two_body import coast, coasting_rates, gravity_gradient
 
 NODES = 12
 PANEL_RAD = 0.6
-MOST_PANELS = 2000
-MOST_MIXED = 6
+MAX_PANELS = 2000
+MAX_MIXED = 6
 _SAMPLES = 64
 _POINTS = 0.5 - 0.5 * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
 _WEIGHTS = np.array([0.5, *[-1.0, 1.0] * (NODES // 2 - 1), -0.5])
 """Increasing Chebyshev points on [0, 1], and their barycentric weights."""
 SETTLED = 1e-11
-MOST_ROUNDS = 30
+MAX_ROUNDS = 30
 FEW_ROUNDS = 8
-MOST_KNOWN = 64
+MAX_KNOWN = 64
 REMEDY = "give visits more time, visit nearer targets first, or check units"
-GREATEST_CHANGE = 2.0
+MAX_CHANGE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,20 +69,20 @@ class Reference(Panels):
         return states
 
     @property
-    def least_radius(self) -> float:
-        """The least distance from the centre at its points, m."""
+    def min_radius(self) -> float:
+        """The minimum distance from the centre at its points, m."""
         return float(np.linalg.norm(self.values[..., :3], axis=-1).min())
 
     @property
-    def greatest_speed(self) -> float:
-        """The greatest speed at its points, m/s."""
+    def max_speed(self) -> float:
+        """The maximum speed at its points, m/s."""
         return float(np.linalg.norm(self.values[..., 3:], axis=-1).max())
 
     def change_from(self, other: Reference) -> float:
-        """Return the greatest difference from `other` at this one's points, relative, of positions and velocities."""
+        """Return the maximum difference from `other` at this one's points, relative, of positions and velocities."""
         apart = self.values - other(_points(self.breaks_s)).reshape(self.values.shape)
         distance, speed = np.abs(apart[..., :3]).max(), np.abs(apart[..., 3:]).max()
-        return float(max(distance / self.least_radius, speed / self.greatest_speed))
+        return float(max(distance / self.min_radius, speed / self.max_speed))
 
     @classmethod
     def of_states(
@@ -156,10 +156,10 @@ class Mixture:
 
     def mix(self, x: Reference, g: Reference) -> Reference:
         """Add a round, and return the next x."""
-        scale = np.array([1.0] * 3 + [g.least_radius / g.greatest_speed] * 3)
+        scale = np.array([1.0] * 3 + [g.min_radius / g.max_speed] * 3)
         self._values.append(g.values)
         self._residuals.append(((g.values - x.values) * scale).ravel())
-        del self._values[:-MOST_MIXED], self._residuals[:-MOST_MIXED]
+        del self._values[:-MAX_MIXED], self._residuals[:-MAX_MIXED]
         last = self._residuals[-1]
         if len(self._residuals) == 1:
             return g
@@ -178,7 +178,7 @@ def _breaks(states: Callable[[Floats], Floats], start_s: float, end_s: float, mu
     even = float(np.sqrt(mu / radii**3).mean()) * (end_s - start_s)
     # On an eccentric orbit, panels are as narrow as its nearest point needs.
     count = np.ceil((radians if radians < 3.0 * even else 3.0 * even) / PANEL_RAD)
-    if not np.isfinite(count) or count > MOST_PANELS:
+    if not np.isfinite(count) or count > MAX_PANELS:
         raise ValueError(f"a trajectory of {radians:.3g} radians between two visits is too long to follow; check units")
     return np.linspace(start_s, end_s, max(1, int(count)) + 1)
 
@@ -282,7 +282,7 @@ class KeplerTour(Visits):
         coast(self.start_state, 0.0, mu)
 
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
-        """Return a path that satisfies the conditions of least energy; its motion is linear about its trajectory.
+        """Return a path that satisfies the conditions of minimum energy; its motion is linear about its trajectory.
 
         Raises
         ------
@@ -327,15 +327,15 @@ class KeplerTour(Visits):
                     f"the way; {REMEDY}"
                 )
             known.append((nodes.arrive_s, [shot.unknowns for shot in shots]))
-            del known[:-MOST_KNOWN]
+            del known[:-MAX_KNOWN]
             return ShotPath(nodes, shots, self._settled)
 
         return fly
 
-    def _relinearise(self, nodes: Nodes, reference: Reference, *, rounds: int = MOST_ROUNDS) -> Path:
+    def _relinearise(self, nodes: Nodes, reference: Reference, *, rounds: int = MAX_ROUNDS) -> Path:
         """Solve linear problems about one trajectory after another until they agree."""
         change = np.inf
-        nearest = LEAST_RADIUS * float(np.linalg.norm(np.vstack([self.start_state, nodes.arrive])[:, :3], axis=1).min())
+        nearest = MIN_RADIUS * float(np.linalg.norm(np.vstack([self.start_state, nodes.arrive])[:, :3], axis=1).min())
         mixture = Mixture()
         for index in range(rounds):
             try:
@@ -346,7 +346,7 @@ class KeplerTour(Visits):
             flown = Reference(panels.breaks_s, panels.values[..., :6], reference.gravitational_parameter_m3_s2)
             before, change = change, flown.change_from(reference)
             hopeless = rounds == FEW_ROUNDS and change > 0.5 * before
-            if hopeless or not change <= GREATEST_CHANGE or flown.least_radius < nearest:
+            if hopeless or not change <= MAX_CHANGE or flown.min_radius < nearest:
                 break
             if change <= SETTLED or (change <= ROUNDING and change > 0.3 * before):
                 path = solve_segments(self._motion_about(flown), self.start_s, self.start_state, nodes)

@@ -20,7 +20,7 @@ from rendezvous.multipoint.tour import SMOOTH, Meet, Tour, Visits, nodes_of
 
 Report = Callable[[float], None]
 
-MOST_TARGETS = 9
+MAX_TARGETS = 9
 _MARGIN = 1e-4
 
 
@@ -74,8 +74,8 @@ def best_order(
         if not complete:
             if horizon is not None:
                 rest = [target for target in range(count) if target not in order]
-                later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.least_gap_s
-                held = TimeLimits(horizon - float(later), limits.least_gap_s, limits.price_per_s)
+                later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.min_gap_s
+                held = TimeLimits(horizon - float(later), limits.min_gap_s, limits.price_per_s)
             if np.isfinite(search.best_objective):
                 enough = search.best_objective
         effort = Effort.BOUND if warm else Effort.ORDER
@@ -233,10 +233,10 @@ class _Search:
 
 def _checked_count(tour: Visits) -> int:
     count = len(tour.targets.targets)
-    if count > MOST_TARGETS:
+    if count > MAX_TARGETS:
         raise ValueError(
-            f"{count} targets have {factorial(count)} orders; a search takes at most {MOST_TARGETS}, with "
-            f"{factorial(MOST_TARGETS)}, and each further target multiplies the cost: give the order"
+            f"{count} targets have {factorial(count)} orders; a search takes at most {MAX_TARGETS}, with "
+            f"{factorial(MAX_TARGETS)}, and each further target multiplies the cost: give the order"
         )
     return count
 

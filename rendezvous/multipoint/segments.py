@@ -32,7 +32,7 @@ class Nodes:
 
 
 class NotSettledError(ValueError):
-    """No path of least energy was found; one may still exist."""
+    """No path of minimum energy was found; one may still exist."""
 
 
 class Flown(Protocol):

@@ -18,17 +18,17 @@ from rendezvous.multipoint.segments import Flown, NotSettledError, Path
 
 FlyAt = Callable[[Floats], Flown]
 
-LEAST_SHARE = 1e-6
-"""Default of the least gap, as a share of the available time."""
+MIN_SHARE = 1e-6
+"""Default of the minimum gap, as a share of the available time."""
 _POLISH_ROUNDS = 8
 _DIFFERENCE = 1e-5
 _HELD = 1e-3
 _WALL = 20.0
-_MOST_WALLS = 6
-_MOST_RESTARTS = 4
+_MAX_WALLS = 6
+_MAX_RESTARTS = 4
 _SETTLED, _WELL_SETTLED = 1e-3, 1e-6
 _ROUNDING = 1e-26
-_SMALLEST = float(np.finfo(float).tiny)
+_MIN = float(np.finfo(float).tiny)
 _CLOCK = 1e-9
 """Travel times below this share of the times are rounding errors, and leave no gaps."""
 
@@ -57,8 +57,8 @@ class TimeLimits:
     ----------
     latest_s : float or None
         Latest end of the last visit.
-    least_gap_s : float
-        Least time between a departure and the next arrival.
+    min_gap_s : float
+        Minimum time between a departure and the next arrival.
     price_per_s : float
         kappa, m^2/s^4, not negative; kappa times the duration is added to the energy.
 
@@ -69,11 +69,11 @@ class TimeLimits:
     """
 
     latest_s: float | None = None
-    least_gap_s: float = 0.0
+    min_gap_s: float = 0.0
     price_per_s: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in (("least gap", self.least_gap_s), ("price of a second", self.price_per_s)):
+        for name, value in (("minimum gap", self.min_gap_s), ("price of a second", self.price_per_s)):
             if not (np.isfinite(value) and value >= 0.0):
                 raise ValueError(f"the {name} must be finite and not negative, found {value!r}")
         if self.latest_s is not None and not np.isfinite(self.latest_s):
@@ -134,8 +134,8 @@ class _Trials:
     fly: FlyAt
     shifts_s: Floats
     price_per_s: float
-    least: float
-    """The least gap, s."""
+    minimum: float
+    """The minimum gap, s."""
     total: float
     """The available travel time, s; infinite without a latest time."""
     scale: float
@@ -160,8 +160,8 @@ class _Trials:
 
     def within(self, gaps: Floats) -> Floats:
         """Return gaps within the limits, to undo the rounding of a descent."""
-        gaps = np.maximum(gaps, self.least)
-        excess = gaps - self.least
+        gaps = np.maximum(gaps, self.minimum)
+        excess = gaps - self.minimum
         over = gaps.sum() - self.total
         if over > 0.0 and excess.sum() > 0.0:
             gaps = gaps - over * excess / excess.sum()
@@ -220,11 +220,11 @@ def optimise_times(
         scale = max((float(guess[-1]) - start_s for guess in guesses if len(guess) == count), default=0.0)
         if scale <= 0.0:
             raise ValueError("with the last time free, times to start from are needed")
-    least = max(limits.least_gap_s, LEAST_SHARE * scale)
-    trials = _Trials(fly, shifts, limits.price_per_s, least, total, scale)
+    minimum = max(limits.min_gap_s, MIN_SHARE * scale)
+    trials = _Trials(fly, shifts, limits.price_per_s, minimum, total, scale)
     candidates = [np.diff(np.concatenate([[0.0], np.asarray(guess) - shifts])) for guess in guesses]
-    candidates += _spread(count, scale, least, bounded=np.isfinite(total), most=effort.starts)
-    sound = [gaps for gaps in candidates if (gaps >= least * (1 - 1e-9)).all() and gaps.sum() <= total * (1 + 1e-12)]
+    candidates += _spread(count, scale, minimum, bounded=np.isfinite(total), most=effort.starts)
+    sound = [gaps for gaps in candidates if (gaps >= minimum * (1 - 1e-9)).all() and gaps.sum() <= total * (1 + 1e-12)]
     starts = [trial for trial in map(trials.attempt, sound) if trial is not None]
     if not starts:
         trials(sound[0])  # raises the reason
@@ -239,7 +239,7 @@ def optimise_times(
     best = min(ends, key=lambda trial: trial.objective)
     if effort is Effort.FINAL:
         best = _polish(trials, best)
-        for _ in range(_MOST_RESTARTS):
+        for _ in range(_MAX_RESTARTS):
             if _unsettled(trials, best) <= _WELL_SETTLED:
                 break
             again = _polish(trials, _descend(trials, best, best.gaps, effort.tolerance, enough))
@@ -257,10 +257,10 @@ def optimise_times(
 def _unsettled(trials: _Trials, best: _Trial) -> float:
     """Return the residual of the conditions of a minimum, relative to the objective.
 
-    To first order, the share of the objective by which a change of one gap by its length, or down to the least one,
+    To first order, the share of the objective by which a change of one gap by its length, or down to the minimum one,
     would lower it, as far as the limits let it change; at the latest time, at the cost of the other gaps.
     """
-    gaps, excess = best.gaps, np.maximum(best.gaps - trials.least, 0.0)
+    gaps, excess = best.gaps, np.maximum(best.gaps - trials.minimum, 0.0)
     slope = best.slope
     full = bool(np.isfinite(trials.total)) and trials.total - gaps.sum() <= 1e-9 * trials.total
     if full and excess.sum() > 0.0:
@@ -270,7 +270,7 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
     # The objective of a path that costs nothing is the rounding of states.
     states = best.flown.nodes.arrive
     size = (states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps
-    return float(gain.max() / max(best.objective + _ROUNDING * size.sum(), _SMALLEST))
+    return float(gain.max() / max(best.objective + _ROUNDING * size.sum(), _MIN))
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
@@ -279,22 +279,22 @@ def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
         return float(np.inf)
     stays = float(dwell_s[:-1].sum())
     total = limits.latest_s - start_s - stays
-    need = len(dwell_s) * limits.least_gap_s
+    need = len(dwell_s) * limits.min_gap_s
     clock = max(abs(limits.latest_s), abs(start_s))
     if not total > _CLOCK * clock or total < need - 1e-14 * clock:
         raise NoRoomError(
             f"{len(dwell_s)} visits do not fit before the latest time, {limits.latest_s:g} s: with gaps of at least "
-            f"{limits.least_gap_s:g} s and the dwells the last one is after {start_s + stays + need:g} s at the "
+            f"{limits.min_gap_s:g} s and the dwells the last one is after {start_s + stays + need:g} s at the "
             "earliest"
         )
     return max(total, need)
 
 
-def _spread(count: int, scale: float, least: float, bounded: bool, most: int) -> list[Floats]:
+def _spread(count: int, scale: float, minimum: float, bounded: bool, most: int) -> list[Floats]:
     """Return initial gaps: even, rising and falling, over all the time and over half of it, and a Halton sequence."""
     rising = np.arange(1.0, count + 1.0)
     lengths = (1.0, 0.5) if bounded else (0.5, 1.0, 2.0, 4.0, 8.0)
-    extra = max(scale - count * least, 0.0) if bounded else scale
+    extra = max(scale - count * minimum, 0.0) if bounded else scale
     shapes = (np.ones(count), rising, rising[::-1])
     shares = [length * shape / shape.sum() for shape in shapes for length in lengths]
     for point in halton(count + 1, most):
@@ -303,7 +303,7 @@ def _spread(count: int, scale: float, least: float, bounded: bool, most: int) ->
             shares.append((weights / weights.sum())[:count])
         else:
             shares.append(0.5 * 16.0 ** point[count] * weights[:count] / weights[:count].sum())
-    return [least + extra * share for share in shares[:most]]
+    return [minimum + extra * share for share in shares[:most]]
 
 
 def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
@@ -328,11 +328,11 @@ def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: f
 
     def value(x: Floats) -> tuple[float, Floats]:
         nonlocal walls, lowest
-        gaps = np.maximum(x * scale, 0.5 * trials.least)
+        gaps = np.maximum(x * scale, 0.5 * trials.minimum)
         trial = trials.attempt(gaps)
         if trial is None:
             walls += 1
-            if walls > _MOST_WALLS:
+            if walls > _MAX_WALLS:
                 raise _StoppedError
             return float(np.log(start.objective)) + _WALL, np.zeros_like(x)
         if trial.objective < lowest.objective and (gaps == trials.within(gaps)).all():
@@ -352,7 +352,7 @@ def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: f
             value,
             start.gaps / scale,
             jac=True,
-            bounds=[(float(bound), None) for bound in np.broadcast_to(trials.least / scale, start.gaps.shape)],
+            bounds=[(float(bound), None) for bound in np.broadcast_to(trials.minimum / scale, start.gaps.shape)],
             constraints=constraints,
             method="SLSQP",
             options={"ftol": tolerance, "maxiter": 100},
@@ -364,11 +364,11 @@ def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: f
 
 
 def _polish(trials: _Trials, best: _Trial) -> _Trial:
-    """Newton's method on the gaps above the least one; at the latest time their sum is fixed."""
-    least, total, near = trials.least, trials.total, 1e-5 * trials.scale
+    """Newton's method on the gaps above the minimum one; at the latest time their sum is fixed."""
+    minimum, total, near = trials.minimum, trials.total, 1e-5 * trials.scale
     gaps = best.gaps
     full = total - gaps.sum() <= near
-    held = gaps - least <= _HELD * least
+    held = gaps - minimum <= _HELD * minimum
     if held.all():
         return best
     if full:  # exactly at the latest time
@@ -387,7 +387,7 @@ def _polish(trials: _Trials, best: _Trial) -> _Trial:
             break
         move = -directions @ np.linalg.solve(hessian, directions.T @ here.slope)
         moved = here.gaps + move
-        outside = bool((moved < least * (1.0 - 1e-12)).any() or moved.sum() > total * (1.0 + 1e-12))
+        outside = bool((moved < minimum * (1.0 - 1e-12)).any() or moved.sum() > total * (1.0 + 1e-12))
         if outside or np.abs(move).max() > 0.1 * float(here.gaps.min()):
             break
         trial = trials(moved)

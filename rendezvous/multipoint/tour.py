@@ -134,7 +134,7 @@ class Visits(ABC):
 
     @abstractmethod
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
-        """Return the path of least energy that reaches targets in an `order`, some or all, each once, at N times."""
+        """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""
 
     @abstractmethod
     def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
@@ -159,7 +159,7 @@ class Tour(Visits):
     __repr__ = short_repr
 
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
-        """Return the path of least energy that reaches targets in an `order`, some or all, each once, at N times."""
+        """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""
         return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
 
     def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:

@@ -7,12 +7,12 @@ from rendezvous.pareto.feasibility import (
     Feasibility,
     NotCertifiedError,
     check_bound,
-    least_peak,
+    min_peak,
     peak_control,
     total_impulse,
 )
 from rendezvous.pareto.front import ParetoSet, distances, front_of_two, pareto_set, simplex_weights
-from rendezvous.pareto.selections import NotOptimalError, least_greatest_excess, least_sum_of_costs, nearest_to
+from rendezvous.pareto.selections import NotOptimalError, min_sum_of_costs, minimax_excess, nearest_to
 from rendezvous.pareto.solution import (
     CraftCost,
     DurationSweep,
@@ -46,9 +46,9 @@ __all__ = [
     "check_bound",
     "distances",
     "front_of_two",
-    "least_greatest_excess",
-    "least_peak",
-    "least_sum_of_costs",
+    "min_peak",
+    "min_sum_of_costs",
+    "minimax_excess",
     "nearest_to",
     "pareto_set",
     "peak_control",

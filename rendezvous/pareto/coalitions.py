@@ -13,7 +13,7 @@ from rendezvous._arrays import Floats
 from rendezvous._repr import short_repr
 from rendezvous.pareto.solution import EncounterSolution, weighted_point
 
-MOST_CRAFT = 12
+MAX_CRAFT = 12
 _ROUNDING = 1e-18
 """Excess that is the rounding of an ideal, relative to the squared cost that the free values change."""
 
@@ -42,8 +42,8 @@ class Core(Enum):
 class Coalition:
     """A coalition of craft, whose `members` are indices.
 
-    `excess` is c(S), their least weighted sum of excesses at a common meeting, and `regret` its increase at the common
-    meeting of all; both in m^2/s^3.
+    `excess` is c(S), their minimum weighted sum of excesses at a common meeting, and `regret` its increase at the
+    common meeting of all; both in m^2/s^3.
     """
 
     members: tuple[int, ...]
@@ -80,8 +80,8 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
         If there are more than 12 craft: there are 2^n coalitions.
     """
     count = len(solution.costs)
-    if count > MOST_CRAFT:
-        raise ValueError(f"{count} craft have {2**count - 1} coalitions; at most {MOST_CRAFT} craft are analysed")
+    if count > MAX_CRAFT:
+        raise ValueError(f"{count} craft have {2**count - 1} coalitions; at most {MAX_CRAFT} craft are analysed")
     weights = solution.encounter.weights
     common = weights * solution.excess()
     worth: dict[tuple[int, ...], float] = {(): 0.0}

@@ -11,22 +11,22 @@ from numpy.polynomial.chebyshev import chebvander
 
 from rendezvous._arrays import Floats, Integers
 from rendezvous.pareto.solution import Plan
-from rendezvous.piecewise import NODES, chebyshev_halves, greatest_control, resolve
+from rendezvous.piecewise import NODES, chebyshev_halves, max_control, resolve
 
 _IMPULSE = 1e-10
 _INTEGRAL, _DIRECTION, _GAP = 1e-10, 1e-9, 1e-6
-_MOST_STEPS = 60
+_MAX_STEPS = 60
 _AT_ONCE = 20_000
 _POINTS, _WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(NODES))
 _AT_POINTS = chebvander(_POINTS, NODES - 1)
 _HALVES = chebyshev_halves(NODES)
-_LEAST_SHARE = 1e-3
+_MIN_SHARE = 1e-3
 _OUTSIDE = float(1.0 - _POINTS[-1])
-_MOST_HALVINGS = 45
+_MAX_HALVINGS = 45
 
 
 class NotCertifiedError(ValueError):
-    """The least peak control was not computed to its tolerance."""
+    """The minimum peak control was not computed to its tolerance."""
 
 
 class Feasibility(Enum):
@@ -44,18 +44,18 @@ class Feasibility(Enum):
 class BoundCheck:
     """The control of a meeting compared with a bound.
 
-    `peak_m_s2` is the greatest |u| of the minimum-energy control, `least_peak_m_s2` a lower bound of that of any
+    `peak_m_s2` is the maximum |u| of the minimum-energy control, `min_peak_m_s2` a lower bound of that of any
     control, to 1e-6.
     """
 
     feasibility: Feasibility
     peak_m_s2: float
-    least_peak_m_s2: float
+    min_peak_m_s2: float
 
 
 def peak_control(plan: Plan) -> float:
-    """Return the greatest |u| of a `plan`, m/s^2."""
-    return greatest_control(plan.control, plan.breaks())
+    """Return the maximum |u| of a `plan`, m/s^2."""
+    return max_control(plan.control, plan.breaks())
 
 
 def total_impulse(plan: Plan) -> float:
@@ -64,7 +64,7 @@ def total_impulse(plan: Plan) -> float:
     return integrate_size(coefficients, half_s, _IMPULSE).value
 
 
-def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck:
+def check_bound(plan: Plan, max_m_s2: float, common: int = 6) -> BoundCheck:
     """Compare a `plan` with a bound u_max on the control; `common` components, 6 or 3 (an intercept), must be met.
 
     IMPOSSIBLE is certain: the bound is below a lower bound of every control's peak. A bound less than 1e-6 above that
@@ -75,18 +75,18 @@ def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck
     ValueError
         If the bound is not positive and finite.
     NotCertifiedError
-        If the least peak is not computed to 1e-6.
+        If the minimum peak is not computed to 1e-6.
     """
-    if not (np.isfinite(greatest_m_s2) and greatest_m_s2 > 0.0):
-        raise ValueError(f"the bound on the control must be positive and finite, found {greatest_m_s2!r} m/s^2")
-    peak, least = peak_control(plan), least_peak(plan, common)
-    if peak <= greatest_m_s2:
-        return BoundCheck(Feasibility.WITHIN, peak, least)
-    possible = least <= greatest_m_s2
-    return BoundCheck(Feasibility.ANOTHER_CONTROL if possible else Feasibility.IMPOSSIBLE, peak, least)
+    if not (np.isfinite(max_m_s2) and max_m_s2 > 0.0):
+        raise ValueError(f"the bound on the control must be positive and finite, found {max_m_s2!r} m/s^2")
+    peak, minimum = peak_control(plan), min_peak(plan, common)
+    if peak <= max_m_s2:
+        return BoundCheck(Feasibility.WITHIN, peak, minimum)
+    possible = minimum <= max_m_s2
+    return BoundCheck(Feasibility.ANOTHER_CONTROL if possible else Feasibility.IMPOSSIBLE, peak, minimum)
 
 
-def least_peak(plan: Plan, common: int = 6) -> float:
+def min_peak(plan: Plan, common: int = 6) -> float:
     """Return a lower bound, m/s^2, of the peak |u| of every control with the effect of a `plan` on `common` components.
 
     A control exists whose peak is at most 1e-6 above it, relative. The common components are 6, or 3 for an intercept.
@@ -98,7 +98,7 @@ def least_peak(plan: Plan, common: int = 6) -> float:
 
     Notes
     -----
-    Krasovskii's problem of moments, by duality: the greatest l'e / int |B' Phi(T, t)' l| dt over directions l, where e
+    Krasovskii's problem of moments, by duality: the maximum l'e / int |B' Phi(T, t)' l| dt over directions l, where e
     is the required effect of the control. The effect of the control is whitened by the Gramian, int E E' dt = 1, and e
     is of unit length; Newton's method minimises I(l) = int |E' l| dt on l'e = 1. At its end two bounds are evaluated:
 
@@ -114,10 +114,10 @@ def least_peak(plan: Plan, common: int = 6) -> float:
     others = np.linalg.svd(goal[None, :])[2][1:].T
     direction = goal
     here = effect.size_of(direction)
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         slope, bend = effect.derivatives(here)
         rest = goal - slope / here.value
-        if others.shape[1] == 0 or float(np.linalg.norm(rest)) * here.value * effect.greatest <= 0.3 * _GAP:
+        if others.shape[1] == 0 or float(np.linalg.norm(rest)) * here.value * effect.maximum <= 0.3 * _GAP:
             break
         flat, bent = others.T @ slope, others.T @ bend @ others
         # No step is longer than l: if w has one direction at all times, the Hessian is zero at first.
@@ -131,15 +131,15 @@ def least_peak(plan: Plan, common: int = 6) -> float:
             break
         direction, here = direction + share * step, there
     missed = float(np.linalg.norm(goal - effect.derivatives(here)[0] / here.value)) * here.value
-    least, most = here.value + here.error, here.value - here.error
-    upper = (1.0 + (missed + effect.greatest * here.direction_error) * effect.greatest) / most
-    if not upper * least - 1.0 <= _GAP:
+    minimum, most = here.value + here.error, here.value - here.error
+    upper = (1.0 + (missed + effect.maximum * here.direction_error) * effect.maximum) / most
+    if not upper * minimum - 1.0 <= _GAP:
         raise NotCertifiedError(
-            f"craft {plan.craft.name!r}: the least control that reaches the meeting is between {length / least:.6g} "
-            f"and {length * upper:.6g} m/s^2; it is not known to {_GAP:g}. Remove the bound on the control, or change "
-            "the duration"
+            f"craft {plan.craft.name!r}: the minimum control that reaches the meeting is between "
+            f"{length / minimum:.6g} and {length * upper:.6g} m/s^2; it is not known to {_GAP:g}. "
+            "Remove the bound on the control, or change the duration"
         )
-    return length / least
+    return length / minimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,14 +175,14 @@ class _Effect:
         return cls(np.einsum("ab,pjbi->pjai", again, coefficients), half, goal)
 
     @cached_property
-    def greatest(self) -> float:
+    def maximum(self) -> float:
         """A bound on |E(t)|: the norm of the sums of the magnitudes of its coefficients."""
         return float(np.sqrt((np.abs(self.coefficients).sum(axis=1) ** 2).sum(axis=(1, 2)).max()))
 
     def size_of(self, direction: Floats) -> SizeIntegral:
         """Int |E' l| dt of a direction l."""
         vectors = np.einsum("pjai,a->pji", self.coefficients, direction)
-        return integrate_size(vectors, self.half_s, _INTEGRAL, _DIRECTION / self.greatest)
+        return integrate_size(vectors, self.half_s, _INTEGRAL, _DIRECTION / self.maximum)
 
     def derivatives(self, at: SizeIntegral) -> tuple[Floats, Floats]:
         """Gradient and matrix of second derivatives of the integral in l, shapes (c,) and (c, c)."""
@@ -237,7 +237,7 @@ def integrate_size(coefficients: Floats, half_s: Floats, tolerance: float, direc
     scale: float | None = None
     value = error = direction_error = 0.0
     accepted: list[tuple[Integers, Floats, Floats, Floats]] = []
-    for level in range(_MOST_HALVINGS + 1):
+    for level in range(_MAX_HALVINGS + 1):
         length = half_s[panel] * size
         vectors = _AT_POINTS @ coefficients
         sizes, units = _polar(vectors)
@@ -253,12 +253,12 @@ def integrate_size(coefficients: Floats, half_s: Floats, tolerance: float, direc
         apart = np.abs(parts - whole)
         turn = 0.5 * length[:, None] * np.einsum("k,nhki->ni", _WEIGHTS, units) - turned
         bent = np.linalg.norm(turn, axis=1)
-        share = np.maximum(2.0 * length / total_s, _LEAST_SHARE)
+        share = np.maximum(2.0 * length / total_s, _MIN_SHARE)
         # The rules miss a turn between the last node and the end: its effect is bounded and added to the error.
         unseen = 0.5 * length[:, None] * _turned_at_ends(halves, sizes, units)
         apart, bent = apart + unseen[:, 0], bent + unseen[:, 1]
         done = (apart <= tolerance * scale * share) & (bent <= direction * total_s * share)
-        if level == _MOST_HALVINGS:
+        if level == _MAX_HALVINGS:
             done[:] = True
         value += float(parts[done].sum())
         error += float(apart[done].sum())

@@ -12,18 +12,18 @@ from rendezvous._halton import halton
 from rendezvous.pareto.front import simplex_weights
 from rendezvous.pareto.solution import EncounterSolution
 
-_MOST_STEPS = 200
-_TRIED, _FOLLOWED, _MOST_ROUNDS = 500, 4, 20
+_MAX_STEPS = 200
+_TRIED, _FOLLOWED, _MAX_ROUNDS = 500, 4, 20
 _NEAREST = 1e-6
 _RELATIVE = 1e-13
-_MOST_CORRALS = 1000
+_MAX_CORRALS = 1000
 
 
 class NotOptimalError(ValueError):
     """The computed choice does not satisfy the conditions of the best one."""
 
 
-def least_sum_of_costs(solution: EncounterSolution) -> Floats:
+def min_sum_of_costs(solution: EncounterSolution) -> Floats:
     """Return the free values, shape (f,), that minimise sum w_i J_i of a `solution`: costs like impulses.
 
     A sum of norms of affine functions, convex: damped Newton steps. If an ideal costs nothing, its norm has a corner
@@ -50,7 +50,7 @@ def least_sum_of_costs(solution: EncounterSolution) -> Floats:
         if np.linalg.norm(np.linalg.solve(roots[corner].T, slopes)) <= weights[here].sum():
             return np.array(point)
     point = solution.point
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         apart, costs = parts(point)
         shares = np.where(active, weights, 0.0) / np.maximum(costs, 1e-12 * size)
         slopes = np.einsum("nab,na->nb", roots, apart)
@@ -71,11 +71,11 @@ def least_sum_of_costs(solution: EncounterSolution) -> Floats:
     return np.asarray(point)
 
 
-def least_greatest_excess(solution: EncounterSolution) -> Floats:
-    """Return the free values, shape (f,), that minimise the greatest weighted excess of a `solution`.
+def minimax_excess(solution: EncounterSolution) -> Floats:
+    """Return the free values, shape (f,), that minimise the maximum weighted excess of a `solution`.
 
-    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), least t with w_i
-    e_i(p) <= t, then Newton's method on the conditions of the active craft.
+    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), minimum t with
+    w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
     """
     counts = solution.encounter.weights > 0.0
     roots, centres, _, weights = (part[counts] for part in _parts(solution))
@@ -167,11 +167,11 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     wide = 10.0 ** (-6.0 * halton(count, 3 * _TRIED - 1))
     candidates = np.concatenate([np.eye(count), np.full((1, count), 1.0 / count), simplex_weights(count, _TRIED), wide])
     nearest = np.argsort((points(candidates) ** 2).sum(axis=1), kind="stable")
-    shares, left = _least_share(distance, candidates[nearest[0]]), np.inf
+    shares, left = _min_share(distance, candidates[nearest[0]]), np.inf
     for candidate in candidates[nearest[1:_FOLLOWED]]:
-        other = _least_share(distance, candidate)
+        other = _min_share(distance, candidate)
         shares = min(shares, other, key=lambda share: distance(share)[0])
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         # The point depends on ratios of shares, so that zero is their only bound: if no change of a single share lowers
         # the distance, the conditions of the minimum hold.
         probes = _changed(shares)
@@ -180,15 +180,15 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
         left = here - float(np.sqrt(squared.min()))
         if left <= _NEAREST:
             return np.asarray(preferred + size * back @ points(shares[None])[0])
-        shares = _least_share(distance, probes[squared.argmin()])
+        shares = _min_share(distance, probes[squared.argmin()])
     raise NotOptimalError(
         "the Pareto-optimal meeting nearest to the preferred one was not found: one that is nearer by "
         f"{left:.2g} of the distance of the farthest ideal is known; prefer another one"
     )
 
 
-def _least_share(distance: Callable[[Floats], tuple[float, Floats]], initial: Floats) -> Floats:
-    """Shares of sum one, from initial ones, at which a squared distance is least."""
+def _min_share(distance: Callable[[Floats], tuple[float, Floats]], initial: Floats) -> Floats:
+    """Shares of sum one, from initial ones, at which a squared distance is minimum."""
     scale = np.maximum(initial / initial.sum(), 1e-6)
 
     def scaled(x: Floats) -> tuple[float, Floats]:
@@ -268,7 +268,7 @@ def nearest_in_hull(points: Floats, target: Floats) -> Floats:
         return np.asarray(np.eye(len(points))[0])
     corral = [int((offsets**2).sum(axis=1).argmin())]
     weights = np.ones(1)
-    for _ in range(_MOST_CORRALS):
+    for _ in range(_MAX_CORRALS):
         nearest = weights @ offsets[corral]
         ahead = int((offsets @ nearest).argmin())
         if ahead in corral or nearest @ (nearest - offsets[ahead]) <= _RELATIVE * size:
@@ -294,7 +294,7 @@ def nearest_in_hull(points: Floats, target: Floats) -> Floats:
 
 
 def _affine_nearest(offsets: Floats) -> Floats:
-    """Weights of sum one of the point of least norm in an affine hull."""
+    """Weights of sum one of the point of minimum norm in an affine hull."""
     edges = (offsets[1:] - offsets[0]).T
     rest = np.linalg.lstsq(edges, -offsets[0], rcond=None)[0]
     return np.concatenate([[1.0 - rest.sum()], rest])

@@ -122,7 +122,7 @@ class CraftCost:
 
 @dataclass(frozen=True, eq=False)
 class EncounterSolution:
-    """A solved encounter: the meeting of least group loss, and the costs of any other meeting.
+    """A solved encounter: the meeting of minimum group loss, and the costs of any other meeting.
 
     `point`, shape (f,), contains the free values that minimise the weighted sum of excesses, the norm (1.7) of the
     paper. The methods use it where their `point` is None.

@@ -15,12 +15,12 @@ from enum import Enum
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._pair import COARSE, FINE, MOST_RESIDUAL, ROUGH, Node, Pair
+from rendezvous.pursuit_evasion._pair import COARSE, FINE, MAX_RESIDUAL, ROUGH, Node, Pair
 
 _LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
 _PREDICTED_WITHIN = 3e-3
 
-MOST_WORK = 20_000.0
+MAX_WORK = 20_000.0
 """Radians of extremals propagated for a pair of sides: 15 revolutions of 28 steps each; seconds."""
 
 
@@ -48,15 +48,15 @@ class Branch:
         return self.nodes[-1]
 
 
-def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: float = MOST_WORK) -> Branch:
+def follow(pair: Pair, first: Node, radius: float, latest: float, max_work: float = MAX_WORK) -> Branch:
     """Follow a branch from its first extremal, as the duration grows, to the capture, to `latest`, or to a fold.
 
-    A `radius` of minus infinity follows the branch beyond the capture. `most_work` limits the radians of extremals
+    A `radius` of minus infinity follows the branch beyond the capture. `max_work` limits the radians of extremals
     propagated: the same limit on every machine. A capture that ends the branch is computed to full precision. Some 20
     steps a revolution, of two or three iterations each.
     """
     nodes, step, work = [first], first.duration, 0.0
-    while work < most_work:
+    while work < max_work:
         node = nodes[-1]
         left = latest - node.duration
         if left <= _SHORTEST_STEP:
@@ -93,7 +93,7 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: flo
 def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: float) -> Node | None:
     """Return the capture near a guess, shape (15,), at full precision, or None.
 
-    None stands for a failure of Newton's method, or a residual above `MOST_RESIDUAL`.
+    None stands for a failure of Newton's method, or a residual above `MAX_RESIDUAL`.
     """
     rough = pair.solve(guess, duration, radius, time_free=True, tolerance=FINE, latest=latest)
     if rough is None:
@@ -102,7 +102,7 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
     fine = pair.solve(
         rough.vector, rough.duration, radius, time_free=True, tolerance=FINE, linear_tolerance=FINE, latest=latest
     )
-    return fine if fine is not None and fine.residual < MOST_RESIDUAL else None
+    return fine if fine is not None and fine.residual < MAX_RESIDUAL else None
 
 
 def first_crossing(before: Node, after: Node, radius: float) -> float | None:

@@ -19,8 +19,8 @@ from rendezvous.dormand_prince import STAGES, error_of_step, step_of
 
 STATES, COLUMNS = 12, 9
 """Position, velocity and costate; what they are differentiated by: end state (6), nu in its plane (2), end mass."""
-_SAFETY, _LEAST_FACTOR, _GREATEST_FACTOR = 0.9, 0.2, 6.0
-_MOST_STEPS = 20_000
+_SAFETY, _MIN_FACTOR, _MAX_FACTOR = 0.9, 0.2, 6.0
+_MAX_STEPS = 20_000
 _FIRST_STEP = 0.05
 _NO_VARIATIONS = np.zeros((0, COLUMNS))
 _Parameters = tuple[Floats, Floats, Floats]
@@ -227,7 +227,7 @@ def flow_kernel(y: Floats, z: Floats, craft: Floats, begin: float, end: float, t
     sign = 1.0 if end > begin else -1.0
     s, step = begin, min(_FIRST_STEP, span)
     first = 0
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         left = abs(end - s)
         last = step >= left * (1.0 - 1e-12)
         h = sign * (left if last else step)
@@ -246,8 +246,8 @@ def flow_kernel(y: Floats, z: Floats, craft: Floats, begin: float, end: float, t
                 return True
             s += h
             first = 0
-        factor = _GREATEST_FACTOR if error < 1e-10 else _SAFETY * error**-0.125
-        step = abs(h) * min(max(factor, _LEAST_FACTOR), _GREATEST_FACTOR)
+        factor = _MAX_FACTOR if error < 1e-10 else _SAFETY * error**-0.125
+        step = abs(h) * min(max(factor, _MIN_FACTOR), _MAX_FACTOR)
         if step < 1e-13 * max(span, 1e-3):
             return False
     return False

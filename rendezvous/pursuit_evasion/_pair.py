@@ -1,6 +1,6 @@
 """The extremals of one side at a time, and of both together by Newton's method: at a duration T, or at a distance l.
 
-At each duration T both sides reach the greatest distance along nu, and r_E - r_P = l nu. At l = 0 these are the
+At each duration T both sides reach the maximum distance along nu, and r_E - r_P = l nu. At l = 0 these are the
 terminal conditions of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP + lambda_rE = 0, lambda_v = 0. The last
 condition there, lambda_rP . (v_P - v_E) = 1, only determines the scale of the costates: here |nu| = 1, and the closing
 speed must be positive. All values are nondimensional.
@@ -19,13 +19,13 @@ from rendezvous.pursuit_evasion._extremal import acceleration, eliminate, end_of
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""
-MOST_RESIDUAL = 1e-9
-"""Greatest error of a result in the necessary conditions: start states, and r_E - r_P = l nu."""
+MAX_RESIDUAL = 1e-9
+"""Maximum error of a result in the necessary conditions: start states, and r_E - r_P = l nu."""
 CLOSE, ROUGH = 1e-7, 1e-4
-"""Greatest last corrections of Newton's method, for the same; the remaining error is about their square."""
-_MOST_ITERATIONS = 12
+"""Maximum last corrections of Newton's method, for the same; the remaining error is about their square."""
+_MAX_ITERATIONS = 12
 _FIRST_DURATION = 0.01
-_LEAST_OF_FIRST = 1e-9
+_MIN_OF_FIRST = 1e-9
 _FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
 
 
@@ -37,7 +37,7 @@ class Response:
     derivatives along two directions across nu and by the duration. `regular` says that there is no conjugate point: the
     map from end states near by to start states preserves orientation. `inverse`, shape (6, 6), is the inverse of the
     derivative of the start state by the end state, `costate`, shape (6,), p_r and p_v at the start, and `residual` the
-    greatest component of the error of the start state.
+    maximum component of the error of the start state.
     """
 
     rho: Floats
@@ -186,8 +186,8 @@ class Node:
         Beyond a conjugate point the reachable set of the pursuer is locally concave: the radius of curvature of its
         boundary has changed from plus to minus infinity, and must stay beyond -l.
         """
-        least, greatest = self.curvature + self.distance
-        return bool(least > 0.0) if self.regular else bool(least < 0.0 < greatest)
+        minimum, maximum = self.curvature + self.distance
+        return bool(minimum > 0.0) if self.regular else bool(minimum < 0.0 < maximum)
 
     @property
     def vector(self) -> Floats:
@@ -266,7 +266,7 @@ class Pair:
         converge.
 
         If `time_free`, the distance is known and the duration a guess, otherwise the reverse. The propagation has a
-        `tolerance`, that of derivatives `linear_tolerance` if it is larger; `close` is the greatest size of the last
+        `tolerance`, that of derivatives `linear_tolerance` if it is larger; `close` is the maximum size of the last
         correction, and `latest` the longest duration that can be propagated.
 
         Both sides are propagated with their variations, then several times without, with the same derivatives, while
@@ -275,7 +275,7 @@ class Pair:
         state = np.concatenate([guess[:12], guess[12:] / np.sqrt(guess[12:] @ guess[12:]), [duration, distance]])
         before, uses = math.inf, 0
         linear: _Linear | None = None
-        for _ in range(_MOST_ITERATIONS):
+        for _ in range(_MAX_ITERATIONS):
             fresh = linear is None
             linear = linear or self._linearised(state, max(tolerance, linear_tolerance), time_free)
             if linear is None:
@@ -335,7 +335,7 @@ class Pair:
         Its distance is greater than the capture radius: there is no earlier capture.
         """
         duration = min(_FIRST_DURATION, 0.5 * latest)
-        while duration > _LEAST_OF_FIRST:
+        while duration > _MIN_OF_FIRST:
             still = np.zeros(3)
             sight = self.evader.ballistic(duration, still)[:3] - self.pursuer.ballistic(duration, still)[:3]
             distance = float(np.linalg.norm(sight))

@@ -1,7 +1,7 @@
 """All directions of the evader at one duration: a search for one that keeps it farther away. Nondimensional.
 
-h(nu) is the distance that a side reaches along nu. The evader keeps the greatest of h_E - h_P over all nu: a branch of
-extremals that is not the greatest is not optimal for it.
+h(nu) is the distance that a side reaches along nu. The evader keeps the maximum of h_E - h_P over all nu: a branch of
+extremals that is not the maximum is not optimal for it.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair, Response, Side, across
 
 _DIRECTIONS = 120
-_SEEDS, _MOST_PARTS = 2, 4
+_SEEDS, _MAX_PARTS = 2, 4
 _SHORT, _GAIN, _LONGEST = 1e-7, 1e-6, 40.0
-_MOST_ITERATIONS = 8
+_MAX_ITERATIONS = 8
 _CONVERGED = 1e-5
 _FARTHEST = 0.5
-_CLIMBS, _MOST_CLIMBING, _APART, _LEAST_STRIDE = 4, 40, 0.9, 1e-4
+_CLIMBS, _MAX_CLIMBING, _APART, _MIN_STRIDE = 4, 40, 0.9, 1e-4
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Scan:
     """Distances h_E - h_P, shape (n,), along directions `nu`, shape (n, 3), at one duration.
 
     Of the directions `tried`, these are the ones for which both sides' extremals were found. `maxima` are local maxima
-    among them, computed exactly, the greatest first.
+    among them, computed exactly, the maximum first.
     """
 
     nu: Floats
@@ -109,7 +109,7 @@ def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -
 def _turn(side: Side, seed: End, toward: Floats, duration: float) -> End | None:
     """Turn the direction of an extremal, in steps as long as they converge."""
     parts = 1
-    while parts <= _MOST_PARTS:
+    while parts <= _MAX_PARTS:
         here = seed
         for part in range(1, parts + 1):
             nu = seed.nu + (toward - seed.nu) * (part / parts)
@@ -128,7 +128,7 @@ def end_along(side: Side, state: Floats, nu: Floats, duration: float) -> End | N
     """Return the end of the extremal of one side along nu, near a guess; None if Newton's method finds none."""
     plane = across(nu)
     before = np.inf
-    for _ in range(_MOST_ITERATIONS):
+    for _ in range(_MAX_ITERATIONS):
         response = side.respond(state, nu, plane, duration, COARSE)
         if response is None:
             return None
@@ -155,7 +155,7 @@ def _starts(nu: Floats, values: Floats) -> list[int]:
 def _climb(pair: Pair, pursuer: End, evader: End, duration: float) -> Node | None:
     """Climb h_E - h_P, whose gradient is r_E - r_P, and finish with Newton's method."""
     stride = 0.2
-    for _ in range(_MOST_CLIMBING):
+    for _ in range(_MAX_CLIMBING):
         rise = (evader.state - pursuer.state)[:3]
         value = float(evader.nu @ rise)
         peak = pair.solve(
@@ -169,7 +169,7 @@ def _climb(pair: Pair, pursuer: End, evader: End, duration: float) -> Node | Non
         if peak is not None and peak.is_saddle and peak.distance >= value:
             return peak
         slope = rise - value * evader.nu
-        while stride > _LEAST_STRIDE:
+        while stride > _MIN_STRIDE:
             nu = evader.nu + stride * slope / max(float(np.linalg.norm(slope)), 1e-3)
             nu = nu / np.linalg.norm(nu)
             p, e = _turn(pair.pursuer, pursuer, nu, duration), _turn(pair.evader, evader, nu, duration)

@@ -14,24 +14,24 @@ from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
 from rendezvous._repr import short_repr
-from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
-from rendezvous.pursuit_evasion._pair import MOST_RESIDUAL, Craft, KnownPath, Node, Pair, Side
+from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
+from rendezvous.pursuit_evasion._pair import MAX_RESIDUAL, Craft, KnownPath, Node, Pair, Side
 from rendezvous.pursuit_evasion._scan import greater, scan
 from rendezvous.pursuit_evasion.game import scaled_game
 from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, extremal_paths, steered_path
 from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.steering import Policy
 
-MOST_HAMILTONIAN_DRIFT = 1e-8
-MOST_INTEGRATOR_GAP = 1e-7
+MAX_HAMILTONIAN_DRIFT = 1e-8
+MAX_INTEGRATOR_GAP = 1e-7
 """In units of length: metres of a geostationary orbit."""
-MOST_GAIN_S = 1e-2
-MOST_EXCESS = 1e-6
+MAX_GAIN_S = 1e-2
+MAX_EXCESS = 1e-6
 
-_PANELS, _POINTS, _MOST_CHANGES = 32, 8, 3
+_PANELS, _POINTS, _MAX_CHANGES = 32, 8, 3
 _BEYOND = 1.0 + 1e-6
 _SECOND_TOLERANCE = 1e-12
-_MOST_WORK = 2.0 * MOST_WORK
+_MAX_WORK = 2.0 * MAX_WORK
 
 
 @dataclass(frozen=True)
@@ -56,44 +56,44 @@ class Certificate:
     residual : float
         Error of the start states, nondimensional.
     hamiltonian_drift : float
-        Greatest relative change of the Hamiltonian, scaled to one, along the paths.
+        Maximum relative change of the Hamiltonian, scaled to one, along the paths.
     integrator_gap_m : float
         Distance of the ends from those of a second integrator, another method in forward time.
     closing_speed_m_s : float
         Speed at which the distance falls at the capture.
-    least_curvature : float
-        Least eigenvalue of the Hessian of h_P - h_E + R across nu, nondimensional; R is the capture radius.
+    min_curvature : float
+        Minimum eigenvalue of the Hessian of h_P - h_E + R across nu, nondimensional; R is the capture radius.
     no_conjugate_point : bool
         Whether neither extremal has one.
     no_earlier_capture : bool
         Whether l was followed from the start of the game and stayed above the capture radius.
-    least_distance_m : float
-        Least distance of both paths from the planet's centre.
+    min_distance_m : float
+        Minimum distance of both paths from the planet's centre.
     pursuer_alone_s : float or None
         Earliest capture of the evader on its fixed optimal path; None if it could not be computed.
     evader_deviations : tuple of Deviation
         Deviations of the evader, with the best responses of the pursuer: each must capture until the capture time.
     directions_found, directions_tried : int
         Number of directions with a solution, and number of directions tried; zero without a scan.
-    greatest_excess_m : float or None
-        Greatest distance beyond the capture radius that some direction keeps, at the capture time.
+    max_excess_m : float or None
+        Maximum distance beyond the capture radius that some direction keeps, at the capture time.
     """
 
     residual: float
     hamiltonian_drift: float
     integrator_gap_m: float
     closing_speed_m_s: float
-    least_curvature: float
+    min_curvature: float
     no_conjugate_point: bool
     no_earlier_capture: bool
-    least_distance_m: float
+    min_distance_m: float
     above_the_planet: bool
     pursuer_alone_s: float | None
     evader_deviations: tuple[Deviation, ...]
     capture_s: float
     directions_found: int
     directions_tried: int
-    greatest_excess_m: float | None
+    max_excess_m: float | None
     unit_length_m: float
 
     __repr__ = short_repr
@@ -103,14 +103,14 @@ class Certificate:
         """Return a phrase for each check that failed."""
         gap_m = self.integrator_gap_m
         checks = (
-            (self.residual < MOST_RESIDUAL, f"the residual is {self.residual:.1e}"),
+            (self.residual < MAX_RESIDUAL, f"the residual is {self.residual:.1e}"),
             (
-                self.hamiltonian_drift < MOST_HAMILTONIAN_DRIFT,
+                self.hamiltonian_drift < MAX_HAMILTONIAN_DRIFT,
                 f"the Hamiltonian drifts by {self.hamiltonian_drift:.1e}",
             ),
-            (gap_m < MOST_INTEGRATOR_GAP * self.unit_length_m, f"a second integrator ends {gap_m:.3g} m away"),
+            (gap_m < MAX_INTEGRATOR_GAP * self.unit_length_m, f"a second integrator ends {gap_m:.3g} m away"),
             (self.closing_speed_m_s > 0.0, "the closing speed is not positive"),
-            (self.least_curvature > 0.0, "a curvature is not positive"),
+            (self.min_curvature > 0.0, "a curvature is not positive"),
             (self.no_conjugate_point, "an extremal has a conjugate point"),
             (self.no_earlier_capture, "earlier captures are not excluded"),
             (self.above_the_planet, "a path goes through the planet"),
@@ -118,15 +118,15 @@ class Certificate:
         failures = [text for holds, text in checks if not holds]
         if self.pursuer_alone_s is None:
             failures.append("the pursuer's deviation could not be followed")
-        elif self.pursuer_alone_s < self.capture_s - MOST_GAIN_S:
+        elif self.pursuer_alone_s < self.capture_s - MAX_GAIN_S:
             failures.append(f"the pursuer alone captures at {self.pursuer_alone_s:.2f} s")
         for deviation in self.evader_deviations:
             if not deviation.conclusive:
                 failures.append(f"the answer to {deviation.name} could not be followed")
-            elif deviation.capture_s is None or deviation.capture_s > self.capture_s + MOST_GAIN_S:
+            elif deviation.capture_s is None or deviation.capture_s > self.capture_s + MAX_GAIN_S:
                 failures.append(f"the evader gains by {deviation.name}")
-        if self.greatest_excess_m is not None and self.greatest_excess_m > self.excess_tolerance_m:
-            failures.append(f"another direction keeps the evader {self.greatest_excess_m:.3g} m away")
+        if self.max_excess_m is not None and self.max_excess_m > self.excess_tolerance_m:
+            failures.append(f"another direction keeps the evader {self.max_excess_m:.3g} m away")
         return tuple(failures)
 
     @property
@@ -139,8 +139,8 @@ class Certificate:
 
     @property
     def excess_tolerance_m(self) -> float:
-        """Return the tolerance of `greatest_excess_m`: the scan is less accurate than the solution of the game."""
-        return MOST_EXCESS * self.unit_length_m
+        """Return the tolerance of `max_excess_m`: the scan is less accurate than the solution of the game."""
+        return MAX_EXCESS * self.unit_length_m
 
     @property
     def claims_saddle_point(self) -> bool:
@@ -167,9 +167,9 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
     scaled = scaled_game(game, units)
     pursuer, evader, radius = scaled.pursuer, scaled.evader, scaled.radius
     paths = extremal_paths(pursuer, evader, node)
-    drift, least_distance = _along(paths, node)
+    drift, min_distance = _along(paths, node)
     latest = node.duration * _BEYOND
-    alone, conclusive, left = _followed(pursuer, KnownPath(paths[1].state_at), radius, latest, _MOST_WORK)
+    alone, conclusive, left = _followed(pursuer, KnownPath(paths[1].state_at), radius, latest, _MAX_WORK)
     if alone is None and conclusive:
         alone = node.duration
     deviations: list[Deviation] = []
@@ -191,17 +191,17 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
         hamiltonian_drift=drift,
         integrator_gap_m=_integrator_gap(pursuer, evader, node) * units.length_m,
         closing_speed_m_s=capture.closing_speed_m_s,
-        least_curvature=float(node.curvature[0] + node.distance),
+        min_curvature=float(node.curvature[0] + node.distance),
         no_conjugate_point=node.regular,
         no_earlier_capture=bool(len(earlier_m)) and bool((earlier_m > game.capture_radius_m).all()),
-        least_distance_m=least_distance * units.length_m,
-        above_the_planet=least_distance * units.length_m > game.gravity.planet_radius_m,
+        min_distance_m=min_distance * units.length_m,
+        above_the_planet=min_distance * units.length_m > game.gravity.planet_radius_m,
         pursuer_alone_s=None if alone is None else alone * units.time_s,
         evader_deviations=tuple(deviations),
         capture_s=capture.time_s,
         directions_found=0 if looked is None else len(looked.nu),
         directions_tried=0 if looked is None else looked.tried,
-        greatest_excess_m=None if excess is None or not np.isfinite(excess) else float(excess) * units.length_m,
+        max_excess_m=None if excess is None or not np.isfinite(excess) else float(excess) * units.length_m,
         unit_length_m=units.length_m,
     )
 
@@ -216,7 +216,7 @@ def _followed(
         return None, False, left
     branch = follow(pair, first, radius, latest, left)
     left -= branch.work
-    for _ in range(_MOST_CHANGES):
+    for _ in range(_MAX_CHANGES):
         better = greater(pair, branch.last) if branch.ending is Ending.FOLD else None
         if better is None:
             break
@@ -228,7 +228,7 @@ def _followed(
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:
-    """Return the drift of the Hamiltonian, scaled to be one, and the least distance from the planet's centre.
+    """Return the drift of the Hamiltonian, scaled to be one, and the minimum distance from the planet's centre.
 
     The costate of the mass is the integral of |p_v| thrust / m^2, by Gauss and Legendre's rule on panels.
     """
@@ -239,7 +239,7 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
     times = np.sort(np.concatenate([edges, inner.ravel()]))
     at_edges = np.searchsorted(times, edges)
     at_inner = np.searchsorted(times, inner.ravel())
-    drift, least = 0.0, np.inf
+    drift, minimum = 0.0, np.inf
     for path in paths:
         y, craft = path.sampled(times), path.craft
         mass = craft.mass - craft.flow * times
@@ -251,8 +251,8 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
         hamiltonian = (e[:, 6:9] * e[:, 3:6]).sum(axis=1) + (e[:, 9:] * gravity).sum(axis=1)
         hamiltonian += (craft.thrust * size / mass)[at_edges] + craft.flow * lost
         drift = max(drift, float(np.abs(hamiltonian - hamiltonian[-1]).max()) / node.closing)
-        least = min(least, float(np.linalg.norm(y[:, :3], axis=1).min()))
-    return drift, least
+        minimum = min(minimum, float(np.linalg.norm(y[:, :3], axis=1).min()))
+    return drift, minimum
 
 
 def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:

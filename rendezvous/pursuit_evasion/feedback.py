@@ -11,7 +11,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from rendezvous._arrays import Floats
 from rendezvous._repr import short_repr
-from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
+from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import FINE, Craft, Node, Pair
 from rendezvous.pursuit_evasion.game import Game, Units, scaled_game
 from rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths, steered_path
@@ -26,7 +26,7 @@ HIT_M = 100.0
 
 _LOOKS = 65
 _PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
-_MOST_PLANS, _LONGEST = 10_000, 1e3
+_MAX_PLANS, _LONGEST = 10_000, 1e3
 _QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 
@@ -160,7 +160,7 @@ def fly_many(
 
 
 def capture_quantiles_s(flights: Sequence[Flight]) -> list[float]:
-    """Return the least capture time of `flights`, the quantiles 0.1, 0.5 and 0.9, and the greatest, s.
+    """Return the minimum capture time of `flights`, the quantiles 0.1, 0.5 and 0.9, and the maximum, s.
 
     The list is empty if no flight ended in a capture.
     """
@@ -179,13 +179,13 @@ class _Pursuit:
         self._radius, self._pursuer, self._evader = scaled.radius, scaled.pursuer, scaled.evader
         self._hit = HIT_M / units.length_m
         self._dry = game.pursuer.dry_mass_kg / units.mass_kg, game.evader.dry_mass_kg / units.mass_kg
-        self._time, self._work = 0.0, MOST_WORK
+        self._time, self._work = 0.0, MAX_WORK
         self._past: list[tuple[float, PathNow]] = []
         self._log: list[tuple[float, float, Floats, Floats]] = []
 
     def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
         own = plan
-        while len(self._log) < _MOST_PLANS:
+        while len(self._log) < _MAX_PLANS:
             self._log.append((self._time, self._time + plan.duration, self._pursuer.start[:3], self._evader.start[:3]))
             if progress is not None:
                 progress(min(1.0, self._time / (self._time + plan.duration)))

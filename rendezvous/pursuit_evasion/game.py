@@ -26,7 +26,7 @@ LONGEST_REVOLUTIONS = 15.0
 class Gravity:
     """Gravity of the planet.
 
-    `planet_radius_m` is the least allowed distance from the centre; zero for no limit. `j2` is the second zonal
+    `planet_radius_m` is the minimum allowed distance from the centre; zero for no limit. `j2` is the second zonal
     harmonic, about the z axis, which refers to `equatorial_radius_m`; zero for a sphere. J2 is not in the slides:
     without it gravity is that of their first equation, -mu r / |r|^3.
 
@@ -97,7 +97,7 @@ class Player:
 
     @property
     def acceleration_m_s2(self) -> float:
-        """Return the greatest acceleration of its thrust at the start."""
+        """Return the maximum acceleration of its thrust at the start."""
         return self.thrust_n / self.mass_kg
 
 

@@ -19,7 +19,7 @@ Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
 
 _TOLERANCE = 1e-12
-_MOST_RATES = 50_000
+_MAX_RATES = 50_000
 
 
 class PathError(ArithmeticError):
@@ -98,7 +98,7 @@ def steered_path(craft: Craft, direction: Direction, duration: float) -> Steered
     def counted(time: float, state: Floats) -> Floats:
         nonlocal calls
         calls += 1
-        if calls > _MOST_RATES:
+        if calls > _MAX_RATES:
             raise PathError("the direction of thrust turns too fast to integrate the path")
         return _rates(time, state, craft, direction)
 

@@ -51,13 +51,13 @@ class PlayerEnd:
 class DistanceCurve:
     """The distance l that the evader can keep at each duration T, rising, both of shape (n,).
 
-    `least_curvature`, shape (n,), is the lesser eigenvalue of the Hessian of h_P - h_E + l across nu, in units of
+    `min_curvature`, shape (n,), is the lesser eigenvalue of the Hessian of h_P - h_E + l across nu, in units of
     length: a saddle while it is positive.
     """
 
     duration_s: Floats
     distance_m: Floats
-    least_curvature: Floats
+    min_curvature: Floats
 
     __repr__ = short_repr
 
@@ -71,7 +71,7 @@ class Capture:
     position_m : ndarray, shape (3,)
         Position of the evader at the capture time.
     direction : ndarray, shape (3,)
-        nu, the direction along which both players reach the greatest distance; with a capture radius, the direction
+        nu, the direction along which both players reach the maximum distance; with a capture radius, the direction
         from the pursuer to the evader. It is that of lambda_rP at the end, which equals -lambda_rE.
     closing_speed_m_s : float
         Speed at which the distance falls.

@@ -11,7 +11,7 @@ import numpy as np
 
 from rendezvous._arrays import Floats
 from rendezvous.linear_game import LinearGameError, circular_orbit_capture
-from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
+from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow, polish
 from rendezvous.pursuit_evasion._pair import Craft, Node
 from rendezvous.pursuit_evasion._scan import end_along, greater
 from rendezvous.pursuit_evasion.game import Game, Player, ScaledGame, Units, horizon_s, scaled_game, units_of
@@ -19,9 +19,9 @@ from rendezvous.pursuit_evasion.paths import orbital_axes, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.steering import Policy
 
-_MOST_BRANCHES = 6
-_REACH_STEP, _MOST_REACH_STEPS = 0.1, 400
-_THRUST_STEP, _LEAST_THRUST_STEP = 0.25, 1e-3
+_MAX_BRANCHES = 6
+_REACH_STEP, _MAX_REACH_STEPS = 0.1, 400
+_THRUST_STEP, _MIN_THRUST_STEP = 0.25, 1e-3
 _LONGEST = 40.0
 """Longest duration of the linear game, in radians."""
 
@@ -35,7 +35,7 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     Notes
     -----
     The game is that of Wang's slides, after Shen and Casalino (2018), who shoot forward from a guess. At each duration
-    the evader takes the branch with the greatest distance l; the capture is the first time at which l is the capture
+    the evader takes the branch with the maximum distance l; the capture is the first time at which l is the capture
     radius. Cost: 20 to 40 ms per revolution. A capture whose residual is not below 1e-9 is rejected: the verdict is
     then that the branch is not certified.
     """
@@ -48,14 +48,14 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     nodes: list[Node] = []
     branch = follow(pair, first, radius, latest)
     changes, work = 0, branch.work
-    while branch.ending in (Ending.CAPTURE, Ending.FOLD) and changes < _MOST_BRANCHES:
+    while branch.ending in (Ending.CAPTURE, Ending.FOLD) and changes < _MAX_BRANCHES:
         if not (change_branch if branch.ending is Ending.FOLD else all_directions):
             break
         better = greater(pair, branch.last)
         if better is None:
             break
         nodes += branch.nodes if branch.ending is Ending.FOLD else branch.nodes[:-1]
-        branch = follow(pair, better, radius, latest, MOST_WORK - work)
+        branch = follow(pair, better, radius, latest, MAX_WORK - work)
         changes, work = changes + 1, work + branch.work
     nodes += branch.nodes
     route = Route.SWITCHED if changes else Route.CONTINUATION
@@ -149,12 +149,12 @@ def solve_by_homotopy(game: Game) -> Capture | None:
     first = still.pair.begin(still.latest, still.radius)
     if first is None:
         return None
-    branch = follow(still.pair, first, still.radius, still.latest, 0.25 * MOST_WORK)
+    branch = follow(still.pair, first, still.radius, still.latest, 0.25 * MAX_WORK)
     if branch.ending is not Ending.CAPTURE:
         return None
     node: Node = branch.last
     done, step = 0.0, _THRUST_STEP
-    while done < 1.0 and step > _LEAST_THRUST_STEP:
+    while done < 1.0 and step > _MIN_THRUST_STEP:
         to = min(1.0, done + step)
         scaled = scaled_game(_with_thrust(game, to), units)
         raised = _polished(scaled, node.vector, node.duration, scaled.radius)
@@ -226,7 +226,7 @@ def _reached(craft: Craft, nu: Floats, duration: float) -> Floats | None:
     time = min(0.01, duration)
     state, step = craft.ballistic(time, nu), _REACH_STEP
     slope: Floats | None = None
-    for _ in range(_MOST_REACH_STEPS):
+    for _ in range(_MAX_REACH_STEPS):
         to = time if slope is None else min(duration, time + step)
         guess = state if slope is None else state + (to - time) * slope
         end = end_along(craft, guess, nu, to)

@@ -7,7 +7,7 @@ selected from this set and simulated.
 from rendezvous.reachability.closed_loop import Flight, replan
 from rendezvous.reachability.motion import MotionModel, NonlinearMotion, between_periods, discretised, motion_of
 from rendezvous.reachability.optimum import EmptyTubeError
-from rendezvous.reachability.problem import MOST_PERIODS, InadmissibleStartError, ReachabilityProblem, ThrustShape
+from rendezvous.reachability.problem import MAX_PERIODS, InadmissibleStartError, ReachabilityProblem, ThrustShape
 from rendezvous.reachability.robust import FeedbackPlan, NoRobustPlanError, feedback_plan, tightened
 from rendezvous.reachability.selection import (
     Effort,
@@ -24,10 +24,10 @@ from rendezvous.reachability.selection import (
     vertices,
 )
 from rendezvous.reachability.sets import Budget, ReachableSets, SetCounts, SetKind, TooLargeError
-from rendezvous.reachability.solve import OptimalControls, Route, Solution, least_periods, solve
+from rendezvous.reachability.solve import OptimalControls, Route, Solution, min_periods, solve
 
 __all__ = [
-    "MOST_PERIODS",
+    "MAX_PERIODS",
     "Budget",
     "Effort",
     "EmptyTubeError",
@@ -53,7 +53,7 @@ __all__ = [
     "discretised",
     "effort",
     "feedback_plan",
-    "least_periods",
+    "min_periods",
     "minimum_energy",
     "minimum_l1",
     "minimum_norms",

@@ -196,8 +196,8 @@ def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> 
     return program
 
 
-def least_relaxation(lifted: Lifted) -> tuple[float, Floats]:
-    """Return the least relaxation of all rows on states and of the equations with a feasible point, and that point.
+def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
+    """Return the minimum relaxation of all rows on states and of the equations with a feasible point, and that point.
 
     It is at least -1, where the search stops, and not positive if the set is not empty. Bounds on controls are not
     relaxed. The relaxation of equations is not negative; without equations a negative relaxation is a margin.
@@ -231,7 +231,7 @@ def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Optimum:
     return optimum if lifted.ball else _polished(optimum, matrix, vector, lifted.rows, lifted.limits)
 
 
-def least_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
+def min_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
     """Minimise the sum over the periods of the norms of the `group` controls of a period; `scale` is their units."""
     periods = len(lifted.control_free) // group
     tops = np.hstack([np.zeros((periods, lifted.size)), np.eye(periods)])
@@ -239,8 +239,8 @@ def least_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
     return _with_norms_below(program, lifted, scale, tops).solve().point[: lifted.size]
 
 
-def least_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
-    """Return the least common bound of all controls, and controls that attain it.
+def min_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
+    """Return the minimum common bound of all controls, and controls that attain it.
 
     It is a bound of each component, or for thrust in a ball of the norm of the `group` controls of a period; `scale`
     contains the units of the controls.
@@ -256,7 +256,7 @@ def least_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats
     return float(point[-1]), point[:-1]
 
 
-def least_l1(lifted: Lifted, scale: Floats) -> Floats:
+def min_l1(lifted: Lifted, scale: Floats) -> Floats:
     """Minimise the sum of the absolute values of all controls, whose units are `scale`."""
     rows, limits = _absolute(lifted, scale, np.eye(len(scale)))
     cost = np.concatenate([np.zeros(lifted.size), np.ones(len(scale))])
@@ -275,7 +275,7 @@ def deep_point(lifted: Lifted) -> tuple[Floats, float]:
         return np.zeros(0), 0.0
     cost = np.concatenate([np.zeros(lifted.size), [-1.0]])
     rows = np.column_stack([lifted.rows, np.linalg.norm(lifted.rows, axis=1)])
-    # The least bound on the radius keeps the program bounded where no row depends on v.
+    # The minimum bound on the radius keeps the program bounded where no row depends on v.
     program = ConeProgram(cost).keep(np.vstack([rows, -cost]), np.concatenate([lifted.limits, [1.0]]))
     optimum = with_thrust(program, lifted, deep=True).solve()
     return optimum.point[:-1], float(optimum.point[-1])
@@ -332,9 +332,9 @@ class Maximiser:
         soft = lifted.moments >= 0
         self._use(np.ones(len(soft), dtype=bool) if soft.sum() < _MANY_ROWS else ~soft)
 
-    def maximise(self, cost: Floats, greatest_gap: float = APART) -> Floats:
+    def maximise(self, cost: Floats, max_gap: float = APART) -> Floats:
         """Return a maximiser of a linear function, both of shape (p,), with at most this duality gap."""
-        return self._solved(cost, greatest_gap).point
+        return self._solved(cost, max_gap).point
 
     def maximise_all(self, costs: Floats) -> Floats:
         """Return a maximiser of each function, both of shape (k, p)."""
@@ -370,12 +370,12 @@ class Maximiser:
         program = ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows[used], lifted.limits[used])
         return with_thrust(program, lifted)
 
-    def _solved(self, cost: Floats, greatest_gap: float = APART) -> Optimum:
+    def _solved(self, cost: Floats, max_gap: float = APART) -> Optimum:
         lifted = self._lifted
         if not lifted.size:
             return Optimum(np.zeros(0), np.zeros(int(self._used.sum())))
         while True:
-            optimum = self._with_rows_used(cost, greatest_gap)
+            optimum = self._with_rows_used(cost, max_gap)
             used = self._used
             if used.all():
                 return optimum
@@ -387,7 +387,7 @@ class Maximiser:
                 used = used | (near & (lifted.labels == lifted.labels[row]))
             self._use(used)
 
-    def _with_rows_used(self, cost: Floats, greatest_gap: float) -> Optimum:
+    def _with_rows_used(self, cost: Floats, max_gap: float) -> Optimum:
         size = float(np.abs(cost).max())
         down = -cost / (size if size > 0.0 else 1.0)
         self._solver.update(q=down)
@@ -395,11 +395,11 @@ class Maximiser:
         if solution.status == clarabel.SolverStatus.Solved:
             point, multipliers = np.array(solution.x), np.array(solution.z)
             try:
-                self._program.need_solution(point, multipliers, down, greatest_gap)
+                self._program.need_solution(point, multipliers, down, max_gap)
             except NoSolutionError:
                 pass
             else:
                 return Optimum(point, self._program.of_rows(multipliers))
         if self._lifted.ball:
-            return self._with_cost(down).solve(greatest_gap)
+            return self._with_cost(down).solve(max_gap)
         return Optimum(self._with_cost(down).vertex(), np.zeros(int(self._used.sum())))

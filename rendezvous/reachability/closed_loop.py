@@ -20,16 +20,16 @@ Observer = Callable[[int, Floats], Floats]
 """A function of the period and the true state that returns the estimated state."""
 
 _MORE = 1.001
-_LEAST_RELAXATION = 1e-9
-_MOST_RELAXATION = 1e3
+_MIN_RELAXATION = 1e-9
+_MAX_RELAXATION = 1e3
 
 
 @dataclass(frozen=True, eq=False)
 class Flight:
     """Simulation in closed loop: true states, shape (T + 1, n), and the controls applied, shape (T, m).
 
-    `expected_misses`, shape (T,), are the least terminal norms of the plans, in the units of the states. `relaxations`,
-    shape (T,), are the fractions by which all constraints on states were relaxed for each plan; 0 without relaxation.
+    `expected_misses`, shape (T,), are the minimum terminal norms of the plans, in the units of the states.
+    `relaxations`, shape (T,), are the fractions by which constraints on states were relaxed for each plan; otherwise 0.
     """
 
     states: Floats
@@ -48,7 +48,7 @@ class Flight:
 def replan(
     problem: ReachabilityProblem, truth: Truth, observe: Observer | None = None, *, relative: bool = False
 ) -> Flight:
-    """Simulate a problem in closed loop: in every period apply the first control of the optimal plan of least energy.
+    """Simulate a problem in closed loop: in every period apply the first control of the optimal plan of minimum energy.
 
     `truth` returns the true state one period later from the period, the true state and the control; `observe` returns
     the estimated state from the period and the true state, and is None for exact estimates. If a plan cannot reach
@@ -56,7 +56,7 @@ def replan(
     their bounds if `relative`.
 
     T optima and T quadratic programs. If no control satisfies the constraints from a state, all of them are relaxed by
-    the least sufficient fraction.
+    the minimum sufficient fraction.
     """
     state = problem.initial
     steps = []
@@ -91,8 +91,8 @@ def _plan(problem: ReachabilityProblem, start: int, estimated: Floats, relative:
             normals, offsets = problem.further
             beyond = ((normals @ estimated - offsets[start]) / _sizes(problem)).max(initial=-np.inf)
             worst = max(float((np.abs(estimated) / problem.state_bounds).max()) - 1.0, float(beyond))
-            fraction = max(2.0 * fraction, min(missing, worst) * _MORE, _LEAST_RELAXATION)
+            fraction = max(2.0 * fraction, min(missing, worst) * _MORE, _MIN_RELAXATION)
         except EmptyTubeError as error:
-            fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _LEAST_RELAXATION
-        if fraction > _MOST_RELAXATION:
+            fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _MIN_RELAXATION
+        if fraction > _MAX_RELAXATION:
             raise ArithmeticError(f"no plan from period {start}: the state is far outside the constraints")

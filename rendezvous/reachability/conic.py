@@ -15,7 +15,7 @@ from rendezvous._arrays import Floats
 
 _GAP = 1e-10
 _BROKEN, APART = 1e-9, 1e-8
-"""The greatest violation of a constraint, and the greatest duality gap, of an answer; both relative."""
+"""The maximum violation of a constraint, and the maximum duality gap, of an answer; both relative."""
 _FREE_FROM = {"equations": 0, "cone": 1}
 """The first multiplier of a constraint whose sign is free; the first of a cone is at least the norm of the others."""
 STEADY: dict[str, float] = {"static_regularization_constant": 1e-7}
@@ -80,7 +80,7 @@ class ConeProgram:
         missing = len(self.cost) - rows.shape[1]
         return np.hstack([rows, np.zeros((len(rows), missing))]) if missing else rows
 
-    def solve(self, greatest_gap: float = APART) -> Optimum:
+    def solve(self, max_gap: float = APART) -> Optimum:
         """Return a solution, by an interior-point method (Clarabel).
 
         Raise `NoSolutionError` if the answer fails the check of `need_solution` under all settings tried.
@@ -88,7 +88,7 @@ class ConeProgram:
         failed = NoSolutionError("a convex program was not solved")
         for point, multipliers in self.attempts():
             try:
-                self.need_solution(point, multipliers, greatest_gap=greatest_gap)
+                self.need_solution(point, multipliers, max_gap=max_gap)
             except NoSolutionError as error:
                 failed = error
             else:
@@ -98,7 +98,7 @@ class ConeProgram:
     def vertex(self) -> Floats:
         """Return a solution of a linear program, shape (p,): a vertex of its feasible set.
 
-        The simplex method (HiGHS) finds it, in rows scaled to a greatest entry of one; its answer is checked. Where
+        The simplex method (HiGHS) finds it, in rows scaled to a maximum entry of one; its answer is checked. Where
         that fails, `solve` gives the point.
         """
         rows, limits = self._stacked("rows")
@@ -122,16 +122,16 @@ class ConeProgram:
         return scaled.solve().point
 
     def need_solution(
-        self, point: Floats, multipliers: Floats, cost: Floats | None = None, greatest_gap: float = APART
+        self, point: Floats, multipliers: Floats, cost: Floats | None = None, max_gap: float = APART
     ) -> None:
         """Check the conditions of optimality: see `broken_and_apart` for the arguments.
 
-        Raise `NoSolutionError` if a constraint is broken by more than 1e-9, or the duality gap is over `greatest_gap`.
+        Raise `NoSolutionError` if a constraint is broken by more than 1e-9, or the duality gap is over `max_gap`.
         """
         broken, apart = self.broken_and_apart(point, multipliers, cost)
-        if broken <= _BROKEN and apart > greatest_gap:
+        if broken <= _BROKEN and apart > max_gap:
             apart = self.broken_and_apart(point, self._balanced(point, multipliers, cost), cost)[1]
-        if not (broken <= _BROKEN and apart <= greatest_gap):
+        if not (broken <= _BROKEN and apart <= max_gap):
             raise NoSolutionError(
                 f"a convex program was not solved: the answer breaks a constraint by {max(broken, 0.0):.2g} and has a "
                 f"duality gap of {apart:.2g}"
@@ -205,7 +205,7 @@ class ConeProgram:
         """Return the multipliers with the smallest change that cancels the residual of the conditions of optimality.
 
         Only multipliers of free sign change. The residual counts times the size of the variables, so that one of the
-        solver's tolerance can exceed the greatest gap; the change of the multipliers costs much less.
+        solver's tolerance can exceed the maximum gap; the change of the multipliers costs much less.
         """
         rows, _ = self._all()
         parts = self._parts(multipliers)

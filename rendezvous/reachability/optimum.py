@@ -1,4 +1,4 @@
-"""The least terminal norm of a block, and the set of all controls that attain it."""
+"""The minimum terminal norm of a block, and the set of all controls that attain it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.linalg import lstsq
 
 from infoset.polytope import null_space_basis, relative_interior
 from rendezvous._arrays import Flags, Floats, Places
-from rendezvous.reachability.admissible import Lifted, deep_point, least_relaxation, lift
+from rendezvous.reachability.admissible import Lifted, deep_point, lift, min_relaxation
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import Block
 
@@ -18,7 +18,7 @@ _REACHED = 1e-9
 """Constraints that are broken by less than this, relative to their sizes, count as kept."""
 _PRESSED = 1e-7
 _APART = 1e-8
-"""Greatest relative gap between the norm and its lower bound."""
+"""Maximum relative gap between the norm and its lower bound."""
 _CLOSE = 1e-13
 """Gap at which the search stops, where rounding allows it."""
 _ZERO = 1e-11
@@ -35,7 +35,7 @@ class EmptyTubeError(ValueError):
     """No control satisfies the constraints.
 
     `time` is the first time t such that the constraints up to t cannot all be kept, and `names` lists those that
-    conflict there. `relaxation` is the least relaxation of all constraints on states, as a fraction of their bounds,
+    conflict there. `relaxation` is the minimum relaxation of all constraints on states, as a fraction of their bounds,
     with which all can be satisfied.
     """
 
@@ -51,9 +51,9 @@ class EmptyTubeError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class BlockOptimum:
-    """The least terminal norm of a `block`, which is relaxed by rounding where needed.
+    """The minimum terminal norm of a `block`, which is relaxed by rounding where needed.
 
-    `terminal`, shape (n,), is the terminal state of least norm, which is unique, scaled; exactly zero where that is
+    `terminal`, shape (n,), is the terminal state of minimum norm, which is unique, scaled; exactly zero where that is
     `reached`. `optimal` contains all optimal controls, in coordinates z of their affine hull; thrust in a ball remains
     a constraint. `centre`, shape (d,), is a point far from its boundary, in its coordinates.
     """
@@ -66,47 +66,47 @@ class BlockOptimum:
 
     @property
     def miss(self) -> float:
-        """The least norm of the block's terminal state, in the units of the problem."""
+        """The minimum norm of the block's terminal state, in the units of the problem."""
         return float(np.linalg.norm(self.terminal * self.block.scale))
 
 
 def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
-    """Return the least terminal norm of a block, and all controls that reach it.
+    """Return the minimum terminal norm of a block, and all controls that reach it.
 
     If `relative`, the norm is of states divided by their bounds; otherwise in the units of the problem.
     `EmptyTubeError` is raised if no control satisfies the constraints.
 
-    A cone program gives the terminal state, which is unique, and multipliers (see `least_norm`). A row with a positive
+    A cone program gives the terminal state, which is unique, and multipliers (see `min_norm`). A row with a positive
     multiplier is tight for every optimal control: with the terminal equations these give a face of the set of
     admissible controls, whose affine hull is found by linear programs through the solution.
     """
     block = admissible(block)
     lifted = lift(block)
-    least = least_norm(lifted, np.ones(block.size) if relative else block.scale / block.scale.max())
+    minimum = min_norm(lifted, np.ones(block.size) if relative else block.scale / block.scale.max())
     # The solution itself must not be outside by rounding.
-    lifted = replace(lifted, limits=np.maximum(lifted.limits, lifted.rows @ least.point))
-    gaps = lifted.limits - lifted.rows @ least.point
-    most = max(float(least.multipliers.max(initial=0.0)), float(np.abs(least.pressures).max(initial=0.0)))
-    held = (least.multipliers > gaps) & (least.multipliers > _REACHED * most)
+    lifted = replace(lifted, limits=np.maximum(lifted.limits, lifted.rows @ minimum.point))
+    gaps = lifted.limits - lifted.rows @ minimum.point
+    most = max(float(minimum.multipliers.max(initial=0.0)), float(np.abs(minimum.pressures).max(initial=0.0)))
+    held = (minimum.multipliers > gaps) & (minimum.multipliers > _REACHED * most)
     fixed = np.zeros(len(lifted.control_free), dtype=bool)
     if lifted.ball:  # on the sphere the thrust of a period is unique
-        pressed = np.linalg.norm(least.pressures.reshape(-1, lifted.ball), axis=1)
+        pressed = np.linalg.norm(minimum.pressures.reshape(-1, lifted.ball), axis=1)
         fixed = np.repeat(pressed > max(_PRESSED * most, 1e-300), lifted.ball)
     across = np.vstack([lifted.rows[held], lifted.control_response[fixed]])
-    terminal = np.zeros(block.size) if least.reached else lifted.free[-1] + lifted.response[-1] @ least.point
-    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(across, across @ least.point)
+    terminal = np.zeros(block.size) if minimum.reached else lifted.free[-1] + lifted.response[-1] @ minimum.point
+    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(across, across @ minimum.point)
     if lifted.ball:
-        optimal = face.within(least.point, null_space_basis(face.equal))
+        optimal = face.within(minimum.point, null_space_basis(face.equal))
         optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
-        return BlockOptimum(block, terminal, least.reached, optimal, deep_point(optimal)[0])
-    hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True, member=least.point)
+        return BlockOptimum(block, terminal, minimum.reached, optimal, deep_point(optimal)[0])
+    hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True, member=minimum.point)
     optimal = face.within(hull.point, hull.basis).only(hull.kept)
-    return BlockOptimum(block, terminal, least.reached, optimal, hull.centre)
+    return BlockOptimum(block, terminal, minimum.reached, optimal, hull.centre)
 
 
 def block_reaches_zero(block: Block) -> bool:
     """Return whether admissible controls lead a block to zero."""
-    relaxation = least_relaxation(lift(block))[0]
+    relaxation = min_relaxation(lift(block))[0]
     return relaxation <= _REACHED and reaches_zero(lift(_relaxed(block, relaxation)))
 
 
@@ -118,15 +118,15 @@ def admissible(block: Block) -> Block:
     bisection, with a linear program per step.
     """
     lifted = lift(block)
-    relaxation = least_relaxation(lifted)[0]
+    relaxation = min_relaxation(lifted)[0]
     if relaxation <= _REACHED:
         return _relaxed(block, relaxation)
 
     def conflicts(time: int) -> bool:
-        return least_relaxation(lifted.until(time))[0] > _REACHED
+        return min_relaxation(lifted.until(time))[0] > _REACHED
 
     first = 1 + bisect_left(range(1, block.periods), True, key=conflicts)
-    _, point = least_relaxation(lifted.until(first))
+    _, point = min_relaxation(lifted.until(first))
     gaps = lifted.limits - lifted.rows @ point
     tight = (gaps < _REACHED) & (lifted.moments >= 0) & (lifted.moments <= first)
     names = dict.fromkeys(
@@ -142,8 +142,8 @@ def _relaxed(block: Block, relaxation: float) -> Block:
 
 
 @dataclass(frozen=True, eq=False)
-class LeastNorm:
-    """The controls of least terminal norm.
+class MinimumNorm:
+    """The controls of minimum terminal norm.
 
     `point`, shape (p,), contains the controls, divided by their bounds; `reached` says that the norm is zero to
     rounding. `multipliers`, shape (r,), are those of the rows, a box included: the derivative of the norm by a limit,
@@ -157,7 +157,7 @@ class LeastNorm:
     pressures: Floats
 
 
-def least_norm(lifted: Lifted, weights: Floats) -> LeastNorm:
+def min_norm(lifted: Lifted, weights: Floats) -> MinimumNorm:
     """Minimise |weights x(T)| over all controls of a block, a set without equations; weights, shape (n,), are positive.
 
     Raise `NoSolutionError` if the norm found is not within 1e-8 of its lower bound, or its controls violate a
@@ -189,7 +189,7 @@ def reaches_zero(lifted: Lifted) -> bool:
 
 
 class _Search:
-    """Search for a point of least norm, with the best point and the best lower bound so far."""
+    """Search for a point of minimum norm, with the best point and the best lower bound so far."""
 
     def __init__(self, lifted: Lifted, weights: Floats) -> None:
         self._lifted = lifted
@@ -248,23 +248,23 @@ class _Search:
                     break
             scale = min(scale, self.value)
 
-    def result(self) -> LeastNorm:
+    def result(self) -> MinimumNorm:
         """Return the solution; raise NoSolutionError if it is not accurate enough."""
         if not self._good:
             raise NoSolutionError(
-                f"the least terminal norm was not found: it lies between {self._bound:.6g} and {self.value:.6g} of the "
-                "largest bound on a state"
+                f"the minimum terminal norm was not found: it lies between {self._bound:.6g} and {self.value:.6g} of "
+                "the largest bound on a state"
             )
         residual = self._residual(self._direction, self._multipliers)
         if self.at_zero and self._bound < -_ZERO * self._reach:
             # Zero is inside the set reached: no constraint is active.
-            return LeastNorm(self._point, True, np.zeros(len(self._multipliers)), np.zeros(self._size))
+            return MinimumNorm(self._point, True, np.zeros(len(self._multipliers)), np.zeros(self._size))
         multipliers = self._multipliers.copy()
         if not self._lifted.ball and self._size:
             # The rows of a box, which hold a control at its bound.
             hard = np.flatnonzero(~self._soft)
             multipliers[hard] = np.maximum(-self._lifted.rows[hard] @ residual, 0.0)
-        return LeastNorm(self._point, self.at_zero, multipliers, residual)
+        return MinimumNorm(self._point, self.at_zero, multipliers, residual)
 
     def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, Places]:
         """The cone program in v = start + scale z, without the constraints that z cannot reach."""

@@ -13,8 +13,8 @@ from scipy.sparse.csgraph import connected_components
 
 from rendezvous._arrays import Floats, Places
 
-MOST_PERIODS = 256
-_MOST_GROWTH = 1e10
+MAX_PERIODS = 256
+_MAX_GROWTH = 1e10
 """Growth of a deviation, relative to the bounds, from which rounding exceeds about 1e-9 of the bounds."""
 
 
@@ -88,8 +88,8 @@ class ReachabilityProblem:
         if self.transition.ndim != 3 or not len(self.transition):
             raise ValueError("A(t) must have the shape (T, n, n), with at least one period")
         periods, n = self.transition.shape[:2]
-        if periods > MOST_PERIODS:
-            raise ValueError(f"there must be at most {MOST_PERIODS} periods, found {periods}")
+        if periods > MAX_PERIODS:
+            raise ValueError(f"there must be at most {MAX_PERIODS} periods, found {periods}")
         if self.control.ndim != 3 or not self.control.shape[2]:
             raise ValueError("B(t) must have the shape (T, n, m), with at least one control")
         m = self.control.shape[2]
@@ -139,9 +139,9 @@ class ReachabilityProblem:
             for matrix in self.transition:
                 moved = matrix @ moved
             growth = float(np.abs(moved / self.state_bounds[:, None]).max())
-        if not growth <= _MOST_GROWTH:
+        if not growth <= _MAX_GROWTH:
             raise ValueError(
-                f"the linear model multiplies deviations by over {_MOST_GROWTH:g}, so rounding decides the result; "
+                f"the linear model multiplies deviations by over {_MAX_GROWTH:g}, so rounding decides the result; "
                 "use fewer or shorter periods, or a time-varying model in place of a frozen one"
             )
 
@@ -226,7 +226,7 @@ class ReachabilityProblem:
         return np.stack(states, axis=-2)
 
     def excess(self, controls: ArrayLike) -> Floats:
-        """Return the greatest violation of a constraint by `controls`, shape (..., T, m), relative to the bounds.
+        """Return the maximum violation of a constraint by `controls`, shape (..., T, m), relative to the bounds.
 
         It is at most 0 if all constraints are satisfied.
         """

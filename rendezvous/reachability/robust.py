@@ -15,7 +15,7 @@ from rendezvous._repr import short_repr
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
-MOST_PERIODS_WITH_FEEDBACK = 24
+MAX_PERIODS_WITH_FEEDBACK = 24
 _TIDY = 1e-7
 
 
@@ -95,14 +95,14 @@ def tightened(problem: ReachabilityProblem, disturbance: Floats) -> Reachability
 
 
 def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> FeedbackPlan:
-    """Return the plan with affine feedback from past disturbances whose worst terminal state is least.
+    """Return the plan with affine feedback from past disturbances whose worst terminal state is minimum.
 
     The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; w(t) is known from t + 1 on, by
     the state.
 
     With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
     an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
-    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds.
+    whose solution is checked. It minimises the sum of the maximum terminal states, divided by their bounds.
 
     Raises
     ------
@@ -114,9 +114,9 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:
         raise ValueError("feedback from disturbances needs thrust in a box")
-    if problem.periods > MOST_PERIODS_WITH_FEEDBACK:
+    if problem.periods > MAX_PERIODS_WITH_FEEDBACK:
         raise ValueError(
-            f"a plan with feedback from disturbances can have at most {MOST_PERIODS_WITH_FEEDBACK} periods, found "
+            f"a plan with feedback from disturbances can have at most {MAX_PERIODS_WITH_FEEDBACK} periods, found "
             f"{problem.periods}"
         )
     return _Program(problem, disturbance).solve()
@@ -174,17 +174,17 @@ class _Program:
                     row = normals[k] / size
                     self._keep(row, t, offsets[t, k] / size, self._spread(row, t))
         self._bound_controls()
-        greatest = [self._new() for _ in range(n)]
+        maximum = [self._new() for _ in range(n)]
         for i in range(n):
             row = np.eye(n)[i] / scale[i]
             for sign in (1.0, -1.0):
                 entries, constant = self._nominal(sign * row, self.periods)
                 entries |= margins[self.periods, i]
-                entries[greatest[i]] = -1.0
+                entries[maximum[i]] = -1.0
                 self._add(entries, -constant)
         cost = np.zeros(self.size)
         cost[self.begin :] = _TIDY  # of equally good plans, the one with small gains
-        cost[greatest] = 1.0
+        cost[maximum] = 1.0
         entries_at = [(r, c, v) for r, entries in enumerate(self.rows) for c, v in entries.items()]
         r, c, v = zip(*entries_at, strict=True)
         matrix = coo_array((v, (r, c)), shape=(len(self.rows), self.size)).tocsr()
@@ -244,7 +244,7 @@ class _Program:
         return index
 
     def _spread(self, row: Floats, time: int) -> dict[int, float]:
-        """Return variables whose sum is the greatest effect of disturbances on row . x(time)."""
+        """Return variables whose sum is the maximum effect of disturbances on row . x(time)."""
         margins: dict[int, float] = {}
         turned = np.einsum("n,nsm->sm", row, self.response[time])
         for s in range(time):

@@ -8,12 +8,12 @@ import numpy as np
 
 from infoset.polytope import EmptyPolytopeError, Polytope, UncertainHullError, relative_interior
 from rendezvous._arrays import Floats
-from rendezvous.reachability.admissible import Lifted, least_l1, least_peak, least_sum_of_norms, quadratic
+from rendezvous.reachability.admissible import Lifted, min_l1, min_peak, min_sum_of_norms, quadratic
 from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.solve import OptimalControls
 
-MOST_VERTICES = 2000
-_MOST_DIMENSIONS = 8
+MAX_VERTICES = 2000
+_MAX_DIMENSIONS = 8
 _NEWTON_STEPS = 200
 _STILL = 1e-9
 _STEPS_A_DIMENSION = 20
@@ -30,7 +30,7 @@ class Effort:
     """Costs of a control, dimensionless.
 
     `energy` is the sum of squares of all components, `l1` that of their absolute values, `norms` that of the Euclidean
-    norms over the periods, and `peak` the greatest absolute value.
+    norms over the periods, and `peak` the maximum absolute value.
     """
 
     energy: float
@@ -50,35 +50,35 @@ def effort(controls: Floats) -> Effort:
 
 
 def minimum_energy(optimal: OptimalControls) -> Floats:
-    """Return the `optimal` control of least sum of squares, shape (T, m), which is unique, by a quadratic program."""
+    """Return the `optimal` control of minimum sum of squares, shape (T, m), which is unique, by a quadratic program."""
     return optimal.at(_nearest(optimal.space, optimal.scale))
 
 
 def minimum_l1(optimal: OptimalControls) -> Floats:
-    """Return an `optimal` control of least sum of absolute values, shape (T, m), by a linear program."""
-    return optimal.at(least_l1(optimal.space, optimal.scale) if optimal.dimension else np.zeros(0))
+    """Return an `optimal` control of minimum sum of absolute values, shape (T, m), by a linear program."""
+    return optimal.at(min_l1(optimal.space, optimal.scale) if optimal.dimension else np.zeros(0))
 
 
 def minimum_norms(optimal: OptimalControls) -> Floats:
-    """Return an `optimal` control of least sum, over the periods, of Euclidean norms, shape (T, m), by a cone program.
+    """Return an `optimal` control of minimum sum, over periods, of Euclidean norms, shape (T, m), by a cone program.
 
     The sum is the propellant of a single thruster.
     """
     if not optimal.dimension:
         return optimal.at(np.zeros(0))
-    return optimal.at(least_sum_of_norms(optimal.space, optimal.scale, optimal.problem.controls))
+    return optimal.at(min_sum_of_norms(optimal.space, optimal.scale, optimal.problem.controls))
 
 
 def minimum_peak(optimal: OptimalControls) -> Floats:
-    """Return, of the `optimal` controls of least greatest component, the one of least energy, shape (T, m).
+    """Return, of the `optimal` controls of minimax component, the one of minimum energy, shape (T, m).
 
-    For thrust in a ball it is a control of least greatest norm. A linear program gives the bound, and a quadratic one
+    For thrust in a ball it is a control of minimax norm. A linear program gives the bound, and a quadratic one
     the control on the face of the set that keeps the bound.
     """
     space, scale = optimal.space, optimal.scale
     if not space.size:
         return optimal.at(np.zeros(0))
-    bound, point = least_peak(space, scale, optimal.problem.controls)
+    bound, point = min_peak(space, scale, optimal.problem.controls)
     if space.ball:
         return optimal.at(point)
     moving = np.linalg.norm(space.control_response, axis=1) > _STILL
@@ -105,7 +105,7 @@ def chebyshev_centre(optimal: OptimalControls) -> Floats:
 
 
 def analytic_centre(optimal: OptimalControls) -> Floats:
-    """Return the `optimal` control of greatest product of slacks, shape (T, m)."""
+    """Return the `optimal` control of maximum product of slacks, shape (T, m)."""
     return optimal.at(analytic_point(optimal.space, optimal.centre)[0])
 
 
@@ -161,7 +161,7 @@ def _barrier(space: Lifted, point: Floats) -> tuple[float, Floats, Floats]:
     return value, gradient, hessian
 
 
-def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
+def vertices(optimal: OptimalControls, most: int = MAX_VERTICES) -> Floats:
     """Return all vertices of the set of `optimal` controls, shape (v, T, m).
 
     Raises
@@ -175,10 +175,10 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
     for part in optimal.blocks:
         if part.optimal.ball:
             raise TooManyVerticesError("with thrust in a ball the optimal controls have no vertices")
-        if part.optimal.size > _MOST_DIMENSIONS:
+        if part.optimal.size > _MAX_DIMENSIONS:
             raise TooManyVerticesError(
                 f"the optimal controls of a block span {part.optimal.size} dimensions, more than the limit of "
-                f"{_MOST_DIMENSIONS} for vertices"
+                f"{_MAX_DIMENSIONS} for vertices"
             )
         if not part.optimal.size:
             corners.append(np.zeros((1, 0)))
@@ -225,8 +225,8 @@ def samples(optimal: OptimalControls, count: int, generator: np.random.Generator
     for _ in range(_STEPS_A_DIMENSION * space.size):
         directions = generator.standard_normal(points.shape) @ rounding.T
         directions /= np.linalg.norm(directions, axis=1)[:, None]
-        least, most = _chord(space, points, directions)
-        along = least + (most - least) * generator.random(count)
+        minimum, most = _chord(space, points, directions)
+        along = minimum + (most - minimum) * generator.random(count)
         points = points + (_INSIDE * along)[:, None] * directions
     return optimal.at(points)
 
@@ -238,7 +238,7 @@ def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, F
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = slack / speed
     most = np.where(speed > 0.0, reach, np.inf).min(axis=1, initial=np.inf)
-    least = np.where(speed < 0.0, reach, -np.inf).max(axis=1, initial=-np.inf)
+    minimum = np.where(speed < 0.0, reach, -np.inf).max(axis=1, initial=-np.inf)
     if space.ball:
         shape = (len(points), -1, space.ball)
         thrust = (space.control_free + points @ space.control_response.T).reshape(shape)
@@ -248,8 +248,8 @@ def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, F
         root = np.sqrt(np.maximum(b * b - a * c, 0.0))
         divisor = np.where(moving, a, 1.0)
         most = np.minimum(most, np.where(moving, (root - b) / divisor, np.inf).min(axis=1))
-        least = np.maximum(least, np.where(moving, (-root - b) / divisor, -np.inf).max(axis=1))
-    return np.minimum(least, 0.0), np.maximum(most, 0.0)
+        minimum = np.maximum(minimum, np.where(moving, (-root - b) / divisor, -np.inf).max(axis=1))
+    return np.minimum(minimum, 0.0), np.maximum(most, 0.0)
 
 
 def _nearest(space: Lifted, scale: Floats, control: Floats | float = 0.0) -> Floats:

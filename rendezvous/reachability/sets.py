@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from infoset.polytope import Polytope, shadow
+from infoset.polytope import Polytope, polytope_from_support
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
 from rendezvous.reachability.conic import APART
@@ -20,7 +20,7 @@ _FEW_CONTROLS = 24
 _AT_BOUND = 1.0 - 1e-10
 _SHARP = 1e-7
 _GAP = 1e-3
-"""Greatest duality gap of the programs of a shadow, as a part of its tolerance."""
+"""Maximum duality gap of the programs of a projection, as a part of its tolerance."""
 
 
 class SetKind(Enum):
@@ -39,7 +39,7 @@ class Budget:
     """Limits of the exact route.
 
     `seconds` is the computing time, s, for all blocks; a step that is expected to exceed it is not started. `megabytes`
-    is the memory, MB, for one step, and `dimension` the greatest number of states of a block.
+    is the memory, MB, for one step, and `dimension` the maximum number of states of a block.
     """
 
     seconds: float = 5.0
@@ -75,7 +75,7 @@ class ReachableSets:
         )
 
     def bounds(self, kind: SetKind) -> Floats:
-        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
+        """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
         _need_kind(kind)
         result = np.zeros((self.problem.periods + 1, self.problem.states, 2))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
@@ -113,7 +113,7 @@ class ReachableSets:
             sum(polytope.dimension for polytope in sets),
         )
 
-    def shadow(self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9) -> Floats:
+    def projection(self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9) -> Floats:
         """Return the vertices of the projection of a set on two or three states, shape (v, len(axes)), in no order.
 
         `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error of the projection of
@@ -140,7 +140,7 @@ class ReachableSets:
             if not mine:
                 continue
             order += [int(block.states[index]) for index in mine]
-            scaled = part.shadow(kind, time, np.eye(block.size)[mine], tolerance).vertices * block.scale[mine]
+            scaled = part.projection(kind, time, np.eye(block.size)[mine], tolerance).vertices * block.scale[mine]
             points = np.hstack([np.repeat(points, len(scaled), axis=0), np.tile(scaled, (len(points), 1))])
         return points[:, [order.index(axis) for axis in wanted]]
 
@@ -231,10 +231,10 @@ class ExactSets:
         return self.polytope(kind, time).support_function(directions)
 
     def bounds(self, kind: SetKind) -> Floats:
-        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2)."""
+        """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2)."""
         return np.array([np.stack(polytope.bounding_box(), axis=-1) for polytope in self._sets[kind]])
 
-    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
+    def projection(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
         """Return the image of a set under a matrix, shape (d, n), of few rows."""
         return self.polytope(kind, time).linear_map(rows)
 
@@ -299,7 +299,7 @@ class LiftedSets:
         return np.asarray(directions @ lifted.free[time] + np.einsum("kp,kp->k", costs, points))
 
     def bounds(self, kind: SetKind) -> Floats:
-        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2)."""
+        """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2)."""
         size, periods = self._optimum.block.size, self._optimum.block.periods
         unit = np.eye(size)
         result = np.zeros((periods + 1, size, 2))
@@ -312,7 +312,7 @@ class LiftedSets:
         # If a state on the path of an optimal control is at its bound, no program is needed.
         lifted, program = self._set(kind, periods)
         best = np.full((periods + 1, size, 2), -np.inf)
-        # Multiples of the greatest powers of two first: any first part of the times is evenly spread.
+        # Multiples of the maximum powers of two first: any first part of the times is evenly spread.
         for t in sorted(range(1, periods), key=lambda t: (-(t & -t), t)):
             for i in range(size):
                 for side, sign in enumerate((-1.0, 1.0)):
@@ -325,7 +325,7 @@ class LiftedSets:
         result[periods] = self._optimum.terminal[:, None]
         return result
 
-    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
+    def projection(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
         """Return the image of a set under a matrix, shape (d, n), of few rows."""
         if time == 0:
             return Polytope.from_vertices((rows @ self._optimum.block.initial)[None, :])
@@ -338,7 +338,7 @@ class LiftedSets:
                 return np.asarray(free + response @ program.maximise(cost, max(APART, _GAP * tolerance)))
             return np.asarray(free + response @ program.maximise_sharply(cost))
 
-        return shadow(furthest, len(rows), tolerance)
+        return polytope_from_support(furthest, len(rows), tolerance)
 
     def polytope(self, kind: SetKind, time: int) -> Polytope | None:
         """Return None: the vertices are not known."""

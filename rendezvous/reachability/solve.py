@@ -1,4 +1,4 @@
-"""Solution of a problem: the least terminal norm, all controls that attain it, and the sets of states."""
+"""Solution of a problem: the minimum terminal norm, all controls that attain it, and the sets of states."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from rendezvous.reachability.sets import (
     optimal_set,
 )
 
-MOST_STATES_BY_CHOICE = 4
-"""Greatest number of states of a block for which the exact route is tried by default."""
-MOST_PERIODS_BY_CHOICE = 16
+MAX_STATES_BY_CHOICE = 4
+"""Maximum number of states of a block for which the exact route is tried by default."""
+MAX_PERIODS_BY_CHOICE = 16
 AGREEMENT = 1e-9
-"""Greatest difference between the bounds of both routes, relative to the bounds on states."""
+"""Maximum difference between the bounds of both routes, relative to the bounds on states."""
 
 
 class Route(Enum):
@@ -43,7 +43,7 @@ class Route(Enum):
 
 @dataclass(frozen=True, eq=False)
 class OptimalControls:
-    """{u: |x(T)| is least and every constraint kept}, from the optima of the blocks: a polytope for thrust in a box."""
+    """{u: |x(T)| is minimal and all constraints kept}, from the blocks: a polytope for thrust in a box."""
 
     problem: ReachabilityProblem
     blocks: tuple[BlockOptimum, ...]
@@ -51,7 +51,7 @@ class OptimalControls:
     def __repr__(self) -> str:
         return (
             f"<optimal controls for {self.problem.sizes}:\n "
-            f"a set of dimension {self.dimension}, least terminal norm {self.miss:.4g}>"
+            f"a set of dimension {self.dimension}, minimum terminal norm {self.miss:.4g}>"
         )
 
     @cached_property
@@ -81,7 +81,7 @@ class OptimalControls:
 
     @property
     def miss(self) -> float:
-        """The least terminal norm, in the units of the problem."""
+        """The minimum terminal norm, in the units of the problem."""
         return float(np.linalg.norm([part.miss for part in self.blocks]))
 
     def at(self, point: Floats) -> Floats:
@@ -92,7 +92,7 @@ class OptimalControls:
     def excess(self, controls: ArrayLike) -> Floats:
         """Return the deviation of `controls`, shape (..., T, m), from the set, relative to the bounds; shape (...).
 
-        It is the greatest violation of a constraint, or the distance of the terminal state from the optimal one; for
+        It is the maximum violation of a constraint, or the distance of the terminal state from the optimal one; for
         members of the set it is at most rounding.
         """
         thrust = np.asarray(controls, dtype=float)
@@ -104,7 +104,7 @@ class OptimalControls:
         return np.asarray(np.maximum(self.problem.excess(thrust), away))
 
     def ranges(self) -> Floats:
-        """Return the least and greatest of each control over the set, shape (T, m, 2), by 2 T m linear programs."""
+        """Return the minimum and maximum of each control over the set, shape (T, m, 2), by 2 T m linear programs."""
         periods = self.problem.periods
         result = np.zeros((periods, self.problem.controls, 2))
         for part in self.blocks:
@@ -121,7 +121,7 @@ class OptimalControls:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a problem: all controls of least terminal norm, and the forward sets and the tube.
+    """The solution of a problem: all controls of minimum terminal norm, and the forward sets and the tube.
 
     The `route` is EXACT if the vertices and facets of all blocks are known; `reason` explains its choice.
     """
@@ -135,18 +135,18 @@ class Solution:
     def __repr__(self) -> str:
         return (
             f"<solution for {self.problem.sizes}: "
-            f"least terminal norm {self.optimal.miss:.4g},\n optimal controls of dimension {self.optimal.dimension}, "
+            f"minimum terminal norm {self.optimal.miss:.4g},\n optimal controls of dimension {self.optimal.dimension}, "
             f"{self.route.value} sets ({self.reason})>"
         )
 
 
 def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) -> OptimalControls:
-    """Return all controls of least terminal norm; see `block_optimum` for `relative` and errors."""
+    """Return all controls of minimum terminal norm; see `block_optimum` for `relative` and errors."""
     return OptimalControls(problem, tuple(block_optimum(block, relative=relative) for block in problem.blocks))
 
 
 def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budget | None = None) -> Solution:
-    """Compute the least terminal norm, all controls that attain it, and the forward sets and tube.
+    """Compute the minimum terminal norm, all controls that attain it, and the forward sets and tube.
 
     No `route` selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
     and the expected cost is within the `budget`; otherwise the lifted route.
@@ -216,17 +216,17 @@ def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
     if asked:
         return None
     largest = max(block.size for block in problem.blocks)
-    if largest > MOST_STATES_BY_CHOICE:
+    if largest > MAX_STATES_BY_CHOICE:
         return f"the constraints couple {largest} states: in so many dimensions rounding errors lose facets of hulls"
-    if problem.periods > MOST_PERIODS_BY_CHOICE:
-        return f"rounding errors lose facets of hulls after more than {MOST_PERIODS_BY_CHOICE} periods"
+    if problem.periods > MAX_PERIODS_BY_CHOICE:
+        return f"rounding errors lose facets of hulls after more than {MAX_PERIODS_BY_CHOICE} periods"
     return None
 
 
-def least_periods(problem: ReachabilityProblem) -> int | None:
-    """Return the least number of periods in which zero can be reached, or None if those of the `problem` are too few.
+def min_periods(problem: ReachabilityProblem) -> int | None:
+    """Return the minimum number of periods in which zero can be reached, or None if those of the `problem` are too few.
 
-    If the zero state satisfies all constraints, it can be held, and the least number is computed by bisection;
+    If the zero state satisfies all constraints, it can be held, and the minimum number is computed by bisection;
     otherwise all numbers are tried. Each block and number needs a linear program.
     """
 

@@ -11,7 +11,7 @@ from rendezvous._arrays import Floats
 from rendezvous.relative_motion.constant import ConstantMotion
 from rendezvous.relative_motion.linear_motion import checked_rate
 
-_MOST_STEPS = 60
+_MAX_STEPS = 60
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: ArrayLike) -> Floats:
     turns = 2.0 * np.pi * np.round(mean / (2.0 * np.pi))
     sign, rest = np.where(mean < turns, -1.0, 1.0), np.abs(mean - turns)
     eccentric = np.minimum(np.minimum(rest + e, rest / (1.0 - e)), np.pi)
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         excess = eccentric - e * np.sin(eccentric) - rest
         step = excess / (1.0 - e * np.cos(eccentric))
         eccentric = np.maximum(eccentric - step, 0.0)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 
-MOST_PANELS = 200_000
+MAX_PANELS = 200_000
 
 
 @dataclass(frozen=True)
@@ -102,9 +102,9 @@ def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
 
     Raise `ValueError` if there are more than 200 000 panels.
     """
-    if not radians <= MOST_PANELS:
+    if not radians <= MAX_PANELS:
         raise ValueError(
-            f"the motion turns by {radians:.3g} rad from {start_s:g} s to {end_s:g} s; at most {MOST_PANELS} rad can "
+            f"the motion turns by {radians:.3g} rad from {start_s:g} s to {end_s:g} s; at most {MAX_PANELS} rad can "
             "be divided into panels; check the units"
         )
     return np.linspace(start_s, end_s, max(1, int(np.ceil(radians))) + 1)

@@ -17,8 +17,8 @@ OfTime = Callable[[Floats], Floats]
 NODES = 8
 AGREEMENT = 2e-13
 ROUNDING = 1e-10
-MOST_PANELS = 4096
-MOST_BREAKS = 200_000
+MAX_PANELS = 4096
+MAX_BREAKS = 200_000
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class TimeVaryingMotion(LinearMotion):
         nodes = _gauss_collocation()[0]
         settled = [np.array([start_s, end_s])]
         while len(starts):
-            if len(starts) > MOST_BREAKS:
+            if len(starts) > MAX_BREAKS:
                 raise ValueError(f"A(t) turns too often from {start_s:g} s to {end_s:g} s; check the units")
             times = starts[:, None] + (ends - starts)[:, None] * nodes
             long = (_rates(self.dynamics(times)).max(axis=1) * (ends - starts) > 1.0) & (ends > starts)
@@ -126,21 +126,21 @@ class TimeVaryingMotion(LinearMotion):
 def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Solution:
     """Double the panels until two solutions agree, or differ by rounding only; many intervals in parts."""
     panels = _first_panels(motion, starts, ends)
-    if len(starts) > 1 and panels * len(starts) > MOST_PANELS:
+    if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
         half = len(starts) // 2
         parts = [_refined(motion, starts[part], ends[part]) for part in (slice(None, half), slice(half, None))]
         return _Solution(
             *(np.concatenate(arrays) for arrays in zip(*(vars(part).values() for part in parts), strict=True))
         )
     coarse, apart = _collocated(motion, starts, ends, panels), np.inf
-    while 2 * panels <= MOST_PANELS:
+    while 2 * panels <= MAX_PANELS:
         panels *= 2
         fine = _collocated(motion, starts, ends, panels)
         before, apart = apart, _difference(coarse, fine, ends - starts)
         if apart <= AGREEMENT or (apart <= ROUNDING and apart > 0.1 * before):
             return fine
         coarse = fine
-    raise ValueError(f"A(t) changes too fast: {MOST_PANELS} panels an interval do not agree to {AGREEMENT:g}")
+    raise ValueError(f"A(t) changes too fast: {MAX_PANELS} panels an interval do not agree to {AGREEMENT:g}")
 
 
 def _at(function: OfTime, time_s: ArrayLike) -> Floats:
@@ -155,7 +155,7 @@ def _first_panels(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> in
         return 1
     matrices = motion.dynamics(np.stack([starts, 0.5 * (starts + ends), ends]))
     radians = float((_rates(matrices) * np.abs(ends - starts)).max())
-    return int(np.clip(np.ceil(radians), 1, MOST_PANELS // 4))
+    return int(np.clip(np.ceil(radians), 1, MAX_PANELS // 4))
 
 
 def _rates(matrices: Floats) -> Floats:
@@ -216,7 +216,7 @@ def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels:
 
 
 def _difference(first: _Solution, second: _Solution, durations: Floats) -> float:
-    """Greatest difference of two solutions, relative to each part, in states divided by (T, T, T, 1, 1, 1)."""
+    """Maximum difference of two solutions, relative to each part, in states divided by (T, T, T, 1, 1, 1)."""
     if not len(durations):
         return 0.0
     scale = state_scales(durations)

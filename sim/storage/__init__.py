@@ -11,11 +11,11 @@ from sim.storage.files import (
     OccupiedError,
     StorageError,
 )
-from sim.storage.manifest import MANIFEST, MOST_CELLS, Axis, Manifest, read_manifest
+from sim.storage.manifest import MANIFEST, MAX_CELLS, Axis, Manifest, read_manifest
 
 __all__ = [
     "MANIFEST",
-    "MOST_CELLS",
+    "MAX_CELLS",
     "Axis",
     "CampaignFolder",
     "CampaignWriter",

@@ -224,7 +224,7 @@ class CampaignFolder:
             if not file.is_file():
                 return "is not an ordinary file"
             rows, size = self._size(index), file.stat().st_size
-            if size > self._tables.BYTES_BESIDE_ROWS + self._tables.MOST_BYTES_A_ROW * rows:
+            if size > self._tables.BYTES_BESIDE_ROWS + self._tables.MAX_BYTES_A_ROW * rows:
                 return f"has {size} bytes, more than any shard of {rows} rows"
             content = file.read_bytes()
         except OSError as error:

@@ -136,7 +136,7 @@ def _continued(stored: Manifest, wanted: Manifest, path: Path) -> Manifest:
     if wanted.runs == stored.runs and wanted.until == stored.until:
         return stored
     if wanted.runs < stored.runs:
-        option = "--most-runs" if wanted.axes and wanted.until else "--runs"
+        option = "--max-runs" if wanted.axes and wanted.until else "--runs"
         raise ManifestError(
             f"{path}: the {stored.kind} in this folder has {stored.runs} runs, more than {option} {wanted.runs}; give "
             f"{option} {stored.runs} or more"

@@ -20,10 +20,10 @@ from sim.storage.files import ManifestError, reporting, write_whole
 FORMAT = "infoset-campaign"
 SCHEMA = 1
 MANIFEST = "manifest.json"
-LARGEST_BYTES = 10_000_000
-MOST_DIFFERENCES = 20
-MOST_CELLS = 10_000
-MOST_RUNS_A_SHARD = 1_000_000
+MAX_BYTES = 10_000_000
+MAX_DIFFERENCES = 20
+MAX_CELLS = 10_000
+MAX_RUNS_A_SHARD = 1_000_000
 
 _PROGRESS = ("runs", "until", "stopped_after", "cell_runs", "require", "extended", "made_by")
 """Keys that may differ between the sessions of a campaign."""
@@ -69,7 +69,7 @@ class Manifest:
     Parameters
     ----------
     runs : int
-        Engagements of each cell, numbered from 0; with `until` the greatest number.
+        Engagements of each cell, numbered from 0; with `until` the maximum number.
     until : str or None
         The rule that may stop the campaign early, or the requirement that stops the cells of a sweep.
     stopped_after : int or None
@@ -117,10 +117,10 @@ class Manifest:
     def __post_init__(self) -> None:
         for name, limits in (("runs", COUNT), ("chunk", COUNT), ("seed", WHOLE)):
             limits.need(name, getattr(self, name))
-        if self.chunk > MOST_RUNS_A_SHARD:
-            raise ValueError(f"chunk must be at most {MOST_RUNS_A_SHARD} engagements: got {self.chunk}")
-        if self.cells > MOST_CELLS:
-            raise ValueError(f"axes make {self.cells} cells, more than the {MOST_CELLS} that a sweep may have")
+        if self.chunk > MAX_RUNS_A_SHARD:
+            raise ValueError(f"chunk must be at most {MAX_RUNS_A_SHARD} engagements: got {self.chunk}")
+        if self.cells > MAX_CELLS:
+            raise ValueError(f"axes make {self.cells} cells, more than the {MAX_CELLS} that a sweep may have")
         if self.stopped_after is not None and not 1 <= self.stopped_after <= self.runs:
             raise ValueError(f"stopped_after must be from 1 to {self.runs}: got {self.stopped_after}")
         if self.cell_runs and (
@@ -229,7 +229,7 @@ def read_manifest(folder: Path) -> Manifest:
             "infoset sweep"
         )
     with reporting(file), file.open("rb") as stream:
-        content = stream.read(LARGEST_BYTES + 1)
+        content = stream.read(MAX_BYTES + 1)
     try:
         return _parsed(content)
     except (ValueError, RecursionError) as error:
@@ -239,8 +239,8 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def _parsed(content: bytes) -> Manifest:
-    if len(content) > LARGEST_BYTES:
-        raise ValueError(f"is over {LARGEST_BYTES // 1_000_000} MB")
+    if len(content) > MAX_BYTES:
+        raise ValueError(f"is over {MAX_BYTES // 1_000_000} MB")
     value = json.loads(content)
     if not isinstance(value, dict) or value.get("format") != FORMAT:
         raise ValueError(f"format: must be {FORMAT}")
@@ -266,8 +266,8 @@ def need_same(stored: Manifest, wanted: Manifest, folder: Path) -> None:
     ]
     if not lines:
         return
-    if len(lines) > MOST_DIFFERENCES:
-        lines = [*lines[:MOST_DIFFERENCES], f"and {len(lines) - MOST_DIFFERENCES} more"]
+    if len(lines) > MAX_DIFFERENCES:
+        lines = [*lines[:MAX_DIFFERENCES], f"and {len(lines) - MAX_DIFFERENCES} more"]
     raise ManifestError(
         f"{folder}: contains a campaign with different settings; repeat the command with those of the folder, or "
         "choose another folder:" + "".join(f"\n  {line}" for line in lines)

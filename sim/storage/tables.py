@@ -21,7 +21,7 @@ from sim.results import Results
 
 SCHEMA_VERSION = 2
 M_PER_KM = 1e3
-MOST_BYTES_A_ROW = 160
+MAX_BYTES_A_ROW = 160
 """A row takes about 110 bytes, and 150 with its text uncompressed; in a plane 30 less."""
 BYTES_BESIDE_ROWS = 100_000
 
@@ -29,7 +29,7 @@ _RESULTS = [column for column in columns_of(Results) if not column.derived]
 _NOISES = (
     Column("noise", "", "Measurement noise", NoiseKind),
     Column("tie", "", "How game noise breaks ties; null under random noise", TieRule, nullable=True),
-    Column("range_meter", "", "Whether there is a range meter", bool),
+    Column("range_sensor", "", "Whether there is a range sensor", bool),
 )
 
 
@@ -76,7 +76,7 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
         "cell": np.full(len(results), chunk.cell, dtype=np.int32),
         "noise": [noise.value for noise in noises],
         "tie": [chunk.scenario.tie.value if noise is NoiseKind.GAME else None for noise in noises],
-        "range_meter": np.full(len(results), chunk.scenario.range_sensor is not None),
+        "range_sensor": np.full(len(results), chunk.scenario.range_sensor is not None),
     }
     for column in _RESULTS:
         values = values_of(results, column)

@@ -125,18 +125,18 @@ def test_hover_on_a_section_shows_its_extent_and_its_predicted_miss(
     )
     text = opened.tip()
     range_km, label_km, zero, *rest = numbers(text)
-    least, greatest = corners.min(axis=0), corners.max(axis=0)
+    minimum, maximum = corners.min(axis=0), corners.max(axis=0)
     angle_factor = 1e6 if "µrad\n" in text else 1e3
     assert [range_km, label_km, zero] == pytest.approx(
         [section.range_m / 1e3, section.label_m / 1e3, 0.0], rel=SIX_DIGITS
     )
     assert rest[:4] == pytest.approx(
-        [least[0] * 1e6, greatest[0] * 1e6, least[1] * angle_factor, greatest[1] * angle_factor], rel=SIX_DIGITS
+        [minimum[0] * 1e6, maximum[0] * 1e6, minimum[1] * angle_factor, maximum[1] * angle_factor], rel=SIX_DIGITS
     )
     assert rest[-1] == len(corners)
     e, nu = section.closing_speed_m_s, records[1].scenario.set_model.disturbance_m_s2
     spread = 0.5 * nu * (section.range_m / e) ** 2  # equations (13) and (14), on this section
-    wanted = [each * section.range_m**2 / e for each in (least[0], greatest[0])]
+    wanted = [each * section.range_m**2 / e for each in (minimum[0], maximum[0])]
     assert rest[4:6] == pytest.approx([wanted[0] - spread, wanted[1] + spread], rel=SIX_DIGITS)
 
 
@@ -193,7 +193,7 @@ def test_two_records_side_by_side(open_page: Open, pair: str, records: list[Reco
     page = opened.page
     page.evaluate(f"player.show({MEASURED})")
     titles = page.locator("h2").all_inner_texts()
-    assert titles == ["(a) random noise, range meter", "(b) game noise, range meter"]
+    assert titles == ["(a) random noise, range sensor", "(b) game noise, range sensor"]
     left, right = (
         page.evaluate(f"columns[{k}].plane.canvas.getBoundingClientRect().left") for k in range(len(records))
     )

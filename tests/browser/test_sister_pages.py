@@ -21,7 +21,7 @@ from experiments.reachability.file import load_rendezvous
 from experiments.reachability.page import reachability_page
 from experiments.reachability.report import Report, Request, make_report
 from rendezvous.multipoint import Path as FlightPath
-from rendezvous.pareto import EncounterSolution, least_greatest_excess, least_sum_of_costs, solve_encounter
+from rendezvous.pareto import EncounterSolution, min_sum_of_costs, minimax_excess, solve_encounter
 from rendezvous.pursuit_evasion import History, Solution, history, orbital_axes, solve
 from tests.browser.conftest import Opened, numbers
 
@@ -45,9 +45,9 @@ class Solved:
     def pages(self, name: str = "a name", description: str = "a line about it") -> dict[str, str]:
         """All four pages."""
         selections = {
-            "least_group_loss": self.encounter.point,
-            "least_sum_of_costs": least_sum_of_costs(self.encounter),
-            "least_greatest_excess": least_greatest_excess(self.encounter),
+            "min_group_loss": self.encounter.point,
+            "min_sum_of_costs": min_sum_of_costs(self.encounter),
+            "minimax_excess": minimax_excess(self.encounter),
         }
         rendezvous = replace(self.report.rendezvous, name=name, description=description)
         axes = load_multipoint("service-3").axes
@@ -160,8 +160,8 @@ def test_the_meetings_live_numbers_are_the_librarys(open_page: Open, pages: dict
     inputs.nth(1).fill("-3.25")
     assert page.evaluate("point") == [12.5, -3.25]
     check()
-    page.get_by_label("Go to").select_option("least sum of costs")
-    assert page.evaluate("point") == pytest.approx(least_sum_of_costs(solution).tolist(), rel=1e-12)
+    page.get_by_label("Go to").select_option("minimum sum of costs")
+    assert page.evaluate("point") == pytest.approx(min_sum_of_costs(solution).tolist(), rel=1e-12)
     check()
 
 

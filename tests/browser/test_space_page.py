@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.interception.course import MOST_STEPS, kept_steps, possible_misses
+from experiments.interception.course import MAX_STEPS, kept_steps, possible_misses
 from experiments.interception.page import interception_page
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
@@ -69,9 +69,9 @@ def test_the_b_plane_shows_the_predicted_misses_of_the_record(open_page: Open, p
     assert len(path) == len(space[1].steps)
     limits = opened.page.evaluate(f"[{panel}.chart.x, [{panel}.chart.low, {panel}.chart.high]]")
     factor = opened.page.evaluate(f"{panel}.unit[1]")
-    for (low, high), (least, greatest) in zip(limits, ends, strict=True):
-        assert low < least * factor
-        assert high > greatest * factor
+    for (low, high), (minimum, maximum) in zip(limits, ends, strict=True):
+        assert low < minimum * factor
+        assert high > maximum * factor
     pixels = opened.page.evaluate(f"(({{ left, right, top, bottom }}) => [right - left, bottom - top])({panel}.chart)")
     scale = [(high - low) / length for (low, high), length in zip(limits, pixels, strict=True)]
     assert scale[0] == pytest.approx(scale[1])
@@ -181,8 +181,8 @@ def test_two_long_flights_have_the_same_steps() -> None:
     )
     times = [record["time_s"] for record in data["records"]]
     assert times[0] == times[1]
-    assert max(len(kept_steps(record)) for record in records) <= MOST_STEPS
-    assert len(times[0]) < 2 * MOST_STEPS
+    assert max(len(kept_steps(record)) for record in records) <= MAX_STEPS
+    assert len(times[0]) < 2 * MAX_STEPS
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +204,7 @@ def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screensh
     kept = kept_steps(record)
     fired = [index for index, step in enumerate(record.steps) if step.impulse_m_s != 0.0]
     assert len(record.steps) > 1000
-    assert len(kept) <= MOST_STEPS
+    assert len(kept) <= MAX_STEPS
     assert {0, len(record.steps) - 1, *fired} <= set(kept)
     assert 1 <= len(fired) <= 4
     assert len(html.encode()) < 4_000_000
@@ -253,12 +253,10 @@ def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Rec
     assert len(kept) > 0.8 * len(steps)
     found = opened.page.evaluate("engagements[0].corridor")
     intervals = np.array([[step.axes[axis].predicted_miss_m for axis in AXES] for step in kept])
-    assert len(found["greatest"]) == len(steps)
-    assert [number for number, value in enumerate(found["greatest"]) if value is not None] == known
-    found["greatest"], found["centred"] = (
-        [found[name][number] for number in known] for name in ("greatest", "centred")
-    )
-    np.testing.assert_allclose(found["greatest"], np.hypot(*np.abs(intervals).max(axis=2).T))
+    assert len(found["maximum"]) == len(steps)
+    assert [number for number, value in enumerate(found["maximum"]) if value is not None] == known
+    found["maximum"], found["centred"] = ([found[name][number] for number in known] for name in ("maximum", "centred"))
+    np.testing.assert_allclose(found["maximum"], np.hypot(*np.abs(intervals).max(axis=2).T))
     np.testing.assert_allclose(found["centred"], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
     np.testing.assert_allclose(found["truth"][-1], float(record.result.miss_m[0]), atol=0.05)
     for number, axis in enumerate(AXES):

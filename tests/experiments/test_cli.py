@@ -33,7 +33,7 @@ pytestmark = pytest.mark.usefixtures("unrendered")
 CURVE_KEYS = [
     "published_curve",
     "noise",
-    "range_meter",
+    "range_sensor",
     "miss_m",
     "impulse_m_s",
     "guaranteed_miss_m",
@@ -98,9 +98,9 @@ def test_mistakes_in_a_command_line_are_one_line(arguments: list[str], infoset: 
 
 
 def test_the_bare_command_prints_its_help(infoset: Command) -> None:
-    _, out, err = infoset()
-    assert "Usage: infoset" in out
-    assert err == ""
+    code, out, err = infoset()
+    assert (code, out) == (2, "")
+    assert "Usage: infoset" in err
 
 
 def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_draws() -> None:
@@ -127,7 +127,7 @@ def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
     assert found["elapsed_s"] > 0.0
     curves = found["curves"]
     assert [list(curve) for curve in curves] == [CURVE_KEYS] * 4
-    assert [(curve["published_curve"], curve["noise"], curve["range_meter"]) for curve in curves] == [
+    assert [(curve["published_curve"], curve["noise"], curve["range_sensor"]) for curve in curves] == [
         (1, "random", False),
         (2, "random", True),
         (3, "game", False),
@@ -161,13 +161,13 @@ def test_table_of_the_experiment(infoset: Command, brief_file: Path, tmp_path: P
         "p99",
         "impulse, m/s",
         "the paper's Phi (not a bound here), m",
-        "  + range meter",
+        "  + range sensor",
     ):
         assert part in out
     assert out.count("true state inside the set at every step: ") == 4
     assert "miss within the bound Phi" not in out
     assert (
-        "paper (one run from z = -8 km, no range meter): random noise: miss 4.3 m, impulse 244.7 m/s; "
+        "paper (one run from z = -8 km, no range sensor): random noise: miss 4.3 m, impulse 244.7 m/s; "
         "game noise: miss 9.5 m, impulse 521.7 m/s" in out
     )
     assert names_in(tmp_path) == []
@@ -219,13 +219,13 @@ def test_experiment_into_a_folder(infoset: Command, tmp_path: Path) -> None:
     assert len(rows) == 8
     assert [(row["published_curve"], row["run"]) for row in rows[:3]] == [("1", "0"), ("1", "1"), ("2", "0")]
     assert [float(row["miss_m"]) for row in rows[4:6]] == found["curves"][2]["miss_m"]
-    assert {row["range_meter"] for row in rows} == {"true", "false"}
+    assert {row["range_sensor"] for row in rows} == {"true", "false"}
     assert {row["start_x_m"] for row in rows[0::2]} == {rows[0]["start_x_m"]}
 
 
 def test_a_run_of_the_experiment_is_the_same_engagement(infoset: Command) -> None:
     curves = infoset.json("experiment", "--runs", 3, "--seed", 7, "--tie", "random")["curves"]
-    cases = product(("random", "game"), ("--no-range-meter", "--range-meter"))
+    cases = product(("random", "game"), ("--no-range-sensor", "--range-sensor"))
     for curve, (noise, switch) in zip(curves, cases, strict=True):
         one = infoset.json("engage", "--noise", noise, switch, "--seed", 7, "--run", 2, "--tie", "random")
         assert {key: one[key] for key in CURVE_KEYS} == {
@@ -256,7 +256,7 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
         "steps",
     ]
     assert found["scenario_hash"] == fingerprint(load_scenario("asteroid-1997"))
-    assert (found["run"], found["seed"], found["noise"], found["range_meter"]) == (0, 0, "random", True)
+    assert (found["run"], found["seed"], found["noise"], found["range_sensor"]) == (0, 0, "random", True)
     assert found["outcome"] in OUTCOMES
     steps = found["steps"]
     assert all(
@@ -379,7 +379,7 @@ def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
         ),
         (["experiment", "--sections", "4"], ["--sections", "from 5", "fewest_sections", "found 4"]),
         (["experiment", "--sections", "100001"], ["--sections", "found 100001"]),
-        (["engage", "asteroid-1997-single", "--range-meter"], ["--range-meter", "[range_sensor]", "relative_error"]),
+        (["engage", "asteroid-1997-single", "--range-sensor"], ["--range-sensor", "[range_sensor]", "relative_error"]),
         (["engage", "asteroid-1996"], ["asteroid-1996", "did you mean"]),
         (["experiment", "no/such.toml"], ["no/such.toml"]),
         (["experiment", "."], ["."]),

@@ -32,7 +32,7 @@ from rendezvous.pursuit_evasion import solve
 from sim import Outcome, Record, fly_one
 from sim.scenario import of_model
 
-MOST_BYTES = 6_000_000
+MAX_BYTES = 6_000_000
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_the_policy_names_each_script_and_the_style_and_nothing_else() -> None:
 
 def test_a_page_is_small_and_fetches_nothing(record: Record) -> None:
     text = interception_page([record, replace(record, run=1)])
-    assert len(text.encode()) < MOST_BYTES
+    assert len(text.encode()) < MAX_BYTES
     code = re.sub(r'<script type="application/json".*?</script>', "", text, flags=re.DOTALL)
     assert not re.search(r"https?:|src=|href=|@import|url\(|innerHTML|outerHTML|document\.write|eval\(", code)
 

@@ -19,7 +19,7 @@ Infoset = Callable[..., tuple[int, str, str]]
 LINE = "model: guaranteed, the default of studies; to use that of the file, add --model paper\n"
 VARY = (
     "--vary",
-    "thruster.greatest_impulse_m_s=2:8:2,thruster.least_impulse_m_s=0.1:0.2:2,angle_sensor.scale=1:2:2",
+    "thruster.max_impulse_m_s=2:8:2,thruster.min_impulse_m_s=0.1:0.2:2,angle_sensor.scale=1:2:2",
 )
 """Three keys, which have no figure."""
 

@@ -29,10 +29,10 @@ TARGETS = (
     *("scenario", "pareto-encounter", "multipoint", "pursuit-evasion", "reachable-rendezvous", "observer"),
     *("record", "campaign", "expressions"),
 )
-MOST_SECONDS_AN_INPUT = 2.0
-MOST_SECONDS_OF_THE_CLOCK = 60
+MAX_SECONDS_AN_INPUT = 2.0
+MAX_SECONDS_OF_THE_CLOCK = 60
 """Beside other work the clock tells little; it only finds what never ends."""
-MOST_MEGABYTES = 500
+MAX_MEGABYTES = 500
 CODE = ("experiments", "sim.storage", "sim.stopping_rule", "tomllib", "zipfile", "json")
 """Whose branches guide the search; the libraries in C are run, but not looked into."""
 
@@ -93,7 +93,7 @@ def _attack(target: str, folder: Path, seconds: int) -> None:
         begun = time.process_time()
         try:
             parse(content)
-            if time.process_time() - begun > MOST_SECONDS_AN_INPUT:
+            if time.process_time() - begun > MAX_SECONDS_AN_INPUT:
                 raise TimeoutError(f"took {time.process_time() - begun:.1f} s")
         except Exception as error:
             _keep(error, content, folder / "defects")
@@ -104,8 +104,8 @@ def _attack(target: str, folder: Path, seconds: int) -> None:
         return bytes(new[:most])
 
     options = [
-        *("-max_len=200000", "-len_control=0", f"-max_total_time={seconds}", f"-timeout={MOST_SECONDS_OF_THE_CLOCK}"),
-        *(f"-rss_limit_mb={base + MOST_MEGABYTES}", f"-artifact_prefix={folder}/", "-reload=0", "-print_final_stats=1"),
+        *("-max_len=200000", "-len_control=0", f"-max_total_time={seconds}", f"-timeout={MAX_SECONDS_OF_THE_CLOCK}"),
+        *(f"-rss_limit_mb={base + MAX_MEGABYTES}", f"-artifact_prefix={folder}/", "-reload=0", "-print_final_stats=1"),
     ]
     atheris.Setup([sys.argv[0], *options, str(folder / "corpus")], one, custom_mutator=custom)
     atheris.Fuzz()

@@ -19,24 +19,24 @@ Values = Mapping[str, object]
 NOTHING: Values = {}
 
 
-def sizes(least: float, greatest: float) -> st.SearchStrategy[float]:
+def sizes(minimum: float, maximum: float) -> st.SearchStrategy[float]:
     """Numbers of any order of magnitude between two."""
-    return st.floats(math.log10(least), math.log10(greatest)).map(lambda power: float(f"{10.0**power:.4g}"))
+    return st.floats(math.log10(minimum), math.log10(maximum)).map(lambda power: float(f"{10.0**power:.4g}"))
 
 
-def signed(greatest: float, span: float = 1e4) -> st.SearchStrategy[float]:
+def signed(maximum: float, span: float = 1e4) -> st.SearchStrategy[float]:
     """Numbers of either sign and some orders of magnitude, and zero."""
-    return st.just(0.0) | sizes(greatest / span, greatest) | sizes(greatest / span, greatest).map(lambda size: -size)
+    return st.just(0.0) | sizes(maximum / span, maximum) | sizes(maximum / span, maximum).map(lambda size: -size)
 
 
-def angles(least: float = 0.0, greatest: float = 360.0) -> st.SearchStrategy[float]:
+def angles(minimum: float = 0.0, maximum: float = 360.0) -> st.SearchStrategy[float]:
     """Degrees of four places."""
-    return st.floats(least, greatest).map(lambda value: round(value, 4))
+    return st.floats(minimum, maximum).map(lambda value: round(value, 4))
 
 
-def vectors(greatest: float) -> st.SearchStrategy[list[float]]:
+def vectors(maximum: float) -> st.SearchStrategy[list[float]]:
     """Arrays of three numbers."""
-    return st.lists(signed(greatest), min_size=3, max_size=3)
+    return st.lists(signed(maximum), min_size=3, max_size=3)
 
 
 def toml(top: Values, tables: Mapping[str, Values | Sequence[Values]]) -> str:
@@ -162,8 +162,8 @@ def scenarios(draw: st.DrawFn) -> str:
         },
         "thruster": {
             "budget_m_s": impulse * draw(sizes(0.1, 1e3)),
-            "least_impulse_m_s": impulse * draw(st.sampled_from([0.0, 0.1, 1.0])),
-            "greatest_impulse_m_s": impulse,
+            "min_impulse_m_s": impulse * draw(st.sampled_from([0.0, 0.1, 1.0])),
+            "max_impulse_m_s": impulse,
             "execution_error_relative": draw(st.sampled_from([0.0, 0.1])),
             "pointing_error_rad": draw(st.sampled_from([0.0, 0.01])) if is_spatial else None,
             **given,
@@ -216,7 +216,7 @@ def encounters(draw: st.DrawFn) -> str:
         "duration_s": duration_s,
         "free": free,
         "meet": "intercept" if intercept else "rendezvous",
-        "greatest_control_m_s2": draw(st.none() | sizes(1e-6, 10.0)),
+        "max_control_m_s2": draw(st.none() | sizes(1e-6, 10.0)),
     }
     return toml(top, {"craft": craft})
 
@@ -242,7 +242,7 @@ def tours(draw: st.DrawFn) -> str:
         "orbit_rate_rad_s": rate,
         "eccentricity": draw(st.sampled_from([0.0, 0.0, 0.3])),
         "true_anomaly_deg": draw(angles(-360.0, 360.0)),
-        "greatest_control_m_s2": draw(st.none() | sizes(1e-6, 10.0)),
+        "max_control_m_s2": draw(st.none() | sizes(1e-6, 10.0)),
     }
     chaser = {"position_m": draw(vectors(size)), "velocity_m_s": draw(vectors(size * rate))}
     return toml(top, {"chaser": chaser, "target": targets})

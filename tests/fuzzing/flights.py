@@ -13,7 +13,7 @@ from infoset.arrays import Floats
 from infoset.model import Interval
 from infoset.sensors import Convention
 from sim import Body, Results, Scenario, Target
-from sim.draws import Draws, corners, greatest_number_of_steps
+from sim.draws import Draws, corners, max_number_of_steps
 from sim.engagement import Engagements, Step
 from sim.scenario import of_model
 
@@ -53,7 +53,7 @@ def engagement(
 ) -> Scenario:
     """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step.
 
-    With a convention of its two angles it is in space. The centroid error of a camera is the greatest one.
+    With a convention of its two angles it is in space. The centroid error of a camera is the maximum one.
     """
     slope = math.tan(angle_rad)
     z, v = range_m * slope, 0.2 * speed_m_s * slope
@@ -102,23 +102,23 @@ def engagement(
 def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
     """Random numbers of which half are at their bounds: what a guarantee must allow."""
     generator = np.random.default_rng(seed)
-    steps = greatest_number_of_steps(scenario)
-    least, greatest = corners(scenario.dispersion)
+    steps = max_number_of_steps(scenario)
+    minimum, maximum = corners(scenario.dispersion)
 
     shape = (2, batch, steps) if scenario.is_spatial else (batch, steps)
 
     def uniform(shape: tuple[int, ...] = shape) -> Floats:
         return np.clip(generator.uniform(-2.0, 2.0, shape), -1.0, 1.0)
 
-    states = least + (greatest - least) * generator.uniform(size=(batch, len(least)))
+    states = minimum + (maximum - minimum) * generator.uniform(size=(batch, len(minimum)))
     errors, tie = {"angle": uniform(), "range": uniform((batch, steps))}, uniform()
     if scenario.set_model.angle_sensor.is_disc:
         errors["angle"] /= np.maximum(1.0, np.hypot(*errors["angle"]))
     if scenario.rate_sensor is not None:
         errors["rate"] = uniform()
     return Draws(
-        states[:, : len(least) // 2],
-        states[:, len(least) // 2 :],
+        states[:, : len(minimum) // 2],
+        states[:, len(minimum) // 2 :],
         errors=errors,
         tie=tie,
         target=uniform() if scenario.target is not None else None,
@@ -218,8 +218,8 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
         thruster=replace(
             engine,
             budget_m_s=speed * engine.budget_m_s,
-            least_impulse_m_s=speed * engine.least_impulse_m_s,
-            greatest_impulse_m_s=speed * engine.greatest_impulse_m_s,
+            min_impulse_m_s=speed * engine.min_impulse_m_s,
+            max_impulse_m_s=speed * engine.max_impulse_m_s,
         ),
         sun=None
         if sun is None

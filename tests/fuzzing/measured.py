@@ -33,7 +33,7 @@ def peak():
 read = {"record": load_record, "campaign": campaign, "scenario": load_scenario}[sys.argv[1]]
 found = []
 for path in sys.argv[2:]:
-    Path("/proc/self/clear_refs").write_text("5")  # the greatest size so far is forgotten
+    Path("/proc/self/clear_refs").write_text("5")  # the maximum size so far is forgotten
     before, begun, message = peak(), time.process_time(), ""
     try:
         read(path)

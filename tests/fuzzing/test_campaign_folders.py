@@ -20,7 +20,7 @@ from experiments.cli import main
 from experiments.common.input_file import to_toml
 from sim import Scenario, Sweep
 from sim.storage import Axis, CampaignFolder, ManifestError, StorageError, read_manifest
-from sim.storage.manifest import LARGEST_BYTES, MANIFEST, checksum
+from sim.storage.manifest import MANIFEST, MAX_BYTES, checksum
 
 from .measured import Measured, measured
 from .mutations import mutated_bytes
@@ -269,7 +269,7 @@ def test_large_files_are_not_read(folder: Path) -> None:
     (damage,) = CampaignFolder.read(folder).damaged
     assert damage.reason == f"has 1000000000 bytes, more than any shard of {ROWS} rows"
     with (folder / MANIFEST).open("a") as stream:
-        stream.write(" " * LARGEST_BYTES)
+        stream.write(" " * MAX_BYTES)
     with pytest.raises(ManifestError, match="is over 10 MB"):
         read_manifest(folder)
 

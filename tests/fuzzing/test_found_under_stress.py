@@ -101,17 +101,17 @@ def test_the_predicted_miss_covers_the_section() -> None:
     scenario = replace(scenario, rate_sensor=RateSensor(step, 1.0000000000000002e-06))
     draws = numbers(scenario, 0)
     draws = replace(draws, errors={name: 0.99 * errors for name, errors in draws.errors.items()})
-    least: list[tuple[float, float]] = []
+    minimum: list[tuple[float, float]] = []
 
     def look(step: Step) -> None:
         (section,) = step.information.sections(2)
         tau = section.range_m / section.closing_speed_m_s
         drift = 0.5 * scenario.set_model.disturbance_m_s2 * tau**2
         reach = float(section.polygon.support_function((-tau, -1.0)))
-        least.append((float(step.predicted_miss.lower_m[2]), -reach - drift))
+        minimum.append((float(step.predicted_miss.lower_m[2]), -reach - drift))
 
     flight = Engagements(scenario, draws)
     while flight.step < 25:
         flight.advance(look)
-    told, true = np.array(least).T
+    told, true = np.array(minimum).T
     np.testing.assert_allclose(told, true, rtol=0.0, atol=1e-14)

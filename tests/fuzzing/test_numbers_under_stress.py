@@ -10,7 +10,7 @@ known to a few ulp of the range at best, and a miss of 1e-14 of the range to no 
 Powers of two change exponents only, so they must give the same digits. They do not where times are scaled and the
 truth is integrated in more or fewer substeps for it: one is at most half a second, an absolute time. Strategies that
 count the last seconds (`patient`, `kalman`, `least-squares`) have a time of their own: it must be scaled too, and
-that of `patient` cannot be. `kalman` with a range meter weighs by the logarithm of a length: the last digit moves.
+that of `patient` cannot be. `kalman` with a range sensor weighs by the logarithm of a length: the last digit moves.
 
 Other factors round differently, so what rounding decides is left out there: U_s where two sections tie, and all after a
 grid of labels is made anew, for it has sections that are points. Errors that are exactly at their bounds leave sets as

@@ -8,8 +8,8 @@ other problems have no set operations: a front of points (`tests/rendezvous/pare
 Here: hull, intersection, cut and projection are idempotent; every operation is monotone and includes what it must;
 cuts, sums, hulls and intersections commute with linear maps (shear, shift, scaling, mirror); volumes scale by
 determinants, multiply in products and obey Brunn and Minkowski. Reachable sets: the tube lies in the forward sets,
-both within their bounds and shadows; more thrust reaches more; a step is the image, the sum and the cut it is said to
-be; mirrored starts and other units of the state give the mirrored and the scaled sets.
+both within their bounds and projections; more thrust reaches more; a step is the image, the sum and the cut it is said
+to be; mirrored starts and other units of the state give the mirrored and the scaled sets.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from hypothesis import strategies as st
 from infoset.arrays import Floats
 from infoset.polytope import (
     Polytope,
+    polytope_from_support,
     product,
-    shadow,
 )
 from rendezvous.reachability import EmptyTubeError, ReachabilityProblem, Route, SetKind, Solution, solve
 
@@ -85,7 +85,7 @@ def test_hulls_cuts_intersections_and_projections_are_idempotent(seed: int, spac
     np.testing.assert_allclose(box.bounding_box(), one.bounding_box(), atol=ROUNDING)
     assert lies_in(one, box)
     assert same(box, Polytope.from_box(*box.bounding_box()))
-    assert same(one, shadow(one.support_vector, space), 1e-7 * SIZE)
+    assert same(one, polytope_from_support(one.support_vector, space), 1e-7 * SIZE)
 
 
 @some
@@ -148,8 +148,8 @@ def test_volumes(seed: int, space: int, kind: str, part: float) -> None:
         abs(float(np.linalg.det(matrix))) * volume, rel=1e-9
     )
     assert one.minkowski_sum(one).volume() == pytest.approx(2.0**space * volume, rel=1e-9)
-    least = volume ** (1.0 / space) + other.volume() ** (1.0 / space)
-    assert one.minkowski_sum(other).volume() ** (1.0 / space) >= least * (1.0 - 1e-9)
+    minimum = volume ** (1.0 / space) + other.volume() ** (1.0 / space)
+    assert one.minkowski_sum(other).volume() ** (1.0 / space) >= minimum * (1.0 - 1e-9)
     assert volume <= float(np.prod(np.subtract(*one.bounding_box()[::-1])))
     line = Polytope.from_box([-1.0], [2.0])
     assert product(one, line).volume() == pytest.approx(3.0 * volume, rel=1e-9)
@@ -190,7 +190,7 @@ def probes(seed: int, states: int) -> Floats:
 
 @few
 @given(SEED)
-def test_the_tube_lies_in_the_forward_sets_and_both_in_bounds_and_shadows(seed: int) -> None:
+def test_the_tube_lies_in_the_forward_sets_and_both_in_bounds_and_projections(seed: int) -> None:
     asked = problem(seed)
     sets = solved(asked).sets
     states = asked.states
@@ -203,7 +203,7 @@ def test_the_tube_lies_in_the_forward_sets_and_both_in_bounds_and_shadows(seed: 
         assert (supports[SetKind.TUBE] <= supports[SetKind.FORWARD] + 1e-7).all()
         for kind in SetKind:
             np.testing.assert_allclose(supports[kind][:states], bounds[kind][time, :, 1], atol=1e-8)
-            outline = sets.shadow(kind, time, [0, 1])
+            outline = sets.projection(kind, time, [0, 1])
             flat = np.zeros((len(seen), states))
             flat[:, :2] = seen[:, :2]
             np.testing.assert_allclose((outline @ seen[:, :2].T).max(axis=0), sets.support(kind, time, flat), atol=1e-7)

@@ -214,4 +214,4 @@ def test_a_bomb_is_refused_in_a_second_and_200_mb(name: str, refusals: Mapping[s
 
 def test_the_header_that_json_makes_of_a_record_is_far_from_its_limit(content: bytes) -> None:
     with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-        assert len(json.loads(stored["header"].tobytes())["scenario"]) < record_file.LARGEST_HEADER_BYTES / 100
+        assert len(json.loads(stored["header"].tobytes())["scenario"]) < record_file.MAX_HEADER_BYTES / 100

@@ -159,10 +159,10 @@ def test_hulls_boxes_and_reductions_are_idempotent_and_outward(
     reduced = polygon.reduce_outward(cap)
     assert reduced.reduce_outward(cap).polygon().tolist() == reduced.polygon().tolist()
     assert lies_in(polygon, reduced)
-    least, greatest = polygon.bounding_box()
-    box = ConvexPolygons.from_box((least[0], least[1]), (greatest[0], greatest[1]))
+    minimum, maximum = polygon.bounding_box()
+    box = ConvexPolygons.from_box((minimum[0], minimum[1]), (maximum[0], maximum[1]))
     again = box.bounding_box()
-    np.testing.assert_array_equal(again, (least, greatest))
+    np.testing.assert_array_equal(again, (minimum, maximum))
     assert lies_in(polygon, box, 0.0)
     assert lies_in(polygon, polygon.add_segment(normal))
     assert lies_in(polygon.cut(normal, *band), polygon)
@@ -189,8 +189,8 @@ def test_areas_add_scale_and_obey_brunn_and_minkowski(
     total = float(first.minkowski_sum(second).area())
     assert math.sqrt(total) >= (math.sqrt(area) + math.sqrt(other)) * (1.0 - 1e-12)
     assert float(first.minkowski_sum(first).area()) == pytest.approx(4.0 * area, rel=1e-12)
-    least, greatest = first.bounding_box()
-    assert area <= float(np.prod(greatest - least)) <= 2.0 * float(np.abs(greatest - least).max()) ** 2
+    minimum, maximum = first.bounding_box()
+    assert area <= float(np.prod(maximum - minimum)) <= 2.0 * float(np.abs(maximum - minimum).max()) ** 2
     assert float(first.reduce_outward(cap).area()) >= area * (1.0 - 1e-12)
 
 

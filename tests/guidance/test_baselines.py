@@ -37,7 +37,7 @@ E = 6e3
 """Closing speed, m/s."""
 T = 1000.0
 """Time of flight, s."""
-ENGINE = Thruster(budget_m_s=1e9, least_impulse_m_s=0.0, greatest_impulse_m_s=1e9)
+ENGINE = Thruster(budget_m_s=1e9, min_impulse_m_s=0.0, max_impulse_m_s=1e9)
 KINDS = [KalmanBank, LeastSquaresFit]
 BASELINES = [name for name in strategy_names() if "kalman" in name or "least-squares" in name]
 
@@ -200,11 +200,11 @@ def test_pulses_are_no_smaller_than_the_dead_band_and_follow_the_commands() -> N
     assert 15 <= len(pulses) <= 30
     assert np.abs(np.cumsum(flight.impulses_m_s) - np.cumsum(all_commands))[:-1].max() < 0.2
     assert abs(flight.misses_m[-1]) < 1e-6
-    least = fly(ProportionalNavigation(pulsed.estimator()), Truth(0.0, 0.0), 10)
-    assert (least.impulses_m_s == 0.0).all()
+    minimum = fly(ProportionalNavigation(pulsed.estimator()), Truth(0.0, 0.0), 10)
+    assert (minimum.impulses_m_s == 0.0).all()
 
 
-def test_the_dead_band_is_the_least_impulse_by_default_and_old_commands_are_not_given() -> None:
+def test_the_dead_band_is_the_min_impulse_by_default_and_old_commands_are_not_given() -> None:
     truth = Truth(0.0, 1.0)
     strategy = ProportionalNavigation(truth.estimator())
     state, engine = strategy.start(1), Thruster(1e9, 0.05, 1e9)
@@ -259,7 +259,7 @@ def test_predictive_guidance_without_a_schedule_has_geometric_times() -> None:
     np.testing.assert_allclose(flight.misses_m[-1], -1.0, atol=1e-6)
 
 
-def test_a_manoeuvre_beyond_the_greatest_impulse_continues() -> None:
+def test_a_manoeuvre_beyond_the_max_impulse_continues() -> None:
     truth = Truth(0.0, 2.0)
     strategy = Predictive(truth.estimator(), spacing=2.0)
     state, engine, given = strategy.start(1), Thruster(1e9, 0.0, 1.5), []
@@ -414,8 +414,8 @@ def test_a_long_fit_stores_old_measurements_and_stays_the_same(monkeypatch: pyte
     model = set_model(AngleSensor.camera(10.0, 1e-5), range_error_m=1e5)
     meter = {"range": RangeSensor(10.0, 0.01)}
 
-    def fit(most_kept: int, sensors: Mapping[str, Sensor]) -> tuple[LeastSquaresFit, MissEstimate]:
-        monkeypatch.setattr(guidance.least_squares, "MOST_KEPT", most_kept)
+    def fit(max_kept: int, sensors: Mapping[str, Sensor]) -> tuple[LeastSquaresFit, MissEstimate]:
+        monkeypatch.setattr(guidance.least_squares, "MAX_KEPT", max_kept)
         made, now = measured(LeastSquaresFit, model, Truth(2000.0, -1.0), 90, seen, errors, sensors=sensors)
         return made, made.estimate(now)
 
@@ -431,8 +431,8 @@ def test_an_error_bound_that_falls_to_zero_beyond_the_possible_ranges(name: str)
     """Warnings are errors: an estimated range can be where the line of the bound is zero."""
     sensor = AngleSensor(10.0, 1e-9, 1e-4, 1.05 * E * T)
     model = set_model(sensor)
-    least_m = 1.05 * E * T / (1.0 - 1e-5)  # where the bound is zero
-    ranges_m = np.array([0.5 * E * T, E * T, least_m, 2.0 * least_m])
+    min_m = 1.05 * E * T / (1.0 - 1e-5)  # where the bound is zero
+    ranges_m = np.array([0.5 * E * T, E * T, min_m, 2.0 * min_m])
     bounds = independent_error_rad(model, ranges_m)
     np.testing.assert_array_equal(bounds[:2], sensor.error_bound(ranges_m[:2]))
     assert (bounds[2:] == 0.5 * sensor.error_bound(model.bounds.farthest_m)).all()

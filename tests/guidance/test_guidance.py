@@ -11,7 +11,7 @@ from guidance import Thruster, make_strategy, strategy_names, symmetric_impulse,
 from guidance.game_noise import keep_point
 from infoset import ExtremePoints, PredictedMiss
 
-THRUSTER = Thruster(budget_m_s=1000.0, least_impulse_m_s=0.25, greatest_impulse_m_s=7.5)
+THRUSTER = Thruster(budget_m_s=1000.0, min_impulse_m_s=0.25, max_impulse_m_s=7.5)
 
 
 def array(*values: float | list[float]) -> np.ndarray:
@@ -47,10 +47,10 @@ def test_an_impulse_is_zero_or_within_the_limits_and_the_budget(wanted: float, l
 @st.composite
 def engines(draw: st.DrawFn) -> tuple[Thruster, float]:
     """An engine and the budget that is left, often at one of its limits."""
-    least, wider = draw(st.floats(0.0, 10.0)), draw(st.floats(0.0, 20.0) | st.just(1e-3))
-    greatest = max(least + wider, 1e-3)
-    left = draw(st.floats(0.0, 50.0) | st.sampled_from([least, greatest, np.nextafter(greatest, 0.0)]))
-    return Thruster(1000.0, least, greatest), left
+    minimum, wider = draw(st.floats(0.0, 10.0)), draw(st.floats(0.0, 20.0) | st.just(1e-3))
+    maximum = max(minimum + wider, 1e-3)
+    left = draw(st.floats(0.0, 50.0) | st.sampled_from([minimum, maximum, np.nextafter(maximum, 0.0)]))
+    return Thruster(1000.0, minimum, maximum), left
 
 
 @given(engines(), st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
@@ -59,12 +59,12 @@ def test_the_modulus_of_an_impulse_in_space_is_limited_and_its_direction_kept(
 ) -> None:
     thruster, left = engine
     impulse = thruster.give(array([y], [z]), array(left))[:, 0]
-    size, wanted, limit = np.hypot(*impulse), np.hypot(y, z), min(thruster.greatest_impulse_m_s, left)
+    size, wanted, limit = np.hypot(*impulse), np.hypot(y, z), min(thruster.max_impulse_m_s, left)
     assert size <= limit
     if size == 0.0:
-        assert min(wanted, limit) == 0.0 or min(wanted, limit) < thruster.least_impulse_m_s
+        assert min(wanted, limit) == 0.0 or min(wanted, limit) < thruster.min_impulse_m_s
         return
-    assert size >= thruster.least_impulse_m_s * (1.0 - 4e-16)
+    assert size >= thruster.min_impulse_m_s * (1.0 - 4e-16)
     if wanted <= limit:
         assert impulse.tolist() == [y, z]
     else:
@@ -76,7 +76,7 @@ def test_the_modulus_of_an_impulse_in_space_is_limited_and_its_direction_kept(
 def test_an_impulse_along_one_axis_is_that_of_a_plane(engine: tuple[Thruster, float], wanted: float) -> None:
     thruster, left = engine
     planar = thruster.give(array(wanted), array(left))
-    assert abs(planar[0]) in (0.0, abs(wanted), min(thruster.greatest_impulse_m_s, left))
+    assert abs(planar[0]) in (0.0, abs(wanted), min(thruster.max_impulse_m_s, left))
     for rows in ([[wanted], [0.0]], [[0.0], [wanted]]):
         impulse = thruster.give(array(*rows), array(left))
         np.testing.assert_array_equal(impulse, np.where(array(*rows) != 0.0, planar, 0.0))
@@ -127,15 +127,15 @@ def test_the_zero_effort_miss_is_where_the_straight_line_goes() -> None:
     assert zero_effort_miss(array(omega), array(x), e)[0] == pytest.approx(z + v * x / e, rel=1e-12)
 
 
-def choose(larger: bool, low: float, high: float, point: float, least: float, greatest: float, reach: float) -> float:
-    """Measured value for a point, a set [least, greatest] and truth-allowed values [low, high]."""
+def choose(larger: bool, low: float, high: float, point: float, minimum: float, maximum: float, reach: float) -> float:
+    """Measured value for a point, a set [minimum, maximum] and truth-allowed values [low, high]."""
     return float(
         keep_point(
             np.array([larger]),
             point_at_top=array(point - reach),
             point_at_bottom=array(point + reach),
-            least_at_bottom=array(least + reach),
-            greatest_at_top=array(greatest - reach),
+            min_at_bottom=array(minimum + reach),
+            max_at_top=array(maximum - reach),
             lower=array(low),
             upper=array(high),
         )[0]
@@ -143,13 +143,13 @@ def choose(larger: bool, low: float, high: float, point: float, least: float, gr
 
 
 @pytest.mark.parametrize(
-    ("larger", "low", "high", "point", "least", "greatest", "expected"),
+    ("larger", "low", "high", "point", "minimum", "maximum", "expected"),
     [
         # The point is the set's upper end, within reach: the band's top comes to it.
         (True, -10.0, 10.0, 8.0, 0.0, 8.0, 5.0),
         # Beyond what the truth allows above: the nearest allowed value, which is the upper bound.
         (True, -10.0, 2.0, 8.0, 0.0, 8.0, 2.0),
-        # The band would reach below the whole set: it is raised until its bottom is the set's least.
+        # The band would reach below the whole set: it is raised until its bottom is the set's minimum.
         (True, -10.0, 10.0, 4.0, 0.0, 4.0, 3.0),
         # The same, but the truth does not allow as much.
         (True, -10.0, 2.0, 4.0, 0.0, 4.0, 2.0),
@@ -161,9 +161,9 @@ def choose(larger: bool, low: float, high: float, point: float, least: float, gr
     ],
 )
 def test_game_noise_keeps_the_point_and_then_as_much_as_it_can(
-    larger: bool, low: float, high: float, point: float, least: float, greatest: float, expected: float
+    larger: bool, low: float, high: float, point: float, minimum: float, maximum: float, expected: float
 ) -> None:
-    assert choose(larger, low, high, point, least, greatest, reach=3.0) == expected
+    assert choose(larger, low, high, point, minimum, maximum, reach=3.0) == expected
 
 
 @given(st.booleans(), st.floats(-5.0, 5.0), st.floats(-8.0, 8.0), st.floats(0.0, 6.0), st.floats(0.0, 6.0))

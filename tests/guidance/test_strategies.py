@@ -32,7 +32,7 @@ from sim.engagement import Engagements
 from tests.long_steps import with_long_steps
 
 E = 58e3
-THRUSTER = Thruster(budget_m_s=1000.0, least_impulse_m_s=0.25, greatest_impulse_m_s=7.5)
+THRUSTER = Thruster(budget_m_s=1000.0, min_impulse_m_s=0.25, max_impulse_m_s=7.5)
 MODEL = SetModel(
     closing_speed_m_s=E,
     step_s=0.5,

@@ -1,7 +1,7 @@
 """Sections kept as two chains, against exact rational polygons in the coordinates (V, m).
 
 What rounding may do is bounded beforehand, in units `U` of the magnitudes that a section had over its life: `R` for V,
-`G` for m and z (the greatest m plus the first time to go times `R`). An operation that writes a vertex sums a few
+`G` for m and z (the maximum m plus the first time to go times `R`). An operation that writes a vertex sums a few
 numbers, of up to `2 R` in V and `2 G` in m: it puts the vertex off by less than `8 U R` and `16 U G`. A height that is
 compared is off by less than `16 U G` as well. Moves of the origins are compensated and add nothing.
 
@@ -91,7 +91,7 @@ def may_reach(points: Floats, normal: Exact, height: Fraction | None = None) -> 
 
 
 def highest(points: Sequence[Exact], about: Floats, normal: Exact) -> Fraction:
-    """Return the greatest height; `about` are the points, rounded."""
+    """Return the maximum height; `about` are the points, rounded."""
     return max(along(normal, points[i]) for i in may_reach(about, normal))
 
 
@@ -251,18 +251,18 @@ class Life:
         self.first_tau = Fraction(tau)
         corners = [(Fraction(v), Fraction(level[2])) for level in (bottom, top) for v in level[:2]]
         self.narrow = self.wide = hull([(v, z + self.first_tau * v) for v, z in corners])
-        self.most_v = max(abs(v) for v, _ in corners)
-        self.most_m = max(abs(number) for points in (corners, self.wide) for _, number in points)
+        self.max_v = max(abs(v) for v, _ in corners)
+        self.max_m = max(abs(number) for points in (corners, self.wide) for _, number in points)
         self.operations = 1
         self.check()
 
     @property
-    def greatest(self) -> Fraction:
-        return self.most_m + self.first_tau * self.most_v
+    def maximum(self) -> Fraction:
+        return self.max_m + self.first_tau * self.max_v
 
     @property
     def box(self) -> Exact:
-        return 8 * self.operations * U * self.most_v, 16 * self.operations * U * self.greatest
+        return 8 * self.operations * U * self.max_v, 16 * self.operations * U * self.maximum
 
     @property
     def tolerance(self) -> Fraction:
@@ -287,8 +287,8 @@ class Life:
         self.grow((abs(by[0]), abs(by[1])))
 
     def grow(self, by: Exact) -> None:
-        self.most_v += by[0]
-        self.most_m += by[1]
+        self.max_v += by[0]
+        self.max_m += by[1]
         self.check()
 
     def cut(self, lower: float, upper: float, of_miss: bool = False) -> bool:
@@ -296,13 +296,13 @@ class Life:
         normal = MISS if of_miss else upward(self.section.tau)
         operation = self.section.cut_misses if of_miss else self.section.cut
         alive, overlap = operation(lower, upper)
-        rounding = 16 * U * self.greatest + self.tolerance
+        rounding = 16 * U * self.maximum + self.tolerance
         # The overlap itself is a difference, of levels that need not be near the section.
         doubt = rounding + 4 * U * (abs(Fraction(lower)) + abs(Fraction(upper)))
         for polygon, sign in ((self.narrow, -1), (self.wide, 1)):
             if polygon:
-                least, most = reaches(polygon, normal)
-                exact = min(most - Fraction(lower), Fraction(upper) - least)
+                minimum, most = reaches(polygon, normal)
+                exact = min(most - Fraction(lower), Fraction(upper) - minimum)
                 assert sign * (Fraction(overlap) - exact) <= doubt
                 assert alive or sign > 0 or exact <= doubt
                 assert not alive or sign < 0 or exact >= -doubt
@@ -337,16 +337,16 @@ class Life:
     def check_extremes(self, right: list[Exact], left: list[Exact]) -> None:
         """Heights and peaks lie between those of the narrow and the wide polygon, and are those of the vertices."""
         section, normal = self.section, upward(self.section.tau)
-        least, greatest = map(Fraction, section.heights())
+        minimum, maximum = map(Fraction, section.heights())
         lowest, highest = reaches(right + left, normal)
-        assert abs(least - lowest) <= self.tolerance
-        assert abs(greatest - highest) <= self.tolerance
+        assert abs(minimum - lowest) <= self.tolerance
+        assert abs(maximum - highest) <= self.tolerance
         peak = right[section.peak(RIGHT) - section.numbers(RIGHT)[0]][1]
         trough = left[section.peak(LEFT) - section.numbers(LEFT)[0]][1]
         assert max(m for _, m in right) - peak <= self.box[1]
         assert trough - min(m for _, m in left) <= self.box[1]
         for low, high, direction, slack in (
-            (least, greatest, normal, self.tolerance),
+            (minimum, maximum, normal, self.tolerance),
             (trough, peak, MISS, self.box[1]),
         ):
             inner, outer = reaches(self.narrow, direction), reaches(self.wide, direction)
@@ -431,37 +431,37 @@ def levels(section: Section, band: Band, ulp: float) -> tuple[float, float]:
     """The borders of a band."""
     outline = section.outline()
     heights = outline[:, 1] + (section.tau * outline[:, 0] if band.of_miss else 0.0)
-    least, greatest = float(heights.min()), float(heights.max())
-    extent, error = greatest - least, band.ulps * ulp
+    minimum, maximum = float(heights.min()), float(heights.max())
+    extent, error = maximum - minimum, band.ulps * ulp
     first, second = band.parts
     if band.kind == "parts":
-        borders = [0.5 * (least + greatest) + part * extent for part in band.parts]
+        borders = [0.5 * (minimum + maximum) + part * extent for part in band.parts]
         return min(borders), max(borders)
     if band.kind == "vertex":
         level = float(heights[int(abs(first) * (len(heights) - 1))]) + error
-        return (level, greatest + ulp) if second < 0.0 else (least - ulp, level)
+        return (level, maximum + ulp) if second < 0.0 else (minimum - ulp, level)
     if band.kind == "thin":
-        level = least + abs(first) * extent
+        level = minimum + abs(first) * extent
         return level, level + abs(error)
     if band.kind == "touching":
-        return (greatest + error, greatest + extent + 1.0) if first < 0.0 else (least - extent - 1.0, least + error)
+        return (maximum + error, maximum + extent + 1.0) if first < 0.0 else (minimum - extent - 1.0, minimum + error)
     if band.kind == "beyond":
-        return greatest + abs(first) * extent, greatest + 2.0 * extent
+        return maximum + abs(first) * extent, maximum + 2.0 * extent
     if band.kind == "around":
-        return least - 1.0, greatest + 1.0
-    return (least + 0.999 * extent, greatest + 1.0) if first < 0.0 else (least - 1.0, least + 0.001 * extent)
+        return minimum - 1.0, maximum + 1.0
+    return (minimum + 0.999 * extent, maximum + 1.0) if first < 0.0 else (minimum - 1.0, minimum + 0.001 * extent)
 
 
 def tell(life: Life, step: Step) -> bool:
     """Let one step happen; whether the section survives it."""
-    scale = float(life.most_v) / life.operations
+    scale = float(life.max_v) / life.operations
     life.turn(life.section.tau * step.falls[0])
     life.spread(scale * step.half_v)
     life.turn(life.section.tau * step.falls[1])
     life.shift(scale * step.kick)
     if step.band is None:
         return True
-    lower, upper = levels(life.section, step.band, float(U * life.greatest))
+    lower, upper = levels(life.section, step.band, float(U * life.maximum))
     return lower > upper or life.cut(lower, upper, step.band.of_miss)
 
 
@@ -540,7 +540,7 @@ def test_extremal_bands_never_lose_the_truth(corner: int, story: list[tuple[Step
     section = Section(300.0, bottom, top)
     v, z = Fraction((*bottom[:2], *top[:2])[corner]), Fraction((bottom, top)[corner // 2][2])
     truth = (v, z + 300 * v)
-    most_m = 400.0
+    max_m = 400.0
     for step, from_below, width in story:
         section.turn(section.tau * step.falls[0])
         section.spread(0.01 * step.half_v)
@@ -549,14 +549,14 @@ def test_extremal_bands_never_lose_the_truth(corner: int, story: list[tuple[Step
         kick = Fraction(0.1 * step.kick)
         truth = (truth[0] + kick, truth[1] + kick * Fraction(section.tau))
         level = float(along(upward(section.tau), truth))
-        most_m += abs(0.1 * step.kick) * section.tau + 0.01 * step.half_v * section.tau
-        slack = 16.0 * chains.EPSILON * (most_m + 300.0 * section.reach)
+        max_m += abs(0.1 * step.kick) * section.tau + 0.01 * step.half_v * section.tau
+        slack = 16.0 * chains.EPSILON * (max_m + 300.0 * section.reach)
         band = (level - slack, level + width + slack) if from_below else (level - width - slack, level + slack)
         alive, overlap = section.cut(*band)
         assert alive
         assert overlap > 0.0
     # A truth once lost would be far outside by now, for the level has turned.
-    assert_contains(section.corners(), [truth], (8 * U * Fraction(section.reach), 16 * U * Fraction(most_m)))
+    assert_contains(section.corners(), [truth], (8 * U * Fraction(section.reach), 16 * U * Fraction(max_m)))
 
 
 # Peaks.
@@ -628,8 +628,8 @@ def test_a_level_segment_cut_by_its_miss_stays_a_segment(part: float) -> None:
         life.check_outline()
     life.turn(0.5)
     life.check_outline()
-    least, greatest = life.section.heights()
-    assert greatest - least == pytest.approx((1.5 * part * 100.0 + 60.0) * 0.2)
+    minimum, maximum = life.section.heights()
+    assert maximum - minimum == pytest.approx((1.5 * part * 100.0 + 60.0) * 0.2)
 
 
 # Outward reduction and room.
@@ -644,11 +644,11 @@ def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
         section.turn(section.tau * fall)
         section.spread(0.01 * size_v)
         section.turn(section.tau * fall)
-        assert before < section.count <= before + chains.MOST_ADDED
+        assert before < section.count <= before + chains.MAX_ADDED
         life.operations += 2
     life.narrow = life.wide = hull(section.chain(RIGHT) + section.chain(LEFT))
-    life.most_v = Fraction(section.reach)
-    life.most_m += life.first_tau * life.most_v
+    life.max_v = Fraction(section.reach)
+    life.max_m += life.first_tau * life.max_v
     life.check()
     return life
 
@@ -662,10 +662,10 @@ def test_reduction_is_outward_and_life_goes_on(tau: float, size_v: float, size_z
     assert section.count <= chains.REDUCED
     reduced = hull(section.chain(RIGHT) + section.chain(LEFT))
     assert_contains(reduced, life.narrow, life.box)
-    # The edges that go are those that cost least: there is hardly more of the set in any direction.
+    # The edges that go are those that cost minimum: there is hardly more of the set in any direction.
     for normal in AXES:
-        (least, greatest), (low, high) = reaches(life.narrow, normal), reaches(reduced, normal)
-        assert high - low <= (greatest - least) * Fraction(11, 10)
+        (minimum, maximum), (low, high) = reaches(life.narrow, normal), reaches(reduced, normal)
+        assert high - low <= (maximum - minimum) * Fraction(11, 10)
     life.wide = reduced
     life.operations += 1
     life.check()
@@ -762,9 +762,9 @@ def test_a_mirrored_life_is_mirrored_to_the_last_bit(start: Start, story: list[t
             one.turn(one.tau * step.falls[1])
             one.shift(sign * size * step.kick)
         assert_mirrored(section, mirror)
-        least, greatest = section.heights()
-        level = least + (0.1 + 0.8 * part) * (greatest - least)
-        band = (level, greatest + 1.0) if from_below else (least - 1.0, level)
+        minimum, maximum = section.heights()
+        level = minimum + (0.1 + 0.8 * part) * (maximum - minimum)
+        band = (level, maximum + 1.0) if from_below else (minimum - 1.0, level)
         assert section.cut(*band) == mirror.cut(-band[1], -band[0])
         assert_mirrored(section, mirror)
         for side in (RIGHT, LEFT):
@@ -816,7 +816,7 @@ def test_ten_thousand_moves_do_not_wear_a_section() -> None:
     rng = np.random.default_rng(3)
     life = Life(97.3, (-1.3, 0.7, -20.0), (-0.9, 1.1, 30.0))
     section, exact = life.section, life.wide
-    added, place, most_v, most_m = (Fraction(0), Fraction(0)), (Fraction(0), Fraction(0)), Fraction(0), Fraction(0)
+    added, place, max_v, max_m = (Fraction(0), Fraction(0)), (Fraction(0), Fraction(0)), Fraction(0), Fraction(0)
     for _ in range(10_000):
         half_v = float(rng.uniform(0.0, 1e-4))
         kick = float(rng.uniform(-1.0, 1.0) * 1e3) if abs(place[0]) < 3000 else -float(place[0])
@@ -825,14 +825,14 @@ def test_ten_thousand_moves_do_not_wear_a_section() -> None:
         by = (Fraction(kick), Fraction(kick) * Fraction(97.3))
         place = (place[0] + by[0], place[1] + by[1])
         added = (added[0] + Fraction(half_v), added[1] + Fraction(half_v) * Fraction(97.3))
-        most_v, most_m = max(most_v, abs(place[0])), max(most_m, abs(place[1]))
+        max_v, max_m = max(max_v, abs(place[0])), max(max_m, abs(place[1]))
     section.shift(-float(place[0]))
     back = Fraction(-float(place[0]))
     place = (place[0] + back, place[1] + back * Fraction(97.3))
     wanted = moved(with_segment(exact, added), place)
     got = hull(section.chain(RIGHT) + section.chain(LEFT))
     # Not a unit of rounding of how far it has been, for each of two floats, is left behind:
-    far = (most_v * U * U * 20_000, most_m * U * U * 20_000)
+    far = (max_v * U * U * 20_000, max_m * U * U * 20_000)
     # but the half of a spread along m is rounded, as is what it starts from.
     box = (far[0] + 2 * U * 2, far[1] + U * added[1] + 4 * U * 150)
     assert_contains(wanted, got, box)

@@ -310,7 +310,7 @@ def test_boxes_may_be_segments_and_points() -> None:
 
 
 def around(vertices: np.ndarray) -> list[tuple[float, float]]:
-    """Vertices from the least one on, to compare cycles."""
+    """Vertices from the minimum one on, to compare cycles."""
     corners = [(float(x), float(y)) for x, y in vertices]
     start = corners.index(min(corners))
     return corners[start:] + corners[:start]

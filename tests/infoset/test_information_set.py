@@ -94,12 +94,12 @@ def test_regridding_gives_twice_the_fewest_and_one_over_the_living_range_ends_in
 def test_a_range_measurement_keeps_exactly_the_ranges_it_allows() -> None:
     information = InformationSet(replace(MODEL, sections=101))
     information.measure_range(5801.3e3, 0.05)
-    least, greatest = information.living_range_interval_m()
-    assert least[0] == pytest.approx(5801.3e3 / 1.05, rel=1e-13)
-    assert greatest[0] == pytest.approx(5801.3e3 / 0.95, rel=1e-13)
+    minimum, maximum = information.living_range_interval_m()
+    assert minimum[0] == pytest.approx(5801.3e3 / 1.05, rel=1e-13)
+    assert maximum[0] == pytest.approx(5801.3e3 / 0.95, rel=1e-13)
     ranges = [section.range_m for section in information.sections()]
-    assert least[0] <= min(ranges)
-    assert max(ranges) <= greatest[0]
+    assert minimum[0] <= min(ranges)
+    assert max(ranges) <= maximum[0]
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -120,9 +120,9 @@ def test_the_ends_of_the_range_are_alive_and_just_beyond_them_is_dead(seed: int)
         z, x = z + STEP * v, x - E * STEP
     assert information.tracking[0]
     travelled = E * information.time_s
-    least, greatest = information.living_range_interval_m()
-    assert greatest[0] - least[0] < 0.9 * 1000e3
-    for end, outward in ((least[0], -1.0), (greatest[0], 1.0)):
+    minimum, maximum = information.living_range_interval_m()
+    assert maximum[0] - minimum[0] < 0.9 * 1000e3
+    for end, outward in ((minimum[0], -1.0), (maximum[0], 1.0)):
         assert not information.section_at(end + travelled).polygon.is_empty
         assert information.section_at(end + travelled + outward * 2e-9 * (end + travelled)).polygon.is_empty
 
@@ -295,7 +295,7 @@ def test_a_copy_of_a_view_goes_on_as_the_set_does(recovery: Recovery) -> None:
     np.testing.assert_array_equal(by_view.guaranteed_miss(), straight.guaranteed_miss())
 
 
-@pytest.mark.parametrize(("range_m", "nearest"), [(5.0e6, "least"), (6.5e6, "greatest")])
+@pytest.mark.parametrize(("range_m", "nearest"), [(5.0e6, "minimum"), (6.5e6, "maximum")])
 def test_a_range_that_contradicts_names_the_living_label_nearest_to_it(range_m: float, nearest: str) -> None:
     information = InformationSet(MODEL)
     information.measure_range(5.5e6, 1e-3)
@@ -304,7 +304,7 @@ def test_a_range_that_contradicts_names_the_living_label_nearest_to_it(range_m: 
     (step,), (label,) = information.inconsistency
     assert step == 0
     # The limits stand a little outside the outermost sections' labels.
-    wanted = living.min() if nearest == "least" else living.max()
+    wanted = living.min() if nearest == "minimum" else living.max()
     assert label == pytest.approx(wanted, rel=1e-3)
 
 
@@ -340,10 +340,10 @@ def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:
         information.predict()
     section = information.sections()[1]
     bound = float(SENSOR.error_bound(section.range_m))
-    least, greatest = (float(corner[1]) / section.range_m for corner in section.polygon.bounding_box())
-    assert greatest - least > 2.0 * bound
+    minimum, maximum = (float(corner[1]) / section.range_m for corner in section.polygon.bounding_box())
+    assert maximum - minimum > 2.0 * bound
     for share in np.linspace(0.0, 0.9, 12):
-        information.measure_angle(least + (1.0 + share) * bound)
+        information.measure_angle(minimum + (1.0 + share) * bound)
         assert all(int(section.polygon.counts) <= 256 for section in information.sections())
     assert information.tracking[0]
 

@@ -1,7 +1,7 @@
 """Every operation on convex polygons against exact rational arithmetic.
 
 Tolerances come from rounding alone. `U` is the unit of rounding of a double; an operation that rounds each coordinate
-a few times errs by a few `U` times the greatest value of *that* coordinate, so sets are compared up to a small box,
+a few times errs by a few `U` times the maximum value of *that* coordinate, so sets are compared up to a small box,
 not a disc: nothing is hidden when x is a billion times y. Inputs are exactly convex: hulls taken in rationals.
 """
 
@@ -23,7 +23,7 @@ from tests.rationals import Fraction
 
 U = Fraction(1, 2**53)
 FEW = 8  # roundings of one coordinate in any one operation
-LEAST = Fraction(1, 2**1074)  # what underflow may take from a product
+MINIMUM = Fraction(1, 2**1074)  # what underflow may take from a product
 Exact = tuple[Fraction, Fraction]
 ORIGIN: Exact = (Fraction(0), Fraction(0))
 Vertices = list[tuple[float, float]]
@@ -136,15 +136,15 @@ def exact_centroid(polygon: Sequence[Exact]) -> Exact:
 
 def exact_distance(polygon: Sequence[Exact], point: Exact) -> float:
     """Distance to the boundary, rounded once or twice."""
-    least: Fraction | None = None
+    minimum: Fraction | None = None
     for a, b in zip(polygon, [*polygon[1:], polygon[0]], strict=True):
         edge, away = (b[0] - a[0], b[1] - a[1]), (point[0] - a[0], point[1] - a[1])
         length = dot(edge, edge)
         f = min(Fraction(1), max(Fraction(0), dot(edge, away) / length)) if length else Fraction(0)
         gap = (away[0] - f * edge[0], away[1] - f * edge[1])
-        least = dot(gap, gap) if least is None else min(least, dot(gap, gap))
-    assert least is not None
-    return math.sqrt(least)
+        minimum = dot(gap, gap) if minimum is None else min(minimum, dot(gap, gap))
+    assert minimum is not None
+    return math.sqrt(minimum)
 
 
 def strictly_inside(polygon: Sequence[Exact], point: Exact) -> bool:
@@ -163,7 +163,7 @@ class Case(NamedTuple):
 
     @property
     def size(self) -> Exact:
-        """Greatest |x| and |y|."""
+        """Maximum |x| and |y|."""
         return max(abs(p[0]) for p in self.exact), max(abs(p[1]) for p in self.exact)
 
     @property
@@ -188,10 +188,10 @@ SCALE = st.integers(-5, 4).map(lambda k: 10.0**k)  # nine decades
 
 
 @st.composite
-def points_of_polygon(draw: st.DrawFn, least: int = 1) -> Vertices:
-    unit = draw(st.lists(st.tuples(UNIT, UNIT), min_size=least, max_size=9))
+def points_of_polygon(draw: st.DrawFn, minimum: int = 1) -> Vertices:
+    unit = draw(st.lists(st.tuples(UNIT, UNIT), min_size=minimum, max_size=9))
     kind = draw(st.sampled_from(["plain", "round", "thin", "tiny", "mixed", "each", "segment", "point"]))
-    if least > 2 and kind in ("segment", "point"):
+    if minimum > 2 and kind in ("segment", "point"):
         kind = "plain"
     angle = draw(ANGLE)
     c, s = math.cos(angle), math.sin(angle)
@@ -217,7 +217,7 @@ def points_of_polygon(draw: st.DrawFn, least: int = 1) -> Vertices:
 
 
 CASES = points_of_polygon().map(case_of)
-FAT_CASES = points_of_polygon(least=3).map(case_of)
+FAT_CASES = points_of_polygon(minimum=3).map(case_of)
 
 
 @st.composite
@@ -541,7 +541,7 @@ def test_support_of_a_sum_is_the_sum_of_supports(first: Case, second: Case, data
     whole = first.polygon.minkowski_sum(second.polygon).support_function((x, y))
     parts = first.polygon.support_function((x, y)) + second.polygon.support_function((x, y))
     tolerance = abs(x) * first.box(second.size)[0] + abs(y) * first.box(second.size)[1]
-    assert abs(whole - parts) <= tolerance + FEW * float(LEAST)
+    assert abs(whole - parts) <= tolerance + FEW * float(MINIMUM)
 
 
 # Measures -------------------------------------------------------------------------------------------------------
@@ -554,7 +554,7 @@ def test_support_function_and_vector(case: Case, data: st.DataObject) -> None:
     value, vector = float(case.polygon.support_function((x, y))), case.polygon.support_vector((x, y))
     direction = (Fraction(x), Fraction(y))
     wanted = max(dot(direction, p) for p in case.exact)
-    slack = FEW * (U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1]) + LEAST)
+    slack = FEW * (U * (abs(direction[0]) * case.size[0] + abs(direction[1]) * case.size[1]) + MINIMUM)
     assert abs(Fraction(value) - wanted) <= slack
     assert exact([vector.tolist()])[0] in case.exact
     assert dot(direction, exact([vector.tolist()])[0]) >= wanted - slack

@@ -2,7 +2,7 @@
 
 `test_polygon_oracle.py` has exactly convex polygons. Here the exact set is the rational hull of the worn vertices, and
 an operation is right if its result and the exact one lie in each other enlarged by a few `EPS * reach`, where `reach`
-is the greatest modulus of a coordinate and `EPS` is 2**-52.
+is the maximum modulus of a coordinate and `EPS` is 2**-52.
 """
 
 from __future__ import annotations
@@ -134,16 +134,16 @@ def exact_area(corners: Sequence[Exact]) -> Fraction:
 
 
 def reach(*arrays: Floats) -> Fraction:
-    """Greatest modulus of the coordinates of some arrays."""
+    """Maximum modulus of the coordinates of some arrays."""
     return Fraction(max((float(np.max(np.abs(array))) for array in arrays if array.size), default=0.0))
 
 
 # What the operations are tried on.
 
 
-def unit_floats(least: float = -1.0) -> st.SearchStrategy[float]:
+def unit_floats(minimum: float = -1.0) -> st.SearchStrategy[float]:
     """Numbers whose products are far from underflow."""
-    return st.floats(least, 1.0).map(lambda number: number if abs(number) > 1e-60 else 0.0)
+    return st.floats(minimum, 1.0).map(lambda number: number if abs(number) > 1e-60 else 0.0)
 
 
 @st.composite
@@ -532,7 +532,7 @@ def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
         assert polygon.area(reduced, len(reduced)) < 1e-14
 
 
-def test_the_edge_that_adds_the_least_area_is_removed_first() -> None:
+def test_the_edge_that_adds_the_min_area_is_removed_first() -> None:
     """The reference computes all areas again after each removal; the lengths are equal in pairs, so that areas tie."""
     rng = np.random.default_rng(2)
     work = np.empty((128, 2))

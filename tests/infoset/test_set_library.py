@@ -231,7 +231,7 @@ def test_difference_of_a_sum(one: Case, other: Case) -> None:
 def exact_distance_between(one: Sequence[Exact], other: Sequence[Exact]) -> float:
     if exact_intersection(one, other):
         return 0.0
-    least: list[Fraction] = []
+    minimum: list[Fraction] = []
     for points, sides in ((one, other), (other, one)):
         for a, b in zip(sides, [*sides[1:], sides[0]], strict=True):
             edge = (b[0] - a[0], b[1] - a[1])
@@ -240,8 +240,8 @@ def exact_distance_between(one: Sequence[Exact], other: Sequence[Exact]) -> floa
                 away = (p[0] - a[0], p[1] - a[1])
                 part = min(Fraction(1), max(ZERO, dot(edge, away) / length)) if length else ZERO
                 gap = (away[0] - part * edge[0], away[1] - part * edge[1])
-                least.append(dot(gap, gap))
-    return math.sqrt(min(least))
+                minimum.append(dot(gap, gap))
+    return math.sqrt(min(minimum))
 
 
 @SOME
@@ -350,7 +350,7 @@ def test_preimage(case: Case, entries: tuple[float, ...], offset: tuple[float, f
 @example(
     case_of([(0.0, 0.0), (-8.270011920337144e-25, -3.784833429991908e-25), (-0.2080734182735712, 0.454648713412840)])
 )
-def test_largest_disc(case: Case) -> None:
+def test_max_disc(case: Case) -> None:
     """The disc lies in the set, and no larger one does: linear programs about a corner, in units of the extent."""
     centre, radius = case.polygon.chebyshev_centre()
     size = float(max(case.size))

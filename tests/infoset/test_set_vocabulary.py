@@ -34,7 +34,7 @@ ONLY_POLYGONS = {
 ONLY_POLYTOPES = {
     **dict.fromkeys(["normals", "offsets", "across", "levels"], "stored facets and affine hull; polygons compute them"),
     **dict.fromkeys(["space", "dimension"], "a polygon is in R^2, and its number of vertices shows its dimension"),
-    **dict.fromkeys(["relaxation", "needed"], "least relaxation of an empty set, known from linear programs"),
+    **dict.fromkeys(["relaxation", "needed"], "minimum relaxation of an empty set, known from linear programs"),
     "excess": "-margin; needed where no sign must change",
     "essential_vertices": "vertices that may be the same point; polygons decide this exactly",
 }

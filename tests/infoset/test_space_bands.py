@@ -71,12 +71,12 @@ def test_bands_contain_the_truth_and_are_convex(
     if of_y is not None and convention is not Convention.CONE:
         at_zero_y = max(of_y[1], 0.3 * of_y[0])
         sensor = replace(sensor, error_at_nominal_range_y_rad=of_y[0], error_at_zero_range_y_rad=at_zero_y)
-    # The falling bound must be positive up to the greatest distance.
+    # The falling bound must be positive up to the maximum distance.
     if min(sensor.error_bounds(np.array([3e7]))[..., 0].min(), sensor.error_bound(3e7)) < 0.0:
         sensor = replace(sensor, nominal_range_m=5.8e7)
     model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
-    least, greatest = model.label_limits_m
-    label, elapsed_m = least + label_share * (greatest - least), 0.999 * flown * least
+    minimum, maximum = model.label_limits_m
+    label, elapsed_m = minimum + label_share * (maximum - minimum), 0.999 * flown * minimum
     x = label - elapsed_m
     true = sight(x * (1.0 + speed * model.speed_error), angles)
     contain_and_are_convex(model, true, errors_of(sensor, error, extremal), label, elapsed_m)
@@ -113,8 +113,8 @@ def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     model = SetModel(
         58e3, 0.5, known, sensor, range_threshold_m=threshold_m, initial_set=InitialSet.BOX, model=Model.GUARANTEED
     )
-    least, greatest = model.label_limits_m
-    label = least + label_share * (greatest - least)
+    minimum, maximum = model.label_limits_m
+    label = minimum + label_share * (maximum - minimum)
     # From the threshold to the start, many of them near the threshold.
     x = threshold_m + (label - threshold_m) * (10.0**far if near < 0.5 else 1e-9 * near)
     true = sight(x * (1.0 + speed * model.speed_error), angles)
@@ -131,18 +131,18 @@ def errors_of(sensor: AngleSensor, error: tuple[float, float], extremal: bool) -
 
 def contain_and_are_convex(model: SetModel, true: Sight, errors: Floats, label: float, elapsed_m: float) -> None:
     """Check the bands of a measurement: that of the label contains the truth, those of all labels are convex."""
-    x, (least, greatest) = label - elapsed_m, model.label_limits_m
+    x, (minimum, maximum) = label - elapsed_m, model.label_limits_m
     band = bands(model, model.angle_sensor.measured(true, errors), elapsed_m)
     for (lower, upper), slope in zip(band(label), np.tan(true.alpha_rad[:, 0]), strict=True):
         rounding = 64.0 * EPS * (1.0 + slope**2) * label / x
         assert lower - rounding <= slope <= upper + rounding
-    labels = np.linspace(max(least, elapsed_m + model.least_range_m), greatest, 7)
+    labels = np.linspace(max(minimum, elapsed_m + model.min_range_m), maximum, 7)
     ranges = labels - elapsed_m
     heights = np.array([band(each) for each in labels.tolist()]) * ranges[:, None, None]
     if np.isfinite(heights).all():
         bend = np.diff(heights, n=2, axis=0)
         steepest = np.abs(heights / ranges[:, None, None]).max()
-        rounding = 64.0 * EPS * greatest * (1.0 + steepest)
+        rounding = 64.0 * EPS * maximum * (1.0 + steepest)
         assert bend[..., 0].min() >= -rounding
         assert bend[..., 1].max() <= rounding
 

@@ -276,9 +276,9 @@ def bands(kind: Convention, measured: Floats, bound: float) -> Floats:
     if kind is Convention.PLANE:
         return np.tan([[angle - bound, angle + bound] for angle in (first, second)])
     lower, upper = np.tan([second - bound, second + bound])
-    # |azimuth| cannot be negative: the theory's least |azimuth_m| - b is at least zero.
-    least, greatest = 1.0 / np.cos(max(abs(first) - bound, 0.0)), 1.0 / np.cos(abs(first) + bound)
-    elevation = [lower * (greatest if lower < 0.0 else least), upper * (greatest if upper > 0.0 else least)]
+    # |azimuth| cannot be negative: the theory's minimum |azimuth_m| - b is at least zero.
+    minimum, maximum = 1.0 / np.cos(max(abs(first) - bound, 0.0)), 1.0 / np.cos(abs(first) + bound)
+    elevation = [lower * (maximum if lower < 0.0 else minimum), upper * (maximum if upper > 0.0 else minimum)]
     return np.array([np.tan([first - bound, first + bound]), elevation])
 
 
@@ -306,7 +306,7 @@ def test_the_bands_of_a_measurement_contain_the_truth(
 @pytest.mark.parametrize("convention", [Convention.GIMBAL, Convention.CONE])
 def test_with_the_bands_of_plane_angles_true_states_are_outside(convention: Convention) -> None:
     """The bands of each convention are needed, at the angles of 1997 too."""
-    one, random, greatest, lost = sensor((convention, None)), np.random.default_rng(3), 0.0, 0
+    one, random, maximum, lost = sensor((convention, None)), np.random.default_rng(3), 0.0, 0
     for _ in range(300):
         place = Place(5.8e6, *random.uniform(-10e3, 10e3, 2))
         bound = float(one.bound(place)[0])
@@ -316,9 +316,9 @@ def test_with_the_bands_of_plane_angles_true_states_are_outside(convention: Conv
         measured = one.measured(place, error)
         beyond = outside(place, bands(Convention.PLANE, one.plane_angles(measured), bound)) * place.x_m
         assert outside(place, bands(convention, measured, bound)) * place.x_m <= 1e-9
-        lost, greatest = lost + (beyond > 1e-9), max(greatest, beyond)
+        lost, maximum = lost + (beyond > 1e-9), max(maximum, beyond)
     assert lost > 20
-    assert 1e-6 < greatest < 1e-2  # m: of second order, and not to be left out
+    assert 1e-6 < maximum < 1e-2  # m: of second order, and not to be left out
 
 
 def test_the_interval_of_one_axis() -> None:

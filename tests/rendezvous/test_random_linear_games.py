@@ -38,7 +38,7 @@ def a_pass(random: np.random.Generator) -> tuple[Floats, Floats, float, float]:
 
 
 def first_zero(gap: Callable[[Floats], Floats], end: float, near: float, points: int = 50_000) -> float | None:
-    """Look at many times, and in each hollow of the gap and around one time for its least value."""
+    """Look at many times, and in each hollow of the gap and around one time for its minimum value."""
     scan = [np.linspace(0.0, end, points), np.geomspace(1e-9 * end, end, points)]
     width = end * np.geomspace(1e-12, 1.0, 200)
     times = np.unique(np.clip(np.concatenate([*scan, near - width, near + width]), 0.0, end))
@@ -53,9 +53,9 @@ def first_zero(gap: Callable[[Floats], Floats], end: float, near: float, points:
         if at >= last:
             break
         low, high = float(times[at - 1]), float(times[at + 1])
-        least = minimize_scalar(one, bounds=(low, high), method="bounded", options={"xatol": 1e-14 * high}).x
-        if one(least) <= 0.0 < one(low):
-            return float(brentq(one, low, least, xtol=1e-300, rtol=1e-14))
+        minimum = minimize_scalar(one, bounds=(low, high), method="bounded", options={"xatol": 1e-14 * high}).x
+        if one(minimum) <= 0.0 < one(low):
+            return float(brentq(one, low, minimum, xtol=1e-300, rtol=1e-14))
     if len(fallen) == 0:
         return None
     return float(brentq(one, float(times[last - 2]), float(times[last - 1]), xtol=1e-300, rtol=1e-14))

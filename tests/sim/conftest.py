@@ -13,7 +13,7 @@ from sim.scenario import of_model
 
 @pytest.fixture(scope="session")
 def asteroid() -> Scenario:
-    """The paper's engagement without a range meter."""
+    """The paper's engagement without a range sensor."""
     model = SetModel(
         closing_speed_m_s=58e3,
         step_s=0.5,
@@ -37,7 +37,7 @@ def asteroid() -> Scenario:
 
 @pytest.fixture(scope="session")
 def ranging(asteroid: Scenario) -> Scenario:
-    """The same with the range meter."""
+    """The same with the range sensor."""
     return replace(asteroid, range_sensor=RangeSensor(2.0, 0.05))
 
 

@@ -69,13 +69,13 @@ def assert_possible(found: WorstEngagement, scenario: Scenario) -> None:
     for errors in found.errors.values():
         assert np.abs(errors).max() <= 1.0
     if found.accelerations_m_s2 is None:
-        assert not found.greatest_acceleration_m_s2
+        assert not found.max_acceleration_m_s2
         assert not scenario.set_model.is_guaranteed
     else:
         for along, axis in zip(np.atleast_2d(found.accelerations_m_s2), scenario.set_model.axes, strict=True):
-            greatest = scenario.set_model.axis(axis).disturbance_m_s2
-            assert found.greatest_acceleration_m_s2[axis] == greatest
-            assert set(np.abs(along).tolist()) <= {0.0, greatest}
+            maximum = scenario.set_model.axis(axis).disturbance_m_s2
+            assert found.max_acceleration_m_s2[axis] == maximum
+            assert set(np.abs(along).tolist()) <= {0.0, maximum}
             assert along.any()
 
 

@@ -30,7 +30,7 @@ from tests.space import in_space
 NOMINAL_LABEL_M = 5801.3e3
 
 
-def toy(vz_m_s: float = 1e3, greatest_impulse_m_s: float = 0.5, z_m: float = 1e5) -> Scenario:
+def toy(vz_m_s: float = 1e3, max_impulse_m_s: float = 0.5, z_m: float = 1e5) -> Scenario:
     """Two measurements, at 2000 m and at 1000 m, of an object that comes at 1000 m/s; errors of 1 mrad."""
     model = SetModel(
         closing_speed_m_s=1000.0,
@@ -47,7 +47,7 @@ def toy(vz_m_s: float = 1e3, greatest_impulse_m_s: float = 0.5, z_m: float = 1e5
         dispersion=model.bounds,
         **of_model(model),
         range_sensor=None,
-        thruster=Thruster(1000.0, 0.0, greatest_impulse_m_s),
+        thruster=Thruster(1000.0, 0.0, max_impulse_m_s),
     )
 
 
@@ -77,8 +77,8 @@ def positions(pair: TruthPair, scenario: Scenario) -> tuple[NDArray[np.float64],
     return times, np.stack(track, axis=-1)
 
 
-def least_share(pair: TruthPair, scenario: Scenario) -> float:
-    """Least bound of the angle of both until the last common step, as a share of the bound on the x axis.
+def min_share(pair: TruthPair, scenario: Scenario) -> float:
+    """Minimum bound of the angle of both until the last common step, as a share of the bound on the x axis.
 
     If both come nearer than the bound, their slope is at most q = W/|V_x| + L/x, and their distance x sqrt(1 + q^2).
     The velocity across x is at most W: that at the start, by accelerations, and the whole budget of 1000 m/s.
@@ -86,22 +86,22 @@ def least_share(pair: TruthPair, scenario: Scenario) -> float:
     assert scenario.thruster.budget_m_s == 1000.0
     pushes = np.abs(pair.acceleration_m_s2).reshape(-1, 2, pair.acceleration_m_s2.shape[-1])
     speeds = np.abs(pair.velocity_m_s[:, :-1].T) + pushes.sum(axis=-1) * scenario.set_model.step_s
-    greatest = float(np.hypot.reduce(speeds).max()) + 1000.0
+    maximum = float(np.hypot.reduce(speeds).max()) + 1000.0
     ranges = pair.label_m + pair.vx_m_s * scenario.set_model.step_s * np.arange(pair.last_common_step + 1)
-    slopes = greatest / -pair.vx_m_s + max(0.0, 0.5 * pair.apart_m - pair.correction_m) / ranges
+    slopes = maximum / -pair.vx_m_s + max(0.0, 0.5 * pair.apart_m - pair.correction_m) / ranges
     farthest = np.asarray(ranges * np.hypot(1.0, slopes), dtype=np.float64)
     bound = scenario.set_model.angle_sensor.error_bound
     return float((bound(farthest) / bound(np.asarray(ranges, dtype=np.float64))).min())
 
 
-def greatest_half_distance_m(scenario: Scenario, label_m: float, last_common_step: int) -> float:
+def max_half_distance_m(scenario: Scenario, label_m: float, last_common_step: int) -> float:
     """A_s of one axis at 58 km/s, by a dense linear program with one acceleration per step."""
     model = scenario.set_model.axis("z")
     steps = int(np.ceil(label_m / 58e3 / model.step_s))
     times = np.append(np.arange(steps) * model.step_s, label_m / 58e3)
     since = np.maximum(times[:, None] - times[None, :-1], 0.0)
     until = np.maximum(times[:, None] - times[None, 1:], 0.0)
-    # Columns: offset and velocity at t = 0, accelerations; each in units of its greatest difference.
+    # Columns: offset and velocity at t = 0, accelerations; each in units of its maximum difference.
     widths = [model.bounds.z_m[1] - model.bounds.z_m[0], model.bounds.vz_m_s[1] - model.bounds.vz_m_s[0]]
     motion = np.column_stack(
         [
@@ -167,7 +167,7 @@ def test_two_measurements_by_hand_without_a_binding_box() -> None:
     and dz(2) = dz(1) + v + a + b/2 = 2 dz(1) - dz(0) + (a + b)/2 is at most 8.5 m: 4.25 m. v is 6 - 0.25 = 5.75 m/s,
     and V_z at most 2.875 + 2 * 0.25 + 60 m/s.
     """
-    strong = toy(vz_m_s=5.0, greatest_impulse_m_s=20.0, z_m=2.0)
+    strong = toy(vz_m_s=5.0, max_impulse_m_s=20.0, z_m=2.0)
     found = pair_at(strong, 2000.0, -1000.0)
     assert found.last_common_step == 1
     assert found.bound_m == pytest.approx(4.0 * cosine(63.0), rel=3e-6)
@@ -179,10 +179,10 @@ def test_two_measurements_by_hand_without_a_binding_box() -> None:
 
 
 @pytest.mark.parametrize("slope", [0.01, 0.3])
-def test_the_bound_is_of_the_least_distance_of_an_oblique_flight(slope: float) -> None:
+def test_the_bound_is_of_the_min_distance_of_an_oblique_flight(slope: float) -> None:
     """As above with both measurements the same, no budget, and V_z within 2 m/s of `slope` times the closing speed.
 
-    The two are at z = 3 m and z = -3 m when x = 0, on straight lines: their least distances from the target are 3 m
+    The two are at z = 3 m and z = -3 m when x = 0, on straight lines: their minimum distances from the target are 3 m
     times 1/sqrt(1 + (V_z/V_x)^2), which is less than 3 m. The bound takes the greater velocity for both.
     """
     scenario, speed = toy(), 1000.0 * slope
@@ -227,14 +227,14 @@ def test_far_from_the_axis_measurements_can_be_the_same(scenario: Scenario) -> N
     """Terms that are quadratic in the slope: of the distance, of cos^2(alpha) in the rate, and of the elevation."""
     pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
     flight = fly_pair(scenario, pair)
-    assert flight.greatest_error_share <= 1.0
+    assert flight.max_error_share <= 1.0
     assert 0.0 < pair.bound_m <= flight.results.miss_m.max()
 
 
-def test_a_precise_range_meter_limits_the_pair() -> None:
+def test_a_precise_range_sensor_limits_the_pair() -> None:
     """At the slope q, the distances of the two differ by at most q |dz|: not more than 2e-5 of the range.
 
-    Without the meter dz is -4, 2 and 8 m at x = 2000, 1000 and 0 m, and V_z is at most 103 m/s. The greatest slope q,
+    Without the meter dz is -4, 2 and 8 m at x = 2000, 1000 and 0 m, and V_z is at most 103 m/s. The maximum slope q,
     if the miss is below 4 m, is 0.103 + 4/2000 and 0.103 + 4/1000. The second is the stricter one: 0.107 * 2/1000 is
     10.7 times 2e-5, so the difference and the bound are divided by 10.7.
     """
@@ -251,7 +251,7 @@ def test_budget_limits_what_can_be_corrected() -> None:
 
     The budget of 5 m/s is best spent as 2, 2 and 1 m/s at the first three: 10 + 8 + 3 = 21 m, not 30 m.
     """
-    scenario = toy(greatest_impulse_m_s=2.0)
+    scenario = toy(max_impulse_m_s=2.0)
     rich = pair_at(scenario, 10e3, -1000.0, last_common_step=4)
     poor = replace(scenario, thruster=replace(scenario.thruster, budget_m_s=5.0))
     assert rich.correction_m == pytest.approx(30.0)
@@ -266,7 +266,7 @@ def test_the_pair_is_admissible(vx_m_s: float, asteroid: Scenario) -> None:
     assert (pair.velocity_m_s[:, 1] == vx_m_s).all()
     assert (np.abs(pair.position_m[:, 0]) <= box.z_m[1]).all()
     assert (np.abs(pair.velocity_m_s[:, 0]) <= box.vz_m_s[1]).all()
-    assert np.abs(pair.acceleration_m_s2).max() == pytest.approx(0.005 * least_share(pair, asteroid))
+    assert np.abs(pair.acceleration_m_s2).max() == pytest.approx(0.005 * min_share(pair, asteroid))
     assert (np.abs(pair.acceleration_m_s2) <= 0.005 * (1.0 + 1e-12)).all()
     times, z = positions(pair, asteroid)
     apart = np.abs(z[0] - z[1])
@@ -302,7 +302,7 @@ def test_gravity_on_both_motions_is_allowed_for() -> None:
     box = scenario.set_model.bounds
     pair = pair_at(scenario, sum(box.x_m) / 2.0, sum(box.vx_m_s) / 2.0)
     flight = fly_pair(scenario, pair)
-    assert flight.greatest_error_share <= 1.0
+    assert flight.max_error_share <= 1.0
     assert flight.results.miss_m.max() >= pair.bound_m > 33.0
     assert pair.bound_m < pair_at(replace(scenario, sun=None), pair.label_m, pair.vx_m_s).bound_m
 
@@ -336,11 +336,11 @@ def test_lower_bound_of_the_published_scenario(asteroid: Scenario) -> None:
     assert done[-1] == pytest.approx(1.0)
     assert found.speeds_m_s == (-59e3, -58e3, -57e3)
     assert [pair.vx_m_s for pair in found.pairs] == [-59e3, -58e3, -57e3]
-    for speed, least, greatest in ((-59e3, 22.0, 25.0), (-58e3, 21.5, 24.0), (-57e3, 21.0, 23.0)):
+    for speed, minimum, maximum in ((-59e3, 22.0, 25.0), (-58e3, 21.5, 24.0), (-57e3, 21.0, 23.0)):
         labels, bounds = found.curve(speed)
         assert (labels[0], labels[-1]) == (5301.3e3, 6301.3e3)
         assert (np.diff(labels) > 0.0).all()
-        assert least < bounds.min() < bounds.max() < greatest
+        assert minimum < bounds.min() < bounds.max() < maximum
     assert max(each.bound_m for each in found.by_label) == found.bound_m
 
 
@@ -375,14 +375,14 @@ def test_bounds_in_space_by_the_last_common_step(
         pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step)
         for scenario in (asteroid, box, disc)
     )
-    independent_m = greatest_half_distance_m(asteroid, NOMINAL_LABEL_M, last_common_step)
+    independent_m = max_half_distance_m(asteroid, NOMINAL_LABEL_M, last_common_step)
     assert independent_m == pytest.approx(half_m, abs=0.006)
-    least = least_share(planar, asteroid)
-    assert 0.9999 * least * independent_m < 0.5 * planar.apart_m < independent_m * (1.0 + 1e-7)
+    minimum = min_share(planar, asteroid)
+    assert 0.9999 * minimum * independent_m < 0.5 * planar.apart_m < independent_m * (1.0 + 1e-7)
     assert planar.correction_m == joint.correction_m == single.correction_m == pytest.approx(correction_m, abs=0.005)
     assert single.bound_m == planar.bound_m == pytest.approx(disc_m, abs=0.06)
     # Both axes together have a slightly greater velocity across x, and a slightly lesser error bound.
-    shares = least_share(joint, box) / least
+    shares = min_share(joint, box) / minimum
     assert joint.apart_m == pytest.approx(np.sqrt(2.0) * shares * planar.apart_m, rel=1e-9)
     assert joint.bound_m == pytest.approx(box_m, abs=0.05)
 
@@ -396,13 +396,13 @@ def test_best_bounds_in_space(
 ) -> None:
     """Distances at x = 0 by an independent linear program, with M_s = 38.34 m and 23.17 m.
 
-    A_s is less by the least error bound, and the cosine is that for the budget of 1000 m/s.
+    A_s is less by the minimum error bound, and the cosine is that for the budget of 1000 m/s.
     """
     scenario = with_disturbance(in_space(asteroid, error_shape=shape), disturbance_m_s2)
     pair = pair_at(scenario, NOMINAL_LABEL_M, -58e3)
     assert pair.last_common_step == last_common_step
     correction_m = {195: 38.34, 196: 23.17}[last_common_step]
-    farther_m = (bound_m + correction_m) * least_share(pair, scenario) - correction_m
+    farther_m = (bound_m + correction_m) * min_share(pair, scenario) - correction_m
     assert pair.bound_m == pytest.approx(farther_m / np.hypot(1.0, 1.0 / 58.0), abs=0.005)
 
 
@@ -447,7 +447,7 @@ def test_the_pair_in_space_is_admissible(shape: ErrorShape, asteroid: Scenario) 
         apart = np.abs(positions_m[i, 0] - positions_m[i, 1])[common]
         shares.append(apart / (2.0 * planar.angle_sensor.error_bound(ranges[common]) * ranges[common]))
     size = np.hypot(*shares) if shape is ErrorShape.DISC else np.maximum(*shares)
-    assert size.max() == pytest.approx(least_share(pair, scenario), rel=2e-6)
+    assert size.max() == pytest.approx(min_share(pair, scenario), rel=2e-6)
     assert size.max() <= 1.0
     ends = positions_m[:, 0, -1] - positions_m[:, 1, -1]
     assert np.hypot(*ends) == pytest.approx(pair.apart_m)

@@ -125,16 +125,16 @@ class TrueFlight:
         self.time_s, self.state = start
         return found
 
-    def correct(self, greatest_m_s: float) -> Floats:
+    def correct(self, max_m_s: float) -> Floats:
         """Give the impulse that brings the motion nearest to the target without later ones, and return it."""
         to_go, state = self.until(lambda _time, state, _push: state[8])
         miss = state[self.lateral]
-        impulse = miss * min(greatest_m_s, float(np.linalg.norm(miss)) / to_go) / max(float(np.linalg.norm(miss)), 1e-9)
+        impulse = miss * min(max_m_s, float(np.linalg.norm(miss)) / to_go) / max(float(np.linalg.norm(miss)), 1e-9)
         self.fire(impulse)
         return np.asarray(impulse)
 
     def miss_m(self) -> float:
-        """Return the least distance from now on."""
+        """Return the minimum distance from now on."""
         return float(np.linalg.norm(self.until(lambda _time, state, _push: state[6:9] @ state[9:12])[1][:3]))
 
 
@@ -149,8 +149,8 @@ def measured(scenario: Scenario, states: Floats) -> dict[str, Floats]:
     return {"angle": angles[:, chosen], "rate": rates[:, chosen], "range": distance[:, None]}
 
 
-def greatest_share(scenario: Scenario, both: list[Floats], last_common_step: int) -> float:
-    """Return the greatest error of the mean of the two measured values, in units of the lesser bound."""
+def max_share(scenario: Scenario, both: list[Floats], last_common_step: int) -> float:
+    """Return the maximum error of the mean of the two measured values, in units of the lesser bound."""
     values = [measured(scenario, states) for states in both]
     shares = [0.0]
     for name, sensor in scenario.sensors.items():
@@ -170,9 +170,9 @@ def greatest_share(scenario: Scenario, both: list[Floats], last_common_step: int
 
 
 def misses(scenario: Scenario, pair: TruthPair, common: dict[int, Floats]) -> tuple[float, list[float]]:
-    """Return the greatest share of an error bound and both misses.
+    """Return the maximum share of an error bound and both misses.
 
-    `common` are impulses by step until the last common one. All later impulses are the greatest that the budget allows,
+    `common` are impulses by step until the last common one. All later impulses are the maximum that the budget allows,
     toward the target.
     """
     thruster, step_s = scenario.thruster, scenario.set_model.step_s
@@ -193,7 +193,7 @@ def misses(scenario: Scenario, pair: TruthPair, common: dict[int, Floats]) -> tu
             flight.fly(float(time_s))
             flight.correct(size)
         found.append(flight.miss_m())
-    return greatest_share(scenario, seen, pair.last_common_step), found
+    return max_share(scenario, seen, pair.last_common_step), found
 
 
 def commands(scenario: Scenario, pair: TruthPair) -> list[dict[int, Floats]]:
@@ -202,7 +202,7 @@ def commands(scenario: Scenario, pair: TruthPair) -> list[dict[int, Floats]]:
     allowed = [step for step in (scenario.impulse_steps or range(last + 1)) if step <= last]
     random = np.random.default_rng(1)
     drawn = {
-        int(step): random.uniform(-0.3, 0.3, len(scenario.set_model.axes)) * thruster.greatest_impulse_m_s
+        int(step): random.uniform(-0.3, 0.3, len(scenario.set_model.axes)) * thruster.max_impulse_m_s
         for step in np.sort(random.choice(allowed, 6, replace=False))
     }
     same = np.ones((2, 1))
@@ -215,7 +215,7 @@ def commands(scenario: Scenario, pair: TruthPair) -> list[dict[int, Floats]]:
     flight, steered, left = TrueFlight(scenario, middle, 0), {}, thruster.budget_m_s
     for step in (*allowed[:40], *allowed[-3:]):
         flight.fly(step * step_s)
-        steered[step] = flight.correct(min(left, thruster.greatest_impulse_m_s))
+        steered[step] = flight.correct(min(left, thruster.max_impulse_m_s))
         left -= float(np.linalg.norm(steered[step]))
         if left < 1e-6:
             break
@@ -301,14 +301,14 @@ def test_one_of_two_motions_misses_by_the_bound_in_two_body_gravity(scenario: Sc
 
 
 @pytest.mark.parametrize(
-    ("range_km", "least_m", "program_m"),
+    ("range_km", "min_m", "program_m"),
     [(60000.0, 47.5, 48.45), (140000.0, 43.5, 45.0), (190000.0, 40.5, 42.5), (200000.0, 39.5, 41.8)],
 )
 def test_bound_is_near_the_linear_program_with_the_gravity_gradient(
-    range_km: float, least_m: float, program_m: float
+    range_km: float, min_m: float, program_m: float
 ) -> None:
     """The values of an independent program without any reserve; without the gradient 47.3, 32.3, 13.7 and 9.1 m."""
-    assert least_m <= pair_at(slow_flight(range_km), 1e3 * range_km + 500.0, -1999.99).bound_m <= program_m + 0.05
+    assert min_m <= pair_at(slow_flight(range_km), 1e3 * range_km + 500.0, -1999.99).bound_m <= program_m + 0.05
 
 
 def test_the_bound_of_pairs_changes_gradually_with_gravity() -> None:

@@ -30,7 +30,7 @@ def offset(z_m: tuple[float, float], **engine: Any) -> Scenario:
     box = StateBox(z_m, (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
     model = replace(published.set_model, bounds=box, disturbance_m_s2=0.005, model=Model.GUARANTEED)
     model = replace(model, initial_set=InitialSet.BOX, angle_sensor=replace(model.angle_sensor, period_s=0.5))
-    thruster = Thruster(**{"budget_m_s": 1000.0, "least_impulse_m_s": 1e-4, "greatest_impulse_m_s": 0.5} | engine)
+    thruster = Thruster(**{"budget_m_s": 1000.0, "min_impulse_m_s": 1e-4, "max_impulse_m_s": 0.5} | engine)
     return replace(published, sun=None, **of_model(model), dispersion=box, range_sensor=None, thruster=thruster)
 
 

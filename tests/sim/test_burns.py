@@ -75,7 +75,7 @@ def test_a_single_impulse_without_noise_hits(known: Scenario, strategy: str, del
 def test_a_later_impulse_corrects_the_rest(known: Scenario, strategy: str) -> None:
     """An engine of 10 m/s corrects 500 m of 900 m with 50 s left; 400 m need 20 m/s with 20 s left and get 10."""
     scenario = replace(
-        with_thruster(known, impulses_s=(50.0, 20.0), greatest_impulse_m_s=10.0, delay_steps=3), strategy=strategy
+        with_thruster(known, impulses_s=(50.0, 20.0), max_impulse_m_s=10.0, delay_steps=3), strategy=strategy
     )
     assert impulses(scenario) == pytest.approx({50.0: 10.0, 80.0: 10.0}, rel=1e-6)
     assert simulate(scenario, 1).miss_m[0] == pytest.approx(900.0 - 500.0 - 200.0, rel=1e-6)
@@ -107,11 +107,11 @@ def test_scheduled_impulses_only(asteroid: Scenario, strategy: str) -> None:
 
 
 class Wasteful(SymmetricMiss):
-    """Always wants the greatest impulse."""
+    """Always wants the maximum impulse."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
         assert (situation.budget_left_m_s >= 0.0).all()
-        return np.full(situation.budget_left_m_s.shape, situation.thruster.greatest_impulse_m_s)
+        return np.full(situation.budget_left_m_s.shape, situation.thruster.max_impulse_m_s)
 
 
 @pytest.mark.parametrize("strategy", [SymmetricMiss(), Wasteful()], ids=["symmetric", "wasteful"])
@@ -198,7 +198,7 @@ def test_patient_gives_at_the_last_time_what_cannot_be_corrected_later(known: Sc
     strategy = Patient(1.0)
     strong = impulses(with_thruster(wide, impulses_s=(80.0, 40.0)), strategy=strategy)
     assert strong == pytest.approx({60.0: 200.0 / 40.0})
-    weak = impulses(with_thruster(wide, impulses_s=(80.0, 40.0), greatest_impulse_m_s=8.0), strategy=strategy)
+    weak = impulses(with_thruster(wide, impulses_s=(80.0, 40.0), max_impulse_m_s=8.0), strategy=strategy)
     # At most 320 m can be corrected later: 180 m are given now, and the middle of what is left, 20 m, at the end.
     assert weak == pytest.approx({20.0: 180.0 / 80.0, 60.0: 20.0 / 40.0})
 
@@ -211,7 +211,7 @@ def test_a_strategy_sees_the_schedule(known: Scenario) -> None:
             seen.append(situation)
             return super().decide(situation, state)
 
-    scenario = with_thruster(known, impulses_s=(80.0, 40.0), delay_steps=4, least_impulse_m_s=0.1)
+    scenario = with_thruster(known, impulses_s=(80.0, 40.0), delay_steps=4, min_impulse_m_s=0.1)
     fly_one(scenario, strategy=Looking())
     assert [now.step for now in seen if now.may_fire] == [36, 116]
     assert {now.lead_s for now in seen} == {2.0}

@@ -121,7 +121,7 @@ def test_possible_miss_is_that_of_linear_programs(last_s: float, centroid_m: flo
 def widest_with_disturbance_m(
     times_s: Floats, pixel: float, centroid_m: float, disturbance_m_s2: float, constant: bool
 ) -> float:
-    """Return the greatest miss that agrees with images of zero at these times before the arrival, by a linear program.
+    """Return the maximum miss that agrees with images of zero at these times before the arrival, by a linear program.
 
     Variables: z and V_z at the first image, the bias, and the acceleration between neighbouring images and up to the
     arrival, each in a unit that makes the coefficients about 1.
@@ -427,7 +427,7 @@ def test_a_lost_image_is_no_value_of_the_record_and_no_cut() -> None:
     ]
 
 
-def test_margins_of_the_truth_with_lost_images_and_a_range_meter() -> None:
+def test_margins_of_the_truth_with_lost_images_and_a_range_sensor() -> None:
     """Engagements with and without an image in a step have their own cuts; a record has the margins of both."""
     scenario = replace(camera_scenario(miss_probability=0.4), range_sensor=RangeSensor(EVERY_S, 0.01))
     record = fly_one(scenario, 3)
@@ -489,7 +489,7 @@ def test_pairs_of_the_lower_bound_stay_within_the_bounds_of_a_camera(centroid_m:
     bound = lower_bound(scenario)
     assert bound.bound_m > 0.0
     flown = fly_pair(scenario, bound.pair)
-    assert flown.greatest_error_share <= 1.0
+    assert flown.max_error_share <= 1.0
     assert flown.results.miss_m.max() >= bound.bound_m * (1.0 - 1e-6)
     if centroid_m == CENTROID_M:
         # Images beyond the last one tell no more: the bound is not less without the limit of time.
@@ -513,7 +513,7 @@ def test_extremal_errors_reach_the_possible_miss_with_any_strategy(centroid_m: f
     bound = lower_bound(scenario)
     assert bound.bound_m == pytest.approx(expected, rel=1e-4)
     flown = fly_pair(scenario, bound.pair)
-    assert flown.greatest_error_share <= 1.0
+    assert flown.max_error_share <= 1.0
     phi = flown.results.guaranteed_miss_m.max()
     assert expected * (1.0 - 1e-4) <= flown.results.miss_m.max() <= phi <= expected * (1.0 + 1e-4)
 

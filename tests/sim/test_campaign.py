@@ -52,7 +52,7 @@ from sim.storage.manifest import checksum
 from sim.versions import VersionError
 
 COLUMNS = [
-    *("run", "noise", "tie", "range_meter", "miss_m", "impulse_m_s", "guaranteed_miss_m"),
+    *("run", "noise", "tie", "range_sensor", "miss_m", "impulse_m_s", "guaranteed_miss_m"),
     *("theorem_8_miss_m", "outcome", "set_emptied", "hit", "truth_margin_m"),
     *("z_km", "x_km", "vz_km_s", "vx_km_s"),
     *("y_km", "vy_km_s", "miss_y_m", "miss_z_m"),
@@ -467,8 +467,8 @@ def test_a_scenario_comes_back_whole(brief: Scenario, ranging: Scenario, comet: 
 
 @pytest.mark.parametrize("number", [2, np.float64(2.0), np.int64(2)])
 def test_numbers_of_other_types_are_the_same_campaign(number: Any, brief: Scenario, tmp_path: Path) -> None:
-    plain = replace(brief, thruster=replace(brief.thruster, greatest_impulse_m_s=2.0))
-    other = replace(brief, thruster=replace(brief.thruster, greatest_impulse_m_s=number))
+    plain = replace(brief, thruster=replace(brief.thruster, max_impulse_m_s=2.0))
+    other = replace(brief, thruster=replace(brief.thruster, max_impulse_m_s=number))
     assert fingerprint(other) == fingerprint(plain)
     result = mixed(other, tmp_path, 8).run(workers=1)
     assert CampaignFolder.read(tmp_path).damaged == []
@@ -622,10 +622,8 @@ def test_chunks_suit_the_number_of_runs() -> None:
 
 
 def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_path: Path) -> None:
-    cells = tuple(
-        replace(brief, thruster=replace(brief.thruster, greatest_impulse_m_s=each)) for each in (2.0, 5.0, 9.0)
-    )
-    axis = Axis("thruster.greatest_impulse_m_s", (2.0, 5.0, 9.0))
+    cells = tuple(replace(brief, thruster=replace(brief.thruster, max_impulse_m_s=each)) for each in (2.0, 5.0, 9.0))
+    axis = Axis("thruster.max_impulse_m_s", (2.0, 5.0, 9.0))
     asked = Sweep(brief, (axis,), cells, 40, tmp_path / "sweep", seed=3, chunk=16, noise=CampaignNoise.MIXED)
     with pytest.raises(Stop):
         asked.run(progress=breaking_off_after(50))
@@ -640,7 +638,7 @@ def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_
     for number, cell in enumerate(cells):
         alone = Campaign(cell, 40, tmp_path / f"cell{number}", seed=3, noise=CampaignNoise.MIXED).run().table
         assert result.folder.table(COLUMNS, number).equals(alone)
-        assert result.folder.manifest.values_of(number) == {"thruster.greatest_impulse_m_s": axis.values[number]}
+        assert result.folder.manifest.values_of(number) == {"thruster.max_impulse_m_s": axis.values[number]}
     other = replace(asked, cells=(cells[0], cells[2], cells[1]))
     with pytest.raises(ManifestError, match="cells_hash"):
         other.run(resume=True)

@@ -143,10 +143,10 @@ def test_the_applied_starts_are_those_of_the_dispersion(asteroid: Scenario) -> N
     results = simulate(asteroid, 40)
     starts = np.hstack((results.position_m, results.velocity_m_s))
     box = asteroid.dispersion
-    for column, (least, greatest) in zip(starts.T, (box.z_m, box.x_m, box.vz_m_s, box.vx_m_s), strict=True):
-        assert least <= column.min()
-        assert column.max() <= greatest
-        assert np.ptp(column) > 0.7 * (greatest - least)
+    for column, (minimum, maximum) in zip(starts.T, (box.z_m, box.x_m, box.vz_m_s, box.vx_m_s), strict=True):
+        assert minimum <= column.min()
+        assert column.max() <= maximum
+        assert np.ptp(column) > 0.7 * (maximum - minimum)
 
 
 class Silent:

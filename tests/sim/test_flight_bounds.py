@@ -43,7 +43,7 @@ def flown(start: Floats, impulse_m_s: Floats, at_s: float, push_m_s2: Floats, su
 
 
 def shares(states: Floats, flight: FlightBounds) -> Floats:
-    """The greatest shares of the bounds that a motion reaches, before its arrival."""
+    """The maximum shares of the bounds that a motion reaches, before its arrival."""
     own, own_speed, there, speed = states[:, :, (states[2] - states[0])[-1] >= 0.0]
     place, velocity = there - own, speed - own_speed
     n = place.shape[1]
@@ -85,11 +85,11 @@ def test_no_motion_leaves_the_bounds_of_a_flight(sun: Sun, range_m: float, speed
     flight = flight_bounds(box, (push_m_s2,) * lateral, sun, fast)
     boxes = [box.axis(name) for name in box.axes]
     ends = [[*(each.z_m for each in boxes), box.x_m], [*(each.vz_m_s for each in boxes), box.vx_m_s]]
-    least, greatest = np.moveaxis(np.array(ends), 2, 0)
+    minimum, maximum = np.moveaxis(np.array(ends), 2, 0)
     random, most = np.random.default_rng(1), np.zeros(7)
     for _ in range(40):
-        share = random.uniform(size=least.shape)
-        start = least + (greatest - least) * np.where(random.uniform(size=least.shape) < 0.7, share.round(), share)
+        share = random.uniform(size=minimum.shape)
+        start = minimum + (maximum - minimum) * np.where(random.uniform(size=minimum.shape) < 0.7, share.round(), share)
         direction = random.normal(size=lateral)
         impulse = np.append(fast * direction / np.linalg.norm(direction), 0.0)
         push = np.append(random.choice([-1.0, 1.0], lateral) * push_m_s2, 0.0)

@@ -19,7 +19,7 @@ RUNS = 10
 
 
 def latest_pair(scenario: Scenario) -> TruthPair:
-    """The pair of motions that arrives last, which has the greatest bound of the missions."""
+    """The pair of motions that arrives last, which has the maximum bound of the missions."""
     bounds = scenario.set_model.bounds
     return pair_at(scenario, bounds.x_m[1], bounds.vx_m_s[1])
 
@@ -65,7 +65,7 @@ def test_the_shift_moves_the_truth_to_the_side_of_its_target_along_each_axis() -
     assert mixed.truth_side.tolist() == [[1.0, -1.0], [0.0, 0.0]]
 
 
-def test_the_greatest_bound_is_that_of_the_latest_arrival() -> None:
+def test_the_max_bound_is_that_of_the_latest_arrival() -> None:
     scenario = load_scenario("dart-2022")
     assert lower_bound(scenario).bound_m == latest_pair(scenario).bound_m
 

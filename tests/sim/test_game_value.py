@@ -103,7 +103,7 @@ def test_each_assumption_has_its_reason(change: Callable[[Scenario], Scenario], 
 def test_reserve_of_a_weak_engine_by_hand() -> None:
     """All 61 impulses of 0.5 m/s correct 460 of 1100 m; the one at 5 km is below the threshold."""
     scenario = known(z_m=(900.0, 1100.0), vz_m_s=0.0)
-    engine = replace(scenario.thruster, greatest_impulse_m_s=0.5, least_impulse_m_s=0.0)
+    engine = replace(scenario.thruster, max_impulse_m_s=0.5, min_impulse_m_s=0.0)
     weak = replace(scenario, thruster=engine, **of_model(replace(scenario.set_model, range_threshold_m=6e3)))
     bound_m, reserve = reserve_of(weak)
     to_go_s = RANGE_M / SPEED_M_S - 0.5 * np.arange(61)
@@ -152,7 +152,7 @@ CAMERA = AngleSensor.camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.
     "change",
     [
         lambda scenario: scenario,
-        lambda scenario: with_thruster(scenario, replace(scenario.thruster, least_impulse_m_s=3.0)),
+        lambda scenario: with_thruster(scenario, replace(scenario.thruster, min_impulse_m_s=3.0)),
         lambda scenario: with_thruster(scenario, Thruster(500.0, 0.0, 200.0, impulses_s=(22.0, 9.0, 3.0))),
         lambda scenario: replace(scenario, **of_model(replace(scenario.set_model, disturbance_m_s2=0.5))),
         lambda scenario: replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=CAMERA))),

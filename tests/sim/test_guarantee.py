@@ -115,9 +115,9 @@ def hundred(two_hundred: Results) -> Results:
 def test_phi_is_tight(asteroid: Scenario, two_hundred: Results) -> None:
     """Phi is a bound that says something: the medians of the theory, 13 m for random noise and 15 to 17.5 for game."""
     game = simulate(replace(guaranteed(asteroid), noise=NoiseKind.GAME), 200)
-    for results, least, greatest in ((two_hundred, 12.0, 14.5), (game, 14.0, 17.5)):
+    for results, minimum, maximum in ((two_hundred, 12.0, 14.5), (game, 14.0, 17.5)):
         assert sound(results)
-        assert least <= median(results.guaranteed_miss_m) <= greatest
+        assert minimum <= median(results.guaranteed_miss_m) <= maximum
 
 
 def test_phi_follows_impulses_fired_after_labels_have_left(asteroid: Scenario) -> None:
@@ -162,7 +162,7 @@ def test_gravity_moves_the_model_motion_within_its_bounds(asteroid: Scenario, sp
     start = np.array(
         [[z, x_m, vz, -e] for z_m in widths for z, vz in itertools.product((-z_m, z_m), (-vz_m_s, vz_m_s))]
     )
-    greatest = np.zeros(len(widths))
+    maximum = np.zeros(len(widths))
     for direction in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
         sun = Sun(1.324948e20, 150e9, float(direction))
         motion = KeplerMotion(start[:, :2], start[:, 2:], sun)
@@ -178,13 +178,13 @@ def test_gravity_moves_the_model_motion_within_its_bounds(asteroid: Scenario, sp
             model = with_gravity(plain[case], sun, 0.0)
             (law,) = section_laws(model)
             mine = slice(4 * case, 4 * case + 4)
-            assert (law.vz_least <= label_v[mine]).all()
-            assert (label_v[mine] <= law.vz_greatest).all()
+            assert (law.vz_min <= label_v[mine]).all()
+            assert (label_v[mine] <= law.vz_max).all()
             most = float(acceleration[:, mine].max())
             rounding = 4.0 * np.spacing(z_m + vz_m_s * 100.0 * step_s) / step_s**2
             assert most <= model.acceleration_m_s2 + rounding
-            greatest[case] = max(greatest[case], most / model.acceleration_m_s2)
-    assert (greatest > 0.25).all()  # the bound is not lavish, and what it bounds was there
+            maximum[case] = max(maximum[case], most / model.acceleration_m_s2)
+    assert (maximum > 0.25).all()  # the bound is not lavish, and what it bounds was there
 
 
 @pytest.mark.parametrize("runs", [16, pytest.param(100, marks=pytest.mark.slow)])

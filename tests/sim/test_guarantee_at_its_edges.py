@@ -122,8 +122,8 @@ def round_scenario(number: int) -> Scenario:
         thruster=replace(
             asteroid.thruster,
             budget_m_s=vz_m_s + 1.0,
-            least_impulse_m_s=one_of(0.0, 0.1),
-            greatest_impulse_m_s=vz_m_s + 1.0,
+            min_impulse_m_s=one_of(0.0, 0.1),
+            max_impulse_m_s=vz_m_s + 1.0,
         ),
         strategy=str(generator.choice(["symmetric-miss", "patient", "kalman", "least-squares", "zero-effort-miss"])),
         noise=(NoiseKind.RANDOM, NoiseKind.GAME)[int(generator.integers(2))],
@@ -311,15 +311,15 @@ def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
     labels = np.linspace(*model.label_limits_m, 120)
     living = np.array([len(information.section_at(label, run).polygon.polygon()) > 0 for label in labels])
     edges = labels[np.flatnonzero(np.diff(living.astype(int)))]
-    assert edges.size == 3  # dead, living, dead, living up to the greatest label
+    assert edges.size == 3  # dead, living, dead, living up to the maximum label
     assert edges[2] - edges[1] > 150e3
     # What is done: the stored sections that live are kept, on both sides, and the interval spans both.
     stored = information.labels_m[run][information.living[run]]
     assert not ((stored > edges[1] + 1e4) & (stored < edges[2])).any()
     travelled = model.closing_speed_m_s * model.step_s * 15
-    least, greatest = (ends[run] + travelled for ends in information.living_range_interval_m())
-    assert edges[0] < least < edges[1]
-    assert greatest == pytest.approx(model.label_limits_m[1], rel=1e-9)
+    minimum, maximum = (ends[run] + travelled for ends in information.living_range_interval_m())
+    assert edges[0] < minimum < edges[1]
+    assert maximum == pytest.approx(model.label_limits_m[1], rel=1e-9)
 
 
 @pytest.mark.parametrize("y", [None, "mirror of z", "bound that falls with range"])
@@ -406,23 +406,23 @@ def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_le
 
 
 @pytest.mark.parametrize(
-    ("error_at_33_km_rad", "measured_rad", "impulse_m_s", "greatest_z_m"),
+    ("error_at_33_km_rad", "measured_rad", "impulse_m_s", "max_z_m"),
     [
-        # Of the four labels and two more, the least would be behind x = 0 at this step.
+        # Of the four labels and two more, the minimum would be behind x = 0 at this step.
         (2.3e-4, 2.07e-4, 4.0, 4.4),
-        # The greatest would be beyond the range at which the error bound is zero.
+        # The maximum would be beyond the range at which the error bound is zero.
         (2.3e-7, 1.61e-4, 0.0, 40.0),
     ],
 )
 def test_phi_is_extrapolated_from_labels_with_sections_only(
-    error_at_33_km_rad: float, measured_rad: float, impulse_m_s: float, greatest_z_m: float
+    error_at_33_km_rad: float, measured_rad: float, impulse_m_s: float, max_z_m: float
 ) -> None:
     """All labels leave at the first step: the misses after one angle and one impulse, at V_z = 0, by hand.
 
     At the range x the angle leaves z within x tan(alpha_m -+ b) and the start, the impulse moves z by -k x/e.
     """
     e, x_m, error_rad = 58e3, (5010.0, 33e3), 2.3e-4
-    box = StateBox((-greatest_z_m, greatest_z_m), x_m, (0.0, 0.0), (-e, -e))
+    box = StateBox((-max_z_m, max_z_m), x_m, (0.0, 0.0), (-e, -e))
     sensor = AngleSensor(0.5, error_at_33_km_rad, error_rad, x_m[1])
     model = SetModel(e, 0.5, box, sensor, range_threshold_m=5e3, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
     information = InformationSet(model)
@@ -431,11 +431,11 @@ def test_phi_is_extrapolated_from_labels_with_sections_only(
     information.drop_below_threshold()
     x = np.linspace(*x_m, 10_001)
     bound = error_rad + (error_at_33_km_rad - error_rad) * x / x_m[1]
-    least = np.maximum(x * np.tan(measured_rad - bound), -greatest_z_m) - impulse_m_s * x / e
-    greatest = np.minimum(x * np.tan(measured_rad + bound), greatest_z_m) - impulse_m_s * x / e
+    minimum = np.maximum(x * np.tan(measured_rad - bound), -max_z_m) - impulse_m_s * x / e
+    maximum = np.minimum(x * np.tan(measured_rad + bound), max_z_m) - impulse_m_s * x / e
     phi_m, exists = information.guaranteed_miss()
     assert exists.all()
-    assert phi_m[0] >= max(greatest.max(), -least.min())
+    assert phi_m[0] >= max(maximum.max(), -minimum.min())
 
 
 def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_speed() -> None:
@@ -492,14 +492,14 @@ def test_flights_that_gravity_slows_down_reach_their_closest_approach(direction_
     assert (results.miss_m < 0.2 * start).all()
 
 
-@pytest.mark.parametrize("greatest_z_m", [0.0, 0.5, 10.0])
-def test_phi_of_an_exactly_known_range_and_speed(greatest_z_m: float) -> None:
+@pytest.mark.parametrize("max_z_m", [0.0, 0.5, 10.0])
+def test_phi_of_an_exactly_known_range_and_speed(max_z_m: float) -> None:
     """The only label leaves after the angle at 1100 m, which leaves z within 1100 tan(1e-3); V_z is zero.
 
     Phi is greater by 4 ulp of the label, which is all of it if z is zero.
     """
     e = 1e3
-    box = StateBox((-greatest_z_m, greatest_z_m), (2e4, 2e4), (0.0, 0.0), (-e, -e))
+    box = StateBox((-max_z_m, max_z_m), (2e4, 2e4), (0.0, 0.0), (-e, -e))
     sensor = AngleSensor(0.9, 1e-3, 1e-3, 2e4)
     model = SetModel(e, 0.9, box, sensor, range_threshold_m=500.0, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
     information = InformationSet(model)
@@ -510,4 +510,4 @@ def test_phi_of_an_exactly_known_range_and_speed(greatest_z_m: float) -> None:
     phi_m, exists = information.guaranteed_miss()
     assert exists.all()
     rounding_m = 4.0 * 2.0**-52 * 2e4
-    assert phi_m[0] == pytest.approx(min(greatest_z_m, 1100.0 * math.tan(1e-3)) + rounding_m, rel=1e-6, abs=0.0)
+    assert phi_m[0] == pytest.approx(min(max_z_m, 1100.0 * math.tan(1e-3)) + rounding_m, rel=1e-6, abs=0.0)

@@ -24,7 +24,7 @@ def test_a_point_has_no_hits(brief: Scenario) -> None:
     assert "hit" not in repr(results)
 
 
-def test_hits_are_the_misses_of_at_most_the_radius(brief: Scenario) -> None:
+def test_hits_are_the_misses_of_at_max_the_radius(brief: Scenario) -> None:
     misses = simulate(brief, 6).miss_m
     results = simulate(replace(brief, body=Body(float(np.sort(misses)[3]))), 6)
     np.testing.assert_array_equal(results.miss_m, misses)
@@ -42,7 +42,7 @@ def test_an_arrival_far_away_is_a_miss_and_an_empty_set_may_hit(published: Scena
     weak = replace(
         published,
         range_sensor=None,
-        thruster=replace(published.thruster, least_impulse_m_s=0.01, greatest_impulse_m_s=0.02),
+        thruster=replace(published.thruster, min_impulse_m_s=0.01, max_impulse_m_s=0.02),
         body=Body(80.0),
     )
     far = simulate(weak, 2)
@@ -63,8 +63,8 @@ def test_a_diverged_run_with_an_empty_set_is_counted_as_both(published: Scenario
     assert results.set_emptied.any()
 
 
-def test_a_body_is_smaller_than_the_least_range(published: Scenario) -> None:
-    with pytest.raises(ValueError, match=r"body\.radius_m must be less than the least possible range, 5.3013e\+06 m"):
+def test_a_body_is_smaller_than_the_min_range(published: Scenario) -> None:
+    with pytest.raises(ValueError, match=r"body\.radius_m must be less than the minimum possible range, 5.3013e\+06 m"):
         replace(published, body=Body(6e6))
 
 

@@ -93,27 +93,27 @@ def test_error_is_under_a_micrometre_over_120_seconds(sun_degrees: float) -> Non
     np.testing.assert_allclose(motion.position_m[0], expected[:2], rtol=0.0, atol=1e-6)
 
 
-def test_least_distance_between_steps_matches_a_dense_search() -> None:
+def test_min_distance_between_steps_matches_a_dense_search() -> None:
     """A target that accelerates, in free space: the motion is a parabola."""
     position, velocity, acceleration = np.array([40.0, 11_000.0]), np.array([3.0, -58_000.0]), 2.0e4
     moments = np.linspace(0.18, 0.20, 2_000_001)
     z = position[0] + velocity[0] * moments + 0.5 * acceleration * moments**2
     x = position[1] + velocity[1] * moments
     passage = KeplerMotion(position[None], velocity[None], None).advance(0.5, np.array([acceleration]))
-    assert passage.least_distance_m[0] == pytest.approx(np.hypot(z, x).min(), rel=1e-9)
+    assert passage.min_distance_m[0] == pytest.approx(np.hypot(z, x).min(), rel=1e-9)
     assert passage.arrival_s[0] == pytest.approx(11.0 / 58.0, rel=1e-14)
 
 
 def test_free_passage_in_free_space_is_the_distance_of_a_straight_line() -> None:
     position, velocity = np.array([[30.0, 100_000.0]]), np.array([[5.0, -58_000.0]])
     motion = KeplerMotion(position, velocity, None)
-    least = np.inf
+    minimum = np.inf
     for _ in range(6):
         passage = motion.advance(0.5)
-        least = min(least, passage.least_distance_m[0])
+        minimum = min(minimum, passage.min_distance_m[0])
     assert passage.passed[0]
     expected = abs(position[0, 0] * velocity[0, 1] - position[0, 1] * velocity[0, 0]) / np.hypot(*velocity[0])
-    assert least == pytest.approx(expected, rel=1e-12)
+    assert minimum == pytest.approx(expected, rel=1e-12)
 
 
 def test_an_object_that_is_just_beside_or_just_there_is_seen_without_a_warning() -> None:
@@ -128,7 +128,7 @@ def test_an_object_that_is_just_beside_or_just_there_is_seen_without_a_warning()
 
 
 def closest_by_scipy(position: Floats, velocity: Floats, sun: Sun, longest_s: float) -> tuple[float, float, float]:
-    """Time and distance of the closest approach, and the least distance from the Sun until then.
+    """Time and distance of the closest approach, and the minimum distance from the Sun until then.
 
     Both craft move around the Sun; the unknowns are the relative motion and that of the spacecraft.
     """
@@ -181,7 +181,7 @@ def test_the_miss_is_exact_in_gravity_of_any_strength(flights: int) -> None:
         motion, step_s, steps = KeplerMotion(position[None], velocity[None], sun), range_m / speed / 30.0, 0
         while not (passage := motion.advance(step_s)).passed[0]:
             steps += 1
-        assert abs(passage.least_distance_m[0] - expected_m) <= max(1e-3, 1e-9 * expected_m)
+        assert abs(passage.min_distance_m[0] - expected_m) <= max(1e-3, 1e-9 * expected_m)
         assert steps * step_s <= arrival_s * (1.0 + 1e-9)
         flown, strongest = flown + 1, max(strongest, (range_m / speed) * np.sqrt(parameter / distance**3))
     assert strongest > 0.5  # radians of the orbit
@@ -195,7 +195,7 @@ def test_a_low_orbit_around_the_earth() -> None:
         pass
     _, expected_m, _ = closest_by_scipy(np.array([-20.0, 2.8e6]), np.array([1100.0, -14_000.0]), sun, 400.0)
     assert expected_m == pytest.approx(180_810.888, abs=1e-3)
-    assert passage.least_distance_m[0] == pytest.approx(expected_m, abs=1e-4)
+    assert passage.min_distance_m[0] == pytest.approx(expected_m, abs=1e-4)
 
 
 def test_the_motion_does_not_depend_on_the_batch_or_on_the_step() -> None:

@@ -1,4 +1,4 @@
-"""The greatest miss of any state of the set when control ends: known cases, the truth below it and Phi above it."""
+"""The maximum miss of any state of the set when control ends: known cases, the truth below it and Phi above it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def guaranteed(scenario: Scenario) -> Scenario:
 def fly(
     scenario: Scenario, runs: int = RUNS, *, noise: MeasurementNoise | None = None, guarantee: bool = True
 ) -> tuple[Results, np.ndarray]:
-    """Return the results of some runs, and the greatest misses of any state."""
+    """Return the results of some runs, and the maximum misses of any state."""
     flight = Engagements(scenario, draw(scenario, range(runs), 0), noise=noise, guarantee=guarantee)
     while flight.flying:
         flight.advance()
@@ -71,7 +71,7 @@ def test_without_control_any_corner_of_the_box_may_be_true(kind: Model, asteroid
     assert any_state_m == pytest.approx([5e3] * 3, rel=1e-6)
 
 
-def test_the_farthest_range_has_the_greatest_miss(asteroid: Scenario) -> None:
+def test_the_farthest_range_has_the_max_miss(asteroid: Scenario) -> None:
     """A range of 1200 km takes 120 s: -3 km - 2.4 km."""
     _, any_state_m = fly(without_control(asteroid, Model.GUARANTEED, (0.8e6, 1.2e6)), 3, noise=EXACT)
     assert any_state_m == pytest.approx([5.4e3] * 3, rel=1e-6)

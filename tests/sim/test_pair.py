@@ -72,7 +72,7 @@ def test_pairs_are_measured_in_the_middle_until_it_is_late(nothing_known: Inform
     assert common["range"] == pytest.approx([1000.0, 1000.0, 501.0, 501.0])
     assert common["rate"] == pytest.approx([1.5, 1.5, 4.0, 4.0])
     assert common["angle"][0] == common["angle"][1]
-    assert noise.greatest_share == pytest.approx(1.0)  # the first pair, 0.001 of 0.001
+    assert noise.max_share == pytest.approx(1.0)  # the first pair, 0.001 of 0.001
     honest = noise.measure(sight(4, SENSOR, METER, RATE), nothing_known)
     assert np.array_equal(honest["angle"], sight(4).alpha_rad)
     assert np.array_equal(honest["range"], sight(4).range_m)
@@ -93,7 +93,7 @@ def test_pairs_in_space_have_one_measurement_with_equal_errors(
     error = sensor.error(true, measured["angle"])
     sizes = np.hypot(*error) if shape == "disc" else np.abs(error).max(axis=0)
     assert sizes[0::2] == pytest.approx(sizes[1::2], rel=1e-6)
-    assert noise.greatest_share == pytest.approx(sizes.max())
+    assert noise.max_share == pytest.approx(sizes.max())
     if convention is Convention.PLANE:
         assert measured["angle"][:, ::2] == pytest.approx(np.array([[0.3006, -0.1], [0.19955, 0.4008]]))
         assert sizes[::2] == pytest.approx([0.75, 0.8] if shape == "disc" else [0.6, 0.8])
@@ -107,7 +107,7 @@ def test_pairs_in_space_have_one_measurement_with_equal_errors(
 def test_only_sensors_that_measure_count(nothing_known: InformationSetView) -> None:
     noise = PairNoise(3)
     noise.measure(sight(3, METER), nothing_known)
-    assert noise.greatest_share == pytest.approx(1.0 / 50.0)  # 1 m of 50 m
+    assert noise.max_share == pytest.approx(1.0 / 50.0)  # 1 m of 50 m
 
 
 def test_what_is_not_measured_is_not_given(nothing_known: InformationSetView) -> None:
@@ -191,8 +191,8 @@ def random_in_space(number: int) -> Scenario:
     sensor = replace(model.angle_sensor, convention=convention, error_shape=ErrorShape(shape))
     if shape == "box":
         sensor = replace(sensor, error_at_nominal_range_y_rad=share[0] * sensor.error_at_nominal_range_rad)
-    (least, greatest), speed = model.bounds.z_m, share[2] * model.bounds.vz_m_s[1]
-    box = replace(model.bounds, y_m=(least, share[1] * greatest), vy_m_s=(-speed, speed))
+    (minimum, maximum), speed = model.bounds.z_m, share[2] * model.bounds.vz_m_s[1]
+    box = replace(model.bounds, y_m=(minimum, share[1] * maximum), vy_m_s=(-speed, speed))
     disturbance = share[3] * model.disturbance_m_s2
     model = replace(model, bounds=box, angle_sensor=sensor, disturbance_y_m_s2=disturbance)
     sun = None if scenario.sun is None else replace(scenario.sun, elevation_rad=draws.uniform(-0.5, 0.5) * np.pi)
@@ -216,7 +216,7 @@ def check(scenario: Scenario, strategy: Strategy) -> None:
     for pair in found.pairs:
         flight = fly_pair(scenario, pair, strategy)
         # Far from an interception angles are no longer small, and rates no longer linear; the miss is then far greater.
-        assert flight.greatest_error_share <= 1.0 or flight.results.miss_m.max() > 2.0 * pair.bound_m
+        assert flight.max_error_share <= 1.0 or flight.results.miss_m.max() > 2.0 * pair.bound_m
         common = flight.impulse_m_s[: pair.last_common_step + 1]
         assert (common[..., 0] == common[..., 1]).all()
         assert flight.results.miss_m.max() >= pair.bound_m
@@ -251,7 +251,7 @@ def test_one_of_the_pair_misses_by_the_bound_in_the_scenario_of_1997(
     expected_m = (apart_m * (1.0 - reserve) - correction_m) / np.hypot(1.0, 1.0 / 58.0)
     assert pair.bound_m == pytest.approx(expected_m, abs=0.005)
     flight = fly_pair(scenario, pair)
-    assert flight.greatest_error_share <= 1.0
+    assert flight.max_error_share <= 1.0
     assert flight.results.miss_m.max() >= pair.bound_m
     assert flight.results.truth_kept.all()
     assert (

@@ -36,7 +36,7 @@ def test_game_noise(asteroid: Scenario) -> None:
         (NoiseKind.GAME, 11.0, 14.0, 308.0),
     ],
 )
-def test_with_the_range_meter(
+def test_with_the_range_sensor(
     ranging: Scenario, noise: NoiseKind, median: float, nine_in_ten: float, impulse: float
 ) -> None:
     """The published procedure: a set that a measurement empties stays lost."""

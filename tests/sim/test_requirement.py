@@ -71,7 +71,7 @@ def test_watched_p_values_are_inverse_likelihood_ratios(runs: int, count: int) -
 
 
 @pytest.mark.parametrize("share", [0.5, 0.95, 0.99])
-def test_looks_after_every_run_are_wrong_in_at_most_5_percent(share: float) -> None:
+def test_looks_after_every_run_are_wrong_in_at_max_5_percent(share: float) -> None:
     """The fixed-size interval, looked at after every run, is wrong in far more than 5 % of the samples."""
     size, repeats = 1500, 1000
     counts = np.cumsum(np.random.default_rng(3).random((repeats, size)) < share, axis=1)
@@ -163,18 +163,20 @@ def test_no_sample_for_a_decision(values: list[float]) -> None:
         judge(np.array(values), P99, watched=True)
 
 
-def test_the_least_fixed_number_of_runs_that_decides() -> None:
-    for share, least in (("0.99", 368), ("0.95", 72)):
-        assert Decimal(share) ** (least - 1) > Decimal("0.025") >= Decimal(share) ** least
-        for size in (least - 1, least):
+def test_the_min_fixed_number_of_runs_that_decides() -> None:
+    for share, minimum in (("0.99", 368), ("0.95", 72)):
+        assert Decimal(share) ** (minimum - 1) > Decimal("0.025") >= Decimal(share) ** minimum
+        for size in (minimum - 1, minimum):
             fewest_met, _ = critical_counts(size, float(share), watched=False)
-            assert (int(fewest_met[0]) <= size) is (size == least)
+            assert (int(fewest_met[0]) <= size) is (size == minimum)
 
 
 def test_runs_needed_by_hand() -> None:
-    for exact, least in ((Fraction("0.99"), 535), (Fraction("0.95"), 105)):
-        assert exact_p_value(least - 1, least - 1, exact) > Fraction("0.025") >= exact_p_value(least, least, exact)
-        assert runs_needed(20, 20, float(exact)) == least
+    for exact, minimum in ((Fraction("0.99"), 535), (Fraction("0.95"), 105)):
+        assert (
+            exact_p_value(minimum - 1, minimum - 1, exact) > Fraction("0.025") >= exact_p_value(minimum, minimum, exact)
+        )
+        assert runs_needed(20, 20, float(exact)) == minimum
     assert runs_needed(19, 20, 0.95) is None
     # The number is that of --until decided, by which the runs are added.
     for watched in (True, False):

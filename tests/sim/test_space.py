@@ -204,8 +204,8 @@ def test_the_diagonal_is_a_planar_engagement_times_root_two(noise: NoiseKind, as
     stronger = replace(
         thruster,
         budget_m_s=thruster.budget_m_s * root,
-        least_impulse_m_s=thruster.least_impulse_m_s * root,
-        greatest_impulse_m_s=thruster.greatest_impulse_m_s * root,
+        min_impulse_m_s=thruster.min_impulse_m_s * root,
+        max_impulse_m_s=thruster.max_impulse_m_s * root,
     )
     spatial = replace(in_space(planar), thruster=stronger)
     draws = draw(planar, range(20), 1)
@@ -270,12 +270,12 @@ def test_the_engine_is_limited_jointly(asteroid: Scenario) -> None:
     sizes = np.stack([modulus(np.where(step.tracking, step.impulse_m_s, 0.0)) for step in steps])
     engine = scenario.thruster
     fired = sizes > 0.0
-    assert (sizes[fired] >= engine.least_impulse_m_s).all()
-    assert (sizes <= engine.greatest_impulse_m_s).all()
+    assert (sizes[fired] >= engine.min_impulse_m_s).all()
+    assert (sizes <= engine.max_impulse_m_s).all()
     assert (sizes.sum(axis=0) <= engine.budget_m_s * (1.0 + 1e-12)).all()
     np.testing.assert_allclose(results.impulse_m_s, sizes.sum(axis=0), rtol=1e-12)
     # The limit binds: otherwise this tests nothing.
-    assert (sizes == engine.greatest_impulse_m_s).any()
+    assert (sizes == engine.max_impulse_m_s).any()
 
 
 def extremal(scenario: Scenario, runs: int, seed: int) -> tuple[Draws, ScriptedNoise]:

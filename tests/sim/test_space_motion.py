@@ -12,7 +12,7 @@ from infoset import Convention, ErrorShape, Model, SetModel
 from infoset.arrays import Floats
 from sim import Manoeuvre, Scenario, Sun, Target, simulate
 from sim.draws import Draws, Y, corners, draw, generator, in_disc
-from sim.gravity import greatest_impulses_m_s, on_board_model, with_gravity
+from sim.gravity import max_impulses_m_s, on_board_model, with_gravity
 from sim.kepler import SPACECRAFT, KeplerMotion, sun_and_orbit
 from sim.target import acceleration_m_s2
 from tests.space import in_space
@@ -177,19 +177,19 @@ def test_the_closest_approach_has_its_position_across() -> None:
     *before, passage = (motion.advance(0.5) for _ in range(4))
     assert passage.passed[0]
     assert passage.lateral_m.tolist() == [[30.0], [-40.0]]
-    assert passage.least_distance_m[0] == pytest.approx(50.0, rel=1e-12)
+    assert passage.min_distance_m[0] == pytest.approx(50.0, rel=1e-12)
     assert not any(other.passed[0] or other.lateral_m.any() for other in before)
 
 
 def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
     """The true difference of gravity at 10 000 points of the box, for any direction of the Sun."""
     box = spatial.set_model.bounds
-    impulses = greatest_impulses_m_s(spatial.set_model, spatial.thruster)
-    # The least distance from the Sun, and thereby the bound, depends on its direction by less than 1e-4.
+    impulses = max_impulses_m_s(spatial.set_model, spatial.thruster)
+    # The minimum distance from the Sun, and thereby the bound, depends on its direction by less than 1e-4.
     model = with_gravity(spatial.set_model, replace(SUN, direction_rad=0.0), impulses)
-    least, greatest = corners(box)
+    minimum, maximum = corners(box)
     random = np.random.default_rng(6)
-    states = least + (greatest - least) * random.uniform(size=(10_000, 6))
+    states = minimum + (maximum - minimum) * random.uniform(size=(10_000, 6))
     moment = random.uniform(size=(10_000, 1)) * states[:, 2:3] / -states[:, 5:]
     place = (states[:, :3] + moment * states[:, 3:]).astype(np.longdouble)
     place[:, :2] += impulses * moment * random.uniform(-1.0, 1.0, (10_000, 2)) / np.sqrt(2.0)
@@ -212,7 +212,7 @@ def test_the_acceleration_of_the_scaled_motion_is_within_its_bound(wide: float, 
     start = spatial.set_model.bounds
     box = replace(start, y_m=(-1e4 * wide, 1e4 * wide), vy_m_s=(-100.0 * wide, 100.0 * wide))
     quiet = replace(spatial.set_model, bounds=box, model=Model.GUARANTEED, disturbance_m_s2=0.0)
-    least, greatest = corners(box)
+    minimum, maximum = corners(box)
     random, worst, speed = np.random.default_rng(12), np.zeros(2), quiet.closing_speed_m_s
     for number in range(12):
         diagonal = (0.25 * np.pi * random.choice([-3, -1, 1, 3]), 0.0)
@@ -220,7 +220,7 @@ def test_the_acceleration_of_the_scaled_motion_is_within_its_bound(wide: float, 
         direction, elevation = anywhere if number % 3 else diagonal
         sun = replace(SUN, direction_rad=direction, elevation_rad=elevation)
         share = random.uniform(size=(40, 6))
-        states = least + (greatest - least) * np.where(random.uniform(size=(40, 6)) < 0.5, share.round(), share)
+        states = minimum + (maximum - minimum) * np.where(random.uniform(size=(40, 6)) < 0.5, share.round(), share)
         motion = KeplerMotion(states[:, :3], states[:, 3:], sun)
         arrival_s, scaled = motion.arrival_s(), []
         for second in range(80):
@@ -290,9 +290,9 @@ def test_the_z_axis_has_the_random_numbers_of_the_plane(ranging: Scenario) -> No
     assert (both.steps, both.errors["angle"].shape) == (one.steps, (2, *one.errors["angle"].shape))
     y = spatial.dispersion.axis("y")
     lateral = np.stack([both.position_m[:, 0], both.velocity_m_s[:, 0]], axis=1)
-    least, greatest = np.transpose([y.z_m, y.vz_m_s])
+    minimum, maximum = np.transpose([y.z_m, y.vz_m_s])
     fresh = np.stack([generator(8, run, Y).uniform(size=2) for run in range(3)])
-    np.testing.assert_array_equal(lateral, least + (greatest - least) * fresh)
+    np.testing.assert_array_equal(lateral, minimum + (maximum - minimum) * fresh)
 
 
 @pytest.mark.parametrize(("convention", "shape"), [(Convention.PLANE, ErrorShape.DISC), (Convention.CONE, None)])

@@ -54,7 +54,7 @@ def test_no_distribution_of_nothing(sample: list[float]) -> None:
 def test_order_statistics_are_the_textbooks() -> None:
     # The median of 10 values: the second and the ninth hold it with probability 1 - 22/1024 = 0.9785.
     assert order_statistics(10, 0.5, 0.95) == (2, 9)
-    # Of n values the greatest exceeds the 99 % quantile with probability 1 - 0.99^n: 0.975 from n = 368 on.
+    # Of n values the maximum exceeds the 99 % quantile with probability 1 - 0.99^n: 0.975 from n = 368 on.
     assert order_statistics(367, 0.99, 0.95)[1] == 368
     assert order_statistics(368, 0.99, 0.95)[1] == 368
 
@@ -90,9 +90,9 @@ def test_quantiles_of_a_small_sample_have_open_ends() -> None:
     assert (median.value, median.lower, median.upper, median.width) == (2.0, None, None, None)
     assert (high.upper, high.width) == (None, None)
     assert high.value == quantiles([3.0, 1.0, 2.0], 0.99)
-    least, greatest = estimate_quantiles(np.arange(100.0), [0.0, 1.0])
-    assert (least.value, least.lower, least.upper) == (0.0, None, 0.0)
-    assert (greatest.value, greatest.lower, greatest.upper) == (99.0, 99.0, None)
+    minimum, maximum = estimate_quantiles(np.arange(100.0), [0.0, 1.0])
+    assert (minimum.value, minimum.lower, minimum.upper) == (0.0, None, 0.0)
+    assert (maximum.value, maximum.lower, maximum.upper) == (99.0, 99.0, None)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from infoset.arrays import Floats
-from infoset.limits import LARGEST, SMALLEST
+from infoset.limits import MAXIMUM, MINIMUM
 from sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
 from sim.requirement import HitRequirement, parse_requirement
 from sim.statistics import level_name
@@ -34,9 +34,9 @@ def test_rules_are_read_and_written() -> None:
 
 
 @given(
-    level=st.floats(SMALLEST, 1.0, exclude_max=True)
+    level=st.floats(MINIMUM, 1.0, exclude_max=True)
     | st.decimals("0.01", "99.99", places=2).map(lambda p: float(p / 100)),
-    number=st.floats(SMALLEST, LARGEST) | st.floats(1e-9, 1e9),
+    number=st.floats(MINIMUM, MAXIMUM) | st.floats(1e-9, 1e9),
 )
 def test_the_texts_of_rules_and_requirements_are_exact(level: float, number: float) -> None:
     # A manifest stores these texts.

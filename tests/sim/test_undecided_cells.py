@@ -58,7 +58,7 @@ def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Sweep:
     axis = Axis("angle_sensor.error_at_zero_range_rad", ERRORS)
     folder = tmp_path_factory.mktemp("undecided") / "sweep"
     return Sweep(
-        brief, (axis,), cells, 16, folder, seed=3, chunk=16, noise=CampaignNoise.MIXED, until=REQUIRED, most_runs=160
+        brief, (axis,), cells, 16, folder, seed=3, chunk=16, noise=CampaignNoise.MIXED, until=REQUIRED, max_runs=160
     )
 
 
@@ -94,7 +94,7 @@ def test_cells_stop_when_they_are_decided(flown: CampaignFolder) -> None:
 
 
 def test_the_runs_of_a_cell_are_those_of_a_longer_sweep(asked: Sweep, flown: CampaignFolder, tmp_path: Path) -> None:
-    whole = replace(asked, runs=160, until=None, most_runs=None, folder=tmp_path / "whole").run().folder
+    whole = replace(asked, runs=160, until=None, max_runs=None, folder=tmp_path / "whole").run().folder
     for cell, size in enumerate(flown.manifest.cell_runs):
         assert flown.table(None, cell).equals(whole.table(None, cell).slice(0, size))
 
@@ -126,7 +126,7 @@ def test_a_sweep_of_fixed_runs_is_continued_until_it_is_decided(
 ) -> None:
     for runs in (16, 10):
         folder = tmp_path / f"{runs}"
-        fixed = replace(asked, runs=runs, until=None, most_runs=None, folder=folder).run()
+        fixed = replace(asked, runs=runs, until=None, max_runs=None, folder=folder).run()
         assert len(fixed) == runs * len(ERRORS)
         replace(asked, folder=folder).run(resume=True)
         assert names(folder) == names(asked.folder)
@@ -154,8 +154,8 @@ def test_a_damaged_shard_is_simulated_again(asked: Sweep, flown: CampaignFolder,
 
 
 def test_what_does_not_fit_together(asked: Sweep) -> None:
-    with pytest.raises(ValueError, match="most_runs must be at least 16"):
-        replace(asked, most_runs=15)
+    with pytest.raises(ValueError, match="max_runs must be at least 16"):
+        replace(asked, max_runs=15)
     with pytest.raises(ValueError, match="a stopping rule of a campaign, or a requirement of a sweep"):
         replace(asked, until=StoppingRule(REQUIRED.quantile, 1.0))
     with pytest.raises(ValueError, match="cell_runs must contain 4 numbers"):

@@ -40,7 +40,7 @@ function truthAt(record, { step, stage }) {
 const DURATIONS = [["d", 86400], ["h", 3600], ["min", 60], ["s", 1]];
 const TICKS_S = [864000, 86400, 21600, 3600, 600, 60, 10, 1, 0.1];
 
-/** A time in the greatest unit of which it has exactly one or at least two. */
+/** A time in the maximum unit of which it has exactly one or at least two. */
 function durationText(seconds) {
   const [name, unit] = DURATIONS.find(([, size]) => seconds === size || seconds >= 2 * size) ?? ["s", 1];
   return shown(seconds / unit, name, 3);
@@ -48,7 +48,7 @@ function durationText(seconds) {
 
 /** The position of a time on a time axis: linear, or logarithmic in the time before the nominal arrival. */
 function timePlace(record, time) {
-  return DATA.counts_down ? -Math.log10(Math.max(record.arrival_s - time, record.least_to_go_s)) : time;
+  return DATA.counts_down ? -Math.log10(Math.max(record.arrival_s - time, record.min_to_go_s)) : time;
 }
 for (const record of DATA.records) record.places = record.time_s.map((time) => timePlace(record, time));
 
@@ -111,7 +111,7 @@ class Column {
         ["true state and its range", mark("cross", "ink")],
         ...(this.record.range_error_relative === null
           ? []
-          : [["ranges allowed by the range meter", stroke("measured", { dash: [5, 3] })]]),
+          : [["ranges allowed by the range sensor", stroke("measured", { dash: [5, 3] })]]),
       ],
       draw: () => this.drawScene(),
       tell: (x, y) => this.tellScene(x, y),
@@ -253,7 +253,7 @@ class Column {
 
   drawImpulses() {
     const { impulses, record } = this;
-    const limit = record.greatest_impulse_m_s;
+    const limit = record.max_impulse_m_s;
     const shownTo = impulseSpan(record);
     impulses.begin({ ...timeAxis(), y: [-1.15 * shownTo, 1.15 * shownTo], yTitle: `k${this.along}, m/s` });
     drawMarks(impulses, record);
@@ -358,8 +358,8 @@ class Column {
   }
 }
 
-/** Greatest number of impulses that have a dot at their end. */
-const MOST_DOTS = 60;
+/** Maximum number of impulses that have a dot at their end. */
+const MAX_DOTS = 60;
 
 /** All impulses of the flight as lines from zero; those after the present step are pale. */
 function drawStems(chart, record, impulses, step) {
@@ -368,14 +368,14 @@ function drawStems(chart, record, impulses, step) {
     if (impulse === 0) return;
     const look = { stroke: record.fired_s[index] <= record.time_s[step] ? theme.colours.impulse : theme.colours.grid, width: 1.6 };
     chart.curve([[places[index], 0], [places[index], impulse]], look);
-    if (impulses.length <= MOST_DOTS) chart.point(places[index], impulse, "dot", look.stroke, 2);
+    if (impulses.length <= MAX_DOTS) chart.point(places[index], impulse, "dot", look.stroke, 2);
   });
 }
 
-/** The greatest impulse of an axis: the limit of the engine, unless all impulses are much smaller. */
-function impulseSpan({ fired_modulus_m_s: moduli, greatest_impulse_m_s: limit }) {
-  const greatest = Math.max(0, ...moduli);
-  return greatest > 0 && greatest < 0.2 * limit ? greatest : limit;
+/** The maximum impulse of an axis: the limit of the engine, unless all impulses are much smaller. */
+function impulseSpan({ fired_modulus_m_s: moduli, max_impulse_m_s: limit }) {
+  const maximum = Math.max(0, ...moduli);
+  return maximum > 0 && maximum < 0.2 * limit ? maximum : limit;
 }
 
 /** The line of the present time; ends the drawing of a chart over time. */
@@ -465,17 +465,17 @@ class Engagement {
 
   /** The possible miss of the set, that after an impulse that centres it, and that of the true state. */
   drawCorridor(chart) {
-    const { record, step, corridor: { greatest, centred, truth } } = this;
+    const { record, step, corridor: { maximum, centred, truth } } = this;
     const levels = [record.guaranteed_miss_m, record.theorem_8_miss_m, record.radius_m].filter((level) => level);
-    const values = [...greatest, ...truth, ...levels].filter((value) => value);
+    const values = [...maximum, ...truth, ...levels].filter((value) => value);
     const floor = Math.max(Math.min(...values, ...centred.filter((value) => value)), 1e-3 * Math.min(...levels, ...centred.filter((value) => value)), 1e-3);
     chart.begin({ ...timeAxis(), y: [0.5 * floor, 2 * Math.max(...values, floor)], yTitle: "miss, m", yScale: LOGARITHMIC });
     const at = (course, last) => course.map((value, index) => [record.places[index], value]).slice(0, last).filter(([, value]) => value !== null);
-    for (const [last, opacity] of [[greatest.length, 0.12], [step + 1, 0.35]]) {
-      const upper = at(greatest, last);
+    for (const [last, opacity] of [[maximum.length, 0.12], [step + 1, 0.35]]) {
+      const upper = at(maximum, last);
       chart.area(upper.map(([place]) => [place, 0.1 * floor]), upper, { fill: theme.colours.set, opacity });
     }
-    chart.curve(at(greatest), { stroke: theme.colours.set, width: 1.3 });
+    chart.curve(at(maximum), { stroke: theme.colours.set, width: 1.3 });
     chart.curve(at(centred), { stroke: theme.colours.set, width: 1.3, dash: [6, 3] });
     chart.curve(at(truth), { stroke: theme.colours.ink, width: 1.2 });
     if (record.guaranteed_miss_m !== null) chart.level(record.guaranteed_miss_m, { stroke: theme.colours.extra, width: 1.6, dash: [8, 3] });
@@ -487,10 +487,10 @@ class Engagement {
   }
 
   corridorLines(step) {
-    const { record, corridor: { greatest, centred, truth } } = this;
+    const { record, corridor: { maximum, centred, truth } } = this;
     return [
       timeText(record, record.time_s[step]),
-      `possible miss ${shown(greatest[step], "m")}`,
+      `possible miss ${shown(maximum[step], "m")}`,
       `after an impulse that centres the set ${shown(centred[step], "m")}`,
       `true predicted miss ${shown(truth[step], "m")}`,
     ];
@@ -498,7 +498,7 @@ class Engagement {
 
   drawModulus(chart) {
     const { record } = this;
-    const limit = record.greatest_impulse_m_s;
+    const limit = record.max_impulse_m_s;
     chart.begin({ ...timeAxis(), y: [0, 1.15 * impulseSpan(record)], yTitle: "|k|, m/s" });
     drawMarks(chart, record);
     chart.level(limit, { stroke: theme.colours.line, width: 1, dash: [5, 3] });
@@ -574,7 +574,7 @@ function levelled(columns) {
   };
 }
 
-/** Over the steps: the greatest possible miss, that after an impulse that centres the set, and that of the true state, m. */
+/** Over the steps: the maximum possible miss, that after an impulse that centres the set, and that of the true state, m. */
 function corridorOf(columns) {
   const across = (values) => (values.includes(null) ? null : Math.hypot(...values));
   const course = (of) => columns[0].record.time_s.map((_, step) => across(columns.map(({ record }) => of(record, step))));
@@ -582,7 +582,7 @@ function corridorOf(columns) {
   const interval = (of) => ({ predicted_miss_m: misses, complete_steps: last }, step) =>
     (step < last && misses[step] ? of(misses[step]) : null);
   return {
-    greatest: course(interval(([low, high]) => Math.max(Math.abs(low), Math.abs(high)))),
+    maximum: course(interval(([low, high]) => Math.max(Math.abs(low), Math.abs(high)))),
     centred: course(interval(([low, high]) => (high - low) / 2)),
     truth: course(({ true_predicted_miss_m: misses }, step) => misses[step]),
   };
@@ -592,8 +592,8 @@ const span = limitsOf(DATA.records.flatMap(({ places }) => places), 0.015);
 const spanTicks = TICKS_S.map((tick) => [-Math.log10(tick), durationText(tick)]).filter(([at]) => at >= span[0] && at <= span[1]);
 const missLimits = (() => {
   const ends = DATA.records.flatMap((record) => record.axes.flatMap((axis) => axis.predicted_miss_m.filter((each) => each).flat()));
-  const greatest = Math.max(10, ...ends.map(Math.abs));
-  return [-2 * greatest, 2 * greatest];
+  const maximum = Math.max(10, ...ends.map(Math.abs));
+  return [-2 * maximum, 2 * maximum];
 })();
 
 const main = document.getElementById("main");

@@ -26,8 +26,8 @@ class Projection {
     this.truth = record.true_range_m.map((range, step) =>
       (range * tangent(record, step)) / Math.sqrt(1 + record.axes.reduce((sum, each) => sum + tangent(each, step) ** 2, 0)));
     this.extents = column.sets.extents();
-    const greatest = Math.max(10, ...this.truth.map(Math.abs), ...this.extents.flatMap((ends) => (ends ? ends.map(Math.abs) : [])));
-    this.limits = [-2 * greatest, 2 * greatest];
+    const maximum = Math.max(10, ...this.truth.map(Math.abs), ...this.extents.flatMap((ends) => (ends ? ends.map(Math.abs) : [])));
+    this.limits = [-2 * maximum, 2 * maximum];
   }
 
   draw() {

@@ -26,7 +26,7 @@ class Sets {
     }
   }
 
-  /** The least and the greatest lateral coordinate alpha x of the measured set of each step, m; null without sections. */
+  /** The minimum and the maximum lateral coordinate alpha x of the measured set of each step, m; null without sections. */
   extents() {
     return Array.from({ length: this.states.length / 3 }, (_, step) => {
       const state = this.states[3 * step + 1];

@@ -29,7 +29,7 @@ _SECOND_MM = 58.0
 
 def animate(
     records: Sequence[Record],
-    most_frames: int = 40,
+    max_frames: int = 40,
     width_px: int | None = None,
     progress: Callable[[float], None] = lambda _done: None,
 ) -> bytes:
@@ -39,8 +39,8 @@ def animate(
     is 425 pixels, or 640 for two records.
     """
     clock = Clock.of(records)
-    chosen = _frame_times(records, clock, most_frames)
-    fps = max(1, round(most_frames / DURATION_S))
+    chosen = _frame_times(records, clock, max_frames)
+    fps = max(1, round(max_frames / DURATION_S))
     writer = PillowWriter(fps=fps)
     traces = traces_of(records)
     in_space = any(record.scenario.is_spatial for record in records)

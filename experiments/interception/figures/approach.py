@@ -30,8 +30,8 @@ from experiments.interception.course import (
     TICKS_S,
     Clock,
     duration_text,
-    least_to_go_s,
     marks,
+    min_to_go_s,
     outcome_title,
     possible_misses,
     record_titles,
@@ -41,7 +41,7 @@ from experiments.interception.figures.b_plane import GUARANTEE_LOOK, RADIUS_SHOW
 from experiments.interception.figures.distributions import RADIUS_LOOK
 from sim import Record, Scenario
 
-MOST_VECTORS = 2000
+MAX_VECTORS = 2000
 """Number of points above which they are pixels in the PDF file."""
 
 _SIDE_MM, _IMPULSES_MM, _GAP_MM = 62.0, 17.0, 3.0
@@ -61,15 +61,15 @@ _END_LOOK: dict[str, Any] = {
     "linestyle": "none",
 }
 _LOGARITHMIC_FROM = 10.0
-"""Ratio of the greatest and the least impulse above which their axis is logarithmic."""
-_LEAST_SHOWN = 1e-3
-"""Least miss of a logarithmic axis, as a multiple of the least possible miss."""
+"""Ratio of the maximum and the minimum impulse above which their axis is logarithmic."""
+_MIN_SHOWN = 1e-3
+"""Minimum miss of a logarithmic axis, as a multiple of the minimum possible miss."""
 
 
 def draw_approach(records: Sequence[Record]) -> Figure:
     """Draw possible misses and impulses against the time before the nominal arrival, and in space the B-plane.
 
-    Each record has a row. The possible miss is the greatest distance of a point of the box of predicted misses, which
+    Each record has a row. The possible miss is the maximum distance of a point of the box of predicted misses, which
     contains those of all sections. After an impulse that centres the box it is half the diagonal of the box. Both end
     when the first section leaves at the range threshold.
     """
@@ -108,7 +108,7 @@ def draw_approach(records: Sequence[Record]) -> Figure:
 
 def count_down(axes: Axes, scenario: Scenario) -> None:
     """Make the time axis logarithmic in the time before the arrival, and draw the times of the schedule."""
-    begin, end = scenario.nominal_arrival_s, least_to_go_s(scenario)
+    begin, end = scenario.nominal_arrival_s, min_to_go_s(scenario)
     axes.set_xscale("log")
     axes.set_xlim(1.1 * begin, end)
     decade_mm = width_mm(axes) / np.log10(1.1 * begin / end)
@@ -155,17 +155,17 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     clock = Clock(counts_down=True)
     known, misses = possible_misses(record)
     times = clock.at(record)
-    greatest = np.hypot.reduce([np.abs(interval).max(axis=1) for interval in misses.values()])
+    maximum = np.hypot.reduce([np.abs(interval).max(axis=1) for interval in misses.values()])
     centred = np.hypot.reduce([0.5 * (interval[:, 1] - interval[:, 0]) for interval in misses.values()])
     true = np.hypot.reduce(np.abs([*true_predicted_misses(record).values()]))
     levels = _levels(record)
-    shown = np.concatenate([greatest, centred, true, [*levels.values()]])
+    shown = np.concatenate([maximum, centred, true, [*levels.values()]])
     top = float(shown.max())
-    bottom = max(float(shown.min()), _LEAST_SHOWN * float(min([*centred, top])), 1e-6)
+    bottom = max(float(shown.min()), _MIN_SHOWN * float(min([*centred, top])), 1e-6)
     axes.set_yscale("log")
     axes.set_ylim(0.5 * bottom, 2.0 * top)
-    axes.fill_between(times[known], np.full(len(known), 1e-9), greatest, color=SET_FILL, linewidth=0.0)
-    axes.plot(times[known], greatest, color=SET_EDGE, linewidth=1.2, label="_possible")
+    axes.fill_between(times[known], np.full(len(known), 1e-9), maximum, color=SET_FILL, linewidth=0.0)
+    axes.plot(times[known], maximum, color=SET_EDGE, linewidth=1.2, label="_possible")
     axes.plot(times[known], centred, label="_centred", **_CENTRED_LOOK)
     axes.plot(times, true, label="_true", **_TRUE_LOOK)
     for name, value in levels.items():
@@ -185,7 +185,7 @@ def _levels(record: Record) -> dict[str, float]:
 def _draw_moduli(axes: Axes, record: Record) -> None:
     moduli = np.abs([step.impulse_m_s for step in record.steps])
     times, given = Clock(counts_down=True).at(record), moduli > 0.0
-    many = given.sum() > MOST_VECTORS
+    many = given.sum() > MAX_VECTORS
     axes.vlines(times[given], 1e-9, moduli[given], color=IMPULSE, linewidth=0.9, rasterized=many)
     axes.plot(times[given], moduli[given], ".", color=IMPULSE, markersize=3.0, markeredgewidth=0.0, rasterized=many)
     if given.any() and moduli.max() > _LOGARITHMIC_FROM * moduli[given].min():

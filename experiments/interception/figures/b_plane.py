@@ -22,14 +22,14 @@ from infoset.arrays import Floats
 from sim import Results
 from sim.statistics import shows
 
-_MOST_COLUMNS = 3
+_MAX_COLUMNS = 3
 _WIDEST_MM = 62.0
-"""Greatest side of a panel, mm."""
+"""Maximum side of a panel, mm."""
 _LEFT_MM, _RIGHT_MM = 17.0, 5.0
 _OWN_LIMITS_FROM = 3.0
-"""Ratio of the greatest and the least median above which each panel has its own limits."""
+"""Ratio of the maximum and the minimum median above which each panel has its own limits."""
 RADIUS_SHOWN = 5.0
-"""The axes extend to the radius of the body if it is at most this multiple of the greatest miss shown."""
+"""The axes extend to the radius of the body if it is at most this multiple of the maximum miss shown."""
 _VECTOR_POINTS = 2000
 """Number of points of a panel above which they are pixels in the PDF file."""
 
@@ -61,7 +61,7 @@ class Cloud:
     miss_m : ndarray, shape (N,)
         Distances at the closest approach, m.
     guaranteed_m : float or None
-        Greatest guaranteed miss of the runs, m; None if a run has no guarantee.
+        Maximum guaranteed miss of the runs, m; None if a run has no guarantee.
     """
 
     title: str
@@ -78,13 +78,13 @@ def cloud(title: str, samples: Sequence[Results]) -> Cloud:
     bounds = [
         float(bound) for results in samples if results.guarantees for bound in results.guaranteed_miss_m.filled(np.inf)
     ]
-    return Cloud(title, across[worst, runs], misses[worst, runs], greatest_guarantee(bounds))
+    return Cloud(title, across[worst, runs], misses[worst, runs], max_guarantee(bounds))
 
 
-def greatest_guarantee(bounds_m: Sequence[float]) -> float | None:
-    """Return the greatest of the guaranteed misses of runs; infinity stands for a run without a guarantee."""
-    greatest = max(bounds_m, default=np.inf)
-    return greatest if np.isfinite(greatest) else None
+def max_guarantee(bounds_m: Sequence[float]) -> float | None:
+    """Return the maximum of the guaranteed misses of runs; infinity stands for a run without a guarantee."""
+    maximum = max(bounds_m, default=np.inf)
+    return maximum if np.isfinite(maximum) else None
 
 
 def ellipse(across_m: Floats, level: float) -> tuple[Floats, Floats, float] | None:
@@ -108,14 +108,14 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     """Draw the miss of each run as a point in the plane across the approach, one panel for each cloud.
 
     Ellipses contain 50 % and 99 % of the runs. The radii of the circles are the median and the 90 % quantile of the
-    miss, and the greatest guaranteed miss. All panels have the same limits, unless the median misses differ much. The
+    miss, and the maximum guaranteed miss. All panels have the same limits, unless the median misses differ much. The
     radius of the body, m, is drawn as a disc.
     """
     if not clouds:
         raise ValueError("at least one cloud is needed")
     medians = [float(np.median(each.miss_m)) for each in clouds]
     alone = max(medians) > _OWN_LIMITS_FROM * min(medians)
-    columns = min(_MOST_COLUMNS, len(clouds))
+    columns = min(_MAX_COLUMNS, len(clouds))
     rows = -(-len(clouds) // columns)
     gap = 11.0 if alone else 6.0
     side = min(_WIDEST_MM, (WIDTH_MM - _LEFT_MM - _RIGHT_MM - gap * (columns - 1)) / columns)
@@ -133,7 +133,7 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     for index, (axes, each, half) in enumerate(zip(panels, clouds, halves, strict=True)):
         quantiles = _draw_cloud(axes, each, half, radius_m)
         if guaranteed:
-            bound = "no guarantee" if each.guaranteed_m is None else f"greatest Φ: {number(each.guaranteed_m)} m"
+            bound = "no guarantee" if each.guaranteed_m is None else f"maximum Φ: {number(each.guaranteed_m)} m"
             quantiles += f"\n{bound}"
         letter = f"({ascii_lowercase[index]}) " if 1 < len(clouds) <= len(ascii_lowercase) else ""
         axes.set_title(f"{letter}{plain(each.title)}\n{quantiles}", linespacing=1.3, pad=4.0)
@@ -148,9 +148,9 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
 
 def _half_width(clouds: Sequence[Cloud], radius_m: float | None) -> float:
     """Return half the length of the axes: the misses and, if not much greater, the radius of the body and Φ."""
-    greatest = axis_limit([each.miss_m for each in clouds]) or 1.0
+    maximum = axis_limit([each.miss_m for each in clouds]) or 1.0
     sizes = [size for size in (radius_m, *(each.guaranteed_m for each in clouds)) if size is not None]
-    return 1.08 * max([greatest, *(size for size in sizes if size <= RADIUS_SHOWN * greatest)])
+    return 1.08 * max([maximum, *(size for size in sizes if size <= RADIUS_SHOWN * maximum)])
 
 
 def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> str:
@@ -223,7 +223,7 @@ def _handles(clouds: Sequence[Cloud], radius_m: float | None, halves: Sequence[f
     ]
     if within:
         where = "" if all(within) else ", if within the axes" if any(within) else ": beyond the axes"
-        label = f"circle: guaranteed miss Φ, greatest of the runs{where}"
+        label = f"circle: guaranteed miss Φ, maximum of the runs{where}"
         handles.append(Line2D([], [], label=label, **GUARANTEE_LOOK))
     if radius_m is not None:
         where = "a smaller miss is a hit" if radius_m <= max(halves) else "beyond the axes"

@@ -40,7 +40,7 @@ _ROWS_OF_NAME = 4
 _BETWEEN_MM = 17.0
 """Height of the title above a panel and of the labels below it."""
 _WIDE = 8.0
-"""Ratio of the greatest miss to the bound from which the axis of misses is logarithmic."""
+"""Ratio of the maximum miss to the bound from which the axis of misses is logarithmic."""
 _SECONDS_SHOWN = 3.0
 """Length of the time axis, in durations between the last equal measurement and the arrival."""
 
@@ -48,7 +48,7 @@ _SECONDS_SHOWN = 3.0
 def draw_bound(scenario: Scenario, lower: LowerBound, worst_m: Mapping[str, float] | None = None) -> Figure:
     """Draw the bound in one column: over the label, the true states that prove it, and the misses of strategies.
 
-    Panel (a) has one curve per closing speed, (b) the motions of the pair, (c) the greatest misses found, `worst_m`,
+    Panel (a) has one curve per closing speed, (b) the motions of the pair, (c) the maximum misses found, `worst_m`,
     m, by the name of the strategy; without them it is left out. The bound is the result of `sim.lower_bound` for this
     scenario. In space, (b) has the offset of the two states along the direction of their difference at x = 0. A bound
     by a single motion has its offset from the x axis.
@@ -93,8 +93,8 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
         # The bound ripples over the distance of one step: the largest value of each ripple, and its range.
         middles = np.array([0.5 * (labels[0] + labels[-1]) for labels, _ in stretches]) / 1e3
         most = np.array([bounds.max() for _, bounds in stretches])
-        least = np.array([bounds.min() for _, bounds in stretches])
-        axes.fill_between(middles, least, most, facecolor=look["color"], alpha=0.16, linewidth=0.0)
+        minimum = np.array([bounds.min() for _, bounds in stretches])
+        axes.fill_between(middles, minimum, most, facecolor=look["color"], alpha=0.16, linewidth=0.0)
         axes.plot(middles, most, label=name, markersize=3.0, **look)
     pair = lower.pair
     axes.plot(pair.label_m / 1e3, pair.bound_m, marker="*", markersize=9.0, color=INK, linestyle="none", zorder=5)
@@ -155,19 +155,19 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
 
 
 def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -> None:
-    """Draw the greatest misses found, the least at the top, against the bound."""
+    """Draw the maximum misses found, the minimum at the top, against the bound."""
     rows = sorted(worst_m.items(), key=lambda item: item[1])
-    greatest = max(bound_m, rows[-1][1])
+    maximum = max(bound_m, rows[-1][1])
     texts = [f"{name}, {number(miss_m)} m" for name, miss_m in rows]
     width_mm = _COLUMN_MM - _LEFT_MM - _RIGHT_MM
     # Each text must fit between its mark and the right side.
     places = [max(0.3, 0.97 - _MM_A_CHARACTER * len(text) / width_mm) for text in texts]
-    if bound_m > 0.0 and greatest > _WIDE * bound_m:
-        low = bound_m / (greatest / bound_m) ** 0.2
+    if bound_m > 0.0 and maximum > _WIDE * bound_m:
+        low = bound_m / (maximum / bound_m) ** 0.2
         high = max(low * (miss_m / low) ** (1.0 / place) for place, (_, miss_m) in zip(places, rows, strict=True))
         axes.set_xscale("log")
         ticks = [digit * 10.0**power for power in range(-3, 10) for digit in (1, 2, 5)]
-        axes.set_xticks([tick for tick in ticks if low < tick < 2.0 * greatest])
+        axes.set_xticks([tick for tick in ticks if low < tick < 2.0 * maximum])
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axes.xaxis.set_minor_locator(NullLocator())
     else:
@@ -185,12 +185,12 @@ def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -
     axes.set_yticks([])
     axes.set_xlim(low, high)
     axes.set_title("(c) strategies against the bound")
-    axes.set_xlabel("greatest miss found, m")
+    axes.set_xlabel("maximum miss found, m")
     separate_labels(axes)
 
 
 def _draw_equal_measurements(axes: Axes, scenario: Scenario, pair: TruthPair, shown: float) -> float:
-    """Draw the limits of the offset of each state with equal measurements; return the greatest one, m."""
+    """Draw the limits of the offset of each state with equal measurements; return the maximum one, m."""
     model = scenario.set_model
     end = pair.track_m[:, -1]
     direction = np.divide(end, np.linalg.norm(end), out=np.zeros_like(end), where=end != 0.0)

@@ -98,9 +98,9 @@ def _ends(everything: Floats, samples: Sequence[Floats], *, logarithmic: bool) -
     positive = everything[everything > 0.0]
     if not positive.size:
         return 0.1, 1.0
-    least = min(float(np.quantile(sample[sample > 0.0], 0.02)) for sample in samples if (sample > 0.0).any())
+    minimum = min(float(np.quantile(sample[sample > 0.0], 0.02)) for sample in samples if (sample > 0.0).any())
     right = 1.25 * float(positive.max())
-    return min(least, 0.1 * right), right
+    return min(minimum, 0.1 * right), right
 
 
 def _draw_strategy(axes: Axes, place: int, sample: Floats, ends: tuple[float, float], *, logarithmic: bool) -> None:

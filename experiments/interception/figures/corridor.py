@@ -19,14 +19,14 @@ from experiments.interception.curves import Curve
 from experiments.interception.figures.approach import MARK_LOOK, count_down_pair
 from experiments.interception.figures.b_plane import GUARANTEE_LOOK
 from experiments.interception.figures.distributions import RADIUS_LOOK
-from experiments.interception.study import greatest_guarantee_m
+from experiments.interception.study import max_guarantee_m
 from sim.statistics import shows
 
 _POSSIBLE_MM, _IMPULSES_MM, _GAP_MM, _BETWEEN_MM = 46.0, 19.0, 3.0, 21.0
 _DECADES = 4.0
-"""Greatest extent of the axis of impulses, decades."""
+"""Maximum extent of the axis of impulses, decades."""
 _MEDIAN: dict[str, Any] = {"color": TRUTH, "linewidth": 1.2}
-_GREATEST: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.0, "linestyle": (0, (4, 1.5))}
+_MAX: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.0, "linestyle": (0, (4, 1.5))}
 _IMPULSES: tuple[tuple[float, dict[str, Any]], ...] = (
     (0.9, {"color": "#d9a39e", "linewidth": 0.9}),
     (0.5, {"color": IMPULSE, "linewidth": 1.3}),
@@ -36,7 +36,7 @@ _IMPULSES: tuple[tuple[float, dict[str, Any]], ...] = (
 def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure:
     """Draw possible misses and impulses of each curve against the time before the nominal arrival.
 
-    The possible miss is the greatest without further impulses. Its quantiles are those of the runs that still have a
+    The possible miss is the maximum without further impulses. Its quantiles are those of the runs that still have a
     complete set (see `Courses`), and end when these are less than half of the runs. Quantiles for which the runs are
     too few are not drawn.
     """
@@ -55,7 +55,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
             below = figure.add_axes((left, foot, width, height * _IMPULSES_MM / tall))
             _draw_possible(axes, curve, course)
             _draw_impulses(below, course)
-            meter = f", {'' if curve.range_meter else 'no '}range meter" if len(curves) > 2 else ""
+            meter = f", {'' if curve.range_sensor else 'no '}range sensor" if len(curves) > 2 else ""
             axes.set_title(f"({letter}) {curve.noise.value} noise{meter}, {some_runs(len(course.possible_m))}")
             count_down_pair(axes, below, course.scenario)
             axes.set_ylabel("possible miss, m")
@@ -70,17 +70,17 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
 
 
 def _draw_possible(axes: Axes, curve: Curve, course: Courses) -> None:
-    """Draw quantiles of the possible miss, the greatest guaranteed miss, and the radius of the body."""
+    """Draw quantiles of the possible miss, the maximum guaranteed miss, and the radius of the body."""
     shown = np.count_nonzero(~np.isnan(course.possible_m), axis=0) >= 0.5 * len(course.possible_m)
     times = course.before_arrival_s[shown]
     axes.set_yscale("log")
     if shown.any():
-        low, median, high, greatest = np.nanquantile(course.possible_m[:, shown], (0.1, 0.5, 0.9, 1.0), axis=0)
+        low, median, high, maximum = np.nanquantile(course.possible_m[:, shown], (0.1, 0.5, 0.9, 1.0), axis=0)
         if shows(len(course.possible_m), 0.9):
             axes.fill_between(times, low, high, color=SET_FILL, linewidth=0.0)
         axes.plot(times, median, **_MEDIAN)
-        axes.plot(times, greatest, **_GREATEST)
-    for value, look in ((greatest_guarantee_m(curve.results), GUARANTEE_LOOK), (course.scenario.radius_m, RADIUS_LOOK)):
+        axes.plot(times, maximum, **_MAX)
+    for value, look in ((max_guarantee_m(curve.results), GUARANTEE_LOOK), (course.scenario.radius_m, RADIUS_LOOK)):
         if value:
             axes.axhline(value, **look)
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
@@ -89,15 +89,15 @@ def _draw_possible(axes: Axes, curve: Curve, course: Courses) -> None:
 
 def _draw_impulses(axes: Axes, course: Courses) -> None:
     """Draw the 90 % quantile and the median of the impulses as bars."""
-    greatest = float(course.impulse_m_s.max()) or 1.0
-    least = float(course.impulse_m_s[course.impulse_m_s > 0.0].min(initial=greatest))
-    bottom = 0.5 * max(least, 10.0**-_DECADES * greatest)
+    maximum = float(course.impulse_m_s.max()) or 1.0
+    minimum = float(course.impulse_m_s[course.impulse_m_s > 0.0].min(initial=maximum))
+    bottom = 0.5 * max(minimum, 10.0**-_DECADES * maximum)
     for level, look in _shown_impulses(course):
         sizes = np.quantile(course.impulse_m_s, level, axis=0)
         given = sizes > bottom
         axes.vlines(course.before_arrival_s[given], 1e-12, sizes[given], **look)
     axes.set_yscale("log")
-    axes.set_ylim(bottom, 2.0 * greatest)
+    axes.set_ylim(bottom, 2.0 * maximum)
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_minor_formatter(NullFormatter())
 
@@ -109,14 +109,14 @@ def _shown_impulses(course: Courses) -> list[tuple[float, dict[str, Any]]]:
 def _handles(curves: Sequence[Curve], course: Courses) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
         Line2D([], [], label="possible miss: median", **_MEDIAN),
-        Line2D([], [], label="possible miss: greatest", **_GREATEST),
+        Line2D([], [], label="possible miss: maximum", **_MAX),
     ]
     if shows(len(course.possible_m), 0.9):
         handles.insert(1, Patch(facecolor=SET_FILL, label="possible miss: 10 to 90 %"))
     for level, look in _shown_impulses(course):
         handles.append(Line2D([], [], label=f"impulse: {'median' if level == 0.5 else '90 %'}", **look))
-    if any(greatest_guarantee_m(curve.results) for curve in curves):
-        handles.append(Line2D([], [], label="greatest guaranteed miss Φ", **GUARANTEE_LOOK))
+    if any(max_guarantee_m(curve.results) for curve in curves):
+        handles.append(Line2D([], [], label="maximum guaranteed miss Φ", **GUARANTEE_LOOK))
     if course.scenario.radius_m is not None:
         handles.append(Line2D([], [], label=f"body radius, {course.scenario.radius_m:g} m", **RADIUS_LOOK))
     if marks(course.scenario):

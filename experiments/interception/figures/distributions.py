@@ -27,7 +27,7 @@ _LEVELS = np.linspace(0.15, 0.85, 29)
 _INSIDE = 0.05, 0.95
 """Horizontal range of curve numbers, as shares of the axes."""
 
-MOST_POINTS = 2000
+MAX_POINTS = 2000
 """Most points of a curve; more would only make the file larger."""
 _NUMBER_LOOK: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "fontweight": "bold", "zorder": 5}
 _NUMBER_BOX: dict[str, Any] = {"boxstyle": "circle,pad=0.18", "facecolor": "white", "linewidth": 0.8}
@@ -36,7 +36,7 @@ RADIUS_LOOK: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)),
 """Line of the radius of the body."""
 
 _LOGARITHMIC_FROM = 30.0
-_LEAST_SHOWN = 0.01
+_MIN_SHOWN = 0.01
 """Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
 
 
@@ -62,8 +62,8 @@ def draw_distributions(curves: Sequence[Curve], radius_m: float | None = None) -
 
 
 def _sample(curve: Curve) -> Sample:
-    meter = "with" if curve.range_meter else "no"
-    name = f"{curve.number}  {curve.noise.value} noise, {meter} range meter, {some_runs(len(curve.results))}"
+    meter = "with" if curve.range_sensor else "no"
+    name = f"{curve.number}  {curve.noise.value} noise, {meter} range sensor, {some_runs(len(curve.results))}"
     results = curve.results
     return Sample(name, CURVE_LOOKS[curve.number], results.miss_m, results.impulse_m_s, number=curve.number)
 
@@ -119,21 +119,21 @@ def draw_radius(axes: Axes, radius_m: float | None) -> list[Line2D]:
 def axis_limit(samples: Sequence[Floats]) -> float:
     """Return the end of an axis: beyond all values, or of all but a few very large ones.
 
-    It is the greatest value if that is at most twice the farthest upper fence (upper quartile and three times the
-    distance between the quartiles) of the samples, else the greatest value within half as much again as that fence.
+    It is the maximum value if that is at most twice the farthest upper fence (upper quartile and three times the
+    distance between the quartiles) of the samples, else the maximum value within half as much again as that fence.
     """
     quartiles = [np.quantile(sample, (0.25, 0.75)) for sample in samples]
     fence = max(float(upper + 3.0 * (upper - lower)) for lower, upper in quartiles)
-    greatest = max(float(sample.max()) for sample in samples)
-    if greatest <= 2.0 * fence:
-        return greatest
+    maximum = max(float(sample.max()) for sample in samples)
+    if maximum <= 2.0 * fence:
+        return maximum
     return max(float(sample[sample <= 1.5 * fence].max(initial=0.0)) for sample in samples)
 
 
 def decades_apart(samples: Sequence[Floats]) -> bool:
     """Whether samples differ so much that a linear axis would show some of them only at its end.
 
-    The greatest median is then more than thirty times the least, and the least is not zero.
+    The maximum median is then more than thirty times the minimum, and the minimum is not zero.
     """
     medians = [float(np.median(sample)) for sample in samples]
     return min(medians) > 0.0 and max(medians) > _LOGARITHMIC_FROM * min(medians)
@@ -145,15 +145,15 @@ def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tup
     Only an axis that starts at zero becomes logarithmic, where the samples are decades apart.
     """
     if from_zero and decades_apart(samples):
-        greatest = max(float(sample.max()) for sample in samples)
-        left = min(float(np.quantile(sample[sample > 0.0], _LEAST_SHOWN)) for sample in samples)
+        maximum = max(float(sample.max()) for sample in samples)
+        left = min(float(np.quantile(sample[sample > 0.0], _MIN_SHOWN)) for sample in samples)
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
-        left, right = 0.5 * left, 2.0 * greatest
+        left, right = 0.5 * left, 2.0 * maximum
     else:
-        least, limit = min(float(sample.min()) for sample in samples), axis_limit(samples)
-        left = 0.0 if from_zero else max(0.0, least - 0.08 * (limit - least))
+        minimum, limit = min(float(sample.min()) for sample in samples), axis_limit(samples)
+        left = 0.0 if from_zero else max(0.0, minimum - 0.08 * (limit - minimum))
         right = limit + (0.04 * (limit - left) or 0.5)
     axes.set_xlim(left, right)
     axes.set_ylim(-0.02, 1.02)
@@ -205,7 +205,7 @@ def _draw_curve(
 ) -> None:
     """Draw a distribution function; without a number, no confidence band."""
     every = empirical_distribution(sample)
-    kept = np.unique(np.linspace(0, sample.size - 1, min(sample.size, MOST_POINTS)).astype(np.int64))
+    kept = np.unique(np.linspace(0, sample.size - 1, min(sample.size, MAX_POINTS)).astype(np.int64))
     values, share = every.values[kept], every.probability[kept]
     if number is not None:
         draw_band(axes, values, every.lower[kept], every.upper[kept], look["color"], f"band {number}")

@@ -39,7 +39,7 @@ from experiments.interception.course import (
     record_titles,
     true_predicted_misses,
 )
-from experiments.interception.figures.approach import MARK_LOOK, MOST_VECTORS, count_down
+from experiments.interception.figures.approach import MARK_LOOK, MAX_VECTORS, count_down
 from infoset.arrays import Floats, Integers
 from sim import Record
 
@@ -47,18 +47,18 @@ ANGLE_RANGE_SHARE = 0.01
 RATE_RANGE_SHARE = 0.1
 """Share of the first range below which values do not set the limits: angle and rate grow as 1/x and 1/x^2."""
 FAR_SHARE = 0.3
-MOST_GROWTH = 1.0
+MAX_GROWTH = 1.0
 """Nearer values extend the limits by at most this multiple of the extent at ranges above `FAR_SHARE` of the first."""
 
 _ROWS = 4
 _LETTER_MM, _LINE_MM = 1.8, 4.0
 """Mean width of a letter, and height of a line of a title, mm."""
 
-_MOST_DECADES = 4
+_MAX_DECADES = 4
 """Number of decades up to which each decade has a label."""
 
 _SMALL_IMPULSES = 0.2
-"""Share of the greatest impulse: if no impulse is greater, the axis extends to the impulses."""
+"""Share of the maximum impulse: if no impulse is greater, the axis extends to the impulses."""
 
 _NARROW_MM = 50.0
 """Width of axes up to which notes are short, or have two lines."""
@@ -67,7 +67,7 @@ Trace = tuple[Record, str]
 """An engagement and one of its lateral axes."""
 
 _MODULUS = "#c9c9c9"
-_LEAST_RATE = 0.02
+_MIN_RATE = 0.02
 """Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be zero."""
 _BOUND_ALPHA = 0.18
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -158,7 +158,7 @@ def _draw_sight(
     if measured:
         measured_at, values = np.array(measured).T
         size = 6.0 if _marker(record) and sensor == "angle" else 3.0
-        look: dict[str, Any] = {"markersize": size, "rasterized": len(values) > MOST_VECTORS}
+        look: dict[str, Any] = {"markersize": size, "rasterized": len(values) > MAX_VECTORS}
         values = np.abs(values) if is_modulus else values
         axes.plot(measured_at, values * scale, ".", color=MEASURED, markeredgewidth=0.0, **look)
     true = np.abs(_course(trace, field)) if is_modulus else _course(trace, field)
@@ -181,27 +181,27 @@ def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
     times = clock.at(trace[0])[steps]
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     axes.fill_between(times, -bounds, bounds, color=MEASURED, alpha=_BOUND_ALPHA, linewidth=0.0)
-    look: dict[str, Any] = {"markersize": 3.0, "rasterized": len(steps) > MOST_VECTORS}
+    look: dict[str, Any] = {"markersize": 3.0, "rasterized": len(steps) > MAX_VECTORS}
     axes.plot(times, errors, ".", color=MEASURED, markeredgewidth=0.0, **look)
 
 
 def _level_angle_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
     """Give axes of angle errors the same limits: logarithmic beyond ten times the power of ten of the first bound."""
     bounds = [bounds for _, _, bounds in map(_angle_errors, traces) if len(bounds)]
-    greatest = max((float(each.max()) for each in bounds), default=1.0)
+    maximum = max((float(each.max()) for each in bounds), default=1.0)
     first = math.ceil(math.log10(max((float(each[0]) for each in bounds), default=1.0)))
-    if greatest > 10.0**first:
-        _bend(row, first, greatest)
+    if maximum > 10.0**first:
+        _bend(row, first, maximum)
         return
     for axes in row:
-        axes.set_ylim(-1.3 * greatest, 1.3 * greatest)
+        axes.set_ylim(-1.3 * maximum, 1.3 * maximum)
 
 
 def _level_moduli(row: Sequence[Axes], moduli: Floats) -> None:
     known = moduli[moduli > 0.0] if moduli.any() else np.ones(1)
     for axes in row:
         axes.set_yscale("log")
-        axes.set_ylim(0.5 * float(np.quantile(known, _LEAST_RATE)), 2.0 * float(known.max()))
+        axes.set_ylim(0.5 * float(np.quantile(known, _MIN_RATE)), 2.0 * float(known.max()))
         axes.yaxis.set_major_locator(LogLocator(numticks=7))
         axes.yaxis.set_minor_formatter(NullFormatter())
 
@@ -210,26 +210,26 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, span_m_s: float) -> No
     """Draw the impulses along an axis; in space, behind them, their moduli, all upward."""
     record, _ = trace
     times, impulses = clock.at(record), _course(trace, "impulse_m_s")
-    greatest = record.scenario.thruster.greatest_impulse_m_s
+    maximum = record.scenario.thruster.max_impulse_m_s
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
-    for limit in (-greatest, greatest):
+    for limit in (-maximum, maximum):
         axes.axhline(limit, color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
     wide = width_mm(axes) > _NARROW_MM
-    text = f"{'greatest impulse' if wide else 'limit'} ±{greatest:g} m/s"
+    text = f"{'maximum impulse' if wide else 'limit'} ±{maximum:g} m/s"
     place: dict[str, Any] = {"xytext": (0.0, 2.5), "textcoords": "offset points", "ha": "right", "va": "bottom"}
     axes.annotate(
-        text + (", beyond the axis" if wide and greatest > span_m_s else ""),
-        (0.985, min(greatest, 1.05 * span_m_s)),
+        text + (", beyond the axis" if wide and maximum > span_m_s else ""),
+        (0.985, min(maximum, 1.05 * span_m_s)),
         xycoords=axes.get_yaxis_transform(),
         path_effects=[withStroke(linewidth=2.0, foreground="white")],
         **place,
     )
     if record.scenario.is_spatial:
         moduli = np.array([step.impulse_m_s for step in record.steps])
-        many = np.count_nonzero(moduli) > MOST_VECTORS
+        many = np.count_nonzero(moduli) > MAX_VECTORS
         axes.vlines(times[moduli > 0.0], 0.0, moduli[moduli > 0.0], color=_MODULUS, linewidth=0.9, rasterized=many)
     given = impulses != 0.0
-    many = given.sum() > MOST_VECTORS
+    many = given.sum() > MAX_VECTORS
     axes.vlines(times[given], 0.0, impulses[given], color=IMPULSE, linewidth=0.9, rasterized=many)
     axes.plot(times[given], impulses[given], ".", color=IMPULSE, markersize=2.2, markeredgewidth=0.0)
 
@@ -247,18 +247,18 @@ def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
 
 
 def _level(row: Sequence[Axes], extents: Sequence[tuple[float, float]], scale: float) -> None:
-    least = min(extent[0] for extent in extents) * scale
-    greatest = max(extent[1] for extent in extents) * scale
-    margin = 0.12 * (greatest - least) or 0.1 * abs(greatest) or 1.0
+    minimum = min(extent[0] for extent in extents) * scale
+    maximum = max(extent[1] for extent in extents) * scale
+    margin = 0.12 * (maximum - minimum) or 0.1 * abs(maximum) or 1.0
     for axes in row:
-        axes.set_ylim(least - margin, greatest + 1.8 * margin)
+        axes.set_ylim(minimum - margin, maximum + 1.8 * margin)
 
 
 def _impulse_span_m_s(records: Sequence[Record]) -> float:
-    """Return the greatest impulse that the axis shows: the limit of the engine unless all are small."""
-    greatest = max(record.scenario.thruster.greatest_impulse_m_s for record in records)
+    """Return the maximum impulse that the axis shows: the limit of the engine unless all are small."""
+    maximum = max(record.scenario.thruster.max_impulse_m_s for record in records)
     given = max(abs(step.impulse_m_s) for record in records for step in record.steps)
-    return given if 0.0 < given < _SMALL_IMPULSES * greatest else greatest
+    return given if 0.0 < given < _SMALL_IMPULSES * maximum else maximum
 
 
 def level_predicted_miss(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
@@ -267,10 +267,10 @@ def level_predicted_miss(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
     _bend(row, 1, float(np.abs(bounds).max(initial=10.0)))
 
 
-def _bend(row: Sequence[Axes], first: int, greatest: float) -> None:
+def _bend(row: Sequence[Axes], first: int, maximum: float) -> None:
     """Make vertical axes linear to 10**first, logarithmic beyond, with symmetric limits."""
-    last = int(np.floor(np.log10(2.0 * greatest)))
-    powers = range(first, last + 1, 1 if last - first < _MOST_DECADES else 2)
+    last = int(np.floor(np.log10(2.0 * maximum)))
+    powers = range(first, last + 1, 1 if last - first < _MAX_DECADES else 2)
     names = ["1" if power == 0 else "10" + (str(power).translate(_RAISED) if power != 1 else "") for power in powers]
     sizes = [10.0**power for power in powers]
     between = [10.0**power for power in range(first - 1, last + 1) if power not in powers]
@@ -281,7 +281,7 @@ def _bend(row: Sequence[Axes], first: int, greatest: float) -> None:
             [*("\N{MINUS SIGN}" + name for name in reversed(names)), "0", *names],
         )
         axes.set_yticks([*(-size for size in between), *between], minor=True)
-        axes.set_ylim(-2.0 * greatest, 2.0 * greatest)
+        axes.set_ylim(-2.0 * maximum, 2.0 * maximum)
 
 
 def _note_exit(axes: Axes, values: Floats, trace: Trace, scale: float, unit: str) -> None:
@@ -350,7 +350,7 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], traces: Sequence[Tra
         Line2D([], [], color=TRUTH, label=true),
         Line2D([], [], color=MEASURED, marker=".", markersize=7, linestyle="none", label=measured),
         Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse component" if in_space else "impulse"),
-        Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="greatest impulse"),
+        Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="maximum impulse"),
         Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, label="predicted-miss interval"),
     ]
     if in_space:
@@ -378,7 +378,7 @@ def _predicted_miss(trace: Trace) -> tuple[Floats, Floats, Floats]:
 
 
 def _extent(trace: Trace, sensor: str, field: str, range_share: float) -> tuple[float, float]:
-    """Return the least and the greatest value, true or measured, without the last part of the way."""
+    """Return the minimum and the maximum value, true or measured, without the last part of the way."""
     record, axis = trace
     ranges = np.array([step.true_range_m for step in record.steps])
     ends = []
@@ -389,7 +389,7 @@ def _extent(trace: Trace, sensor: str, field: str, range_share: float) -> tuple[
         seen += [step.measured[sensor] for step in steps if sensor in step.measured]
         ends.append((min(seen), max(seen)))
     (low, high), (lower, higher) = ends
-    most = MOST_GROWTH * (high - low)
+    most = MAX_GROWTH * (high - low)
     return max(lower, low - most), min(higher, high + most)
 
 

@@ -29,7 +29,7 @@ MEASUREMENT_MARK = "measured α, drawn at the true ω"
 
 _DARK, _LIGHT = (0.03, 0.14, 0.36), (0.36, 0.66, 0.86)
 _PLANE_MM = 90.0
-"""Least width of a plane and its labels in space, mm."""
+"""Minimum width of a plane and its labels in space, mm."""
 _LETTER_MM = 1.8
 _COINCIDE = 0.1
 """Share of the size of sections: of a long flight only two sections are drawn if all differ by less."""
@@ -262,8 +262,8 @@ def _crossings(anchors: Sequence[tuple[float, float, int]], heights: Floats, sta
 
 def _right_top(outline: Floats) -> tuple[float, float]:
     """Return the rightmost vertex, the upper one of a vertical edge."""
-    least, greatest = outline[:, 0].min(), outline[:, 0].max()
-    edge = outline[outline[:, 0] >= greatest - 1e-6 * (greatest - least)]
+    minimum, maximum = outline[:, 0].min(), outline[:, 0].max()
+    edge = outline[outline[:, 0] >= maximum - 1e-6 * (maximum - minimum)]
     x, y = edge[edge[:, 1].argmax()]
     return float(x), float(y)
 
@@ -282,15 +282,15 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
     for axis in {plane.axis for plane in planes}:
         same = [(axes, plane) for axes, plane in zip(row, planes, strict=True) if plane.axis == axis]
         everything = np.concatenate([plane.extent for _, plane in same])
-        least, greatest = everything.min(axis=0), everything.max(axis=0)
-        margin = 0.07 * (greatest - least)
-        margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(greatest), 1e-6))
-        least, greatest = least - margin, greatest + margin
+        minimum, maximum = everything.min(axis=0), everything.max(axis=0)
+        margin = 0.07 * (maximum - minimum)
+        margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(maximum), 1e-6))
+        minimum, maximum = minimum - margin, maximum + margin
         for axes, _ in same:
             room = (_LABEL_ROOM_MM + max(_extra_mm(plane.chosen) for _, plane in same)) / width_mm(axes)
-            axes.set_xlim(float(least[0]), float(greatest[0] + room / (1.0 - room) * (greatest[0] - least[0])))
-            axes.set_ylim(float(least[1]), float(greatest[1]))
-            nbins = 6 if np.abs(least[0]) < 1e4 else 3
+            axes.set_xlim(float(minimum[0]), float(maximum[0] + room / (1.0 - room) * (maximum[0] - minimum[0])))
+            axes.set_ylim(float(minimum[1]), float(maximum[1]))
+            nbins = 6 if np.abs(minimum[0]) < 1e4 else 3
             axes.xaxis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 2.5, 5, 10]))
 
 

@@ -78,11 +78,11 @@ def _summary(
     return {
         "seed": chosen.seed,
         "model": scenario.information_set.model.value,
-        "range_meter": scenario.range_sensor is not None,
+        "range_sensor": scenario.range_sensor is not None,
         "elapsed_s": elapsed_s,
         "strategy": chosen.strategy,
         "objective": chosen.objective.value,
-        "searched_accelerations_m_s2": chosen.greatest_acceleration_m_s2,
+        "searched_accelerations_m_s2": chosen.max_acceleration_m_s2,
         **worst.misses(),
         "keep_set": options.keep_set,
         "worst_any_state_miss_m": chosen.any_state_miss_m,
@@ -105,7 +105,7 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
     position, velocity = ", ".join(axes), ", ".join(f"V_{axis}" for axis in axes)
     across = [("miss along y, z, m", lambda found: ", ".join(map(number, found.lateral_miss_m.values())))]
     return [
-        ("greatest miss of any state of the set, m", lambda found: number(found.any_state_miss_m)),
+        ("maximum miss of any state of the set, m", lambda found: number(found.any_state_miss_m)),
         ("miss of the simulated truth, m", lambda found: number(found.miss_m)),
         *(across if scenario.is_spatial else []),
         ("outcome", lambda found: found.outcome.value),
@@ -128,7 +128,7 @@ def _halfway_m(found: WorstEngagement) -> float | None:
 
 def _notes(found: WorstEngagement) -> Iterator[str]:
     """Return lines about what was searched and what the two misses mean."""
-    bounds = found.greatest_acceleration_m_s2
+    bounds = found.max_acceleration_m_s2
     each = ", ".join(
         f"{number(bound)} m/s^2" + (f" along {axis}" if len(bounds) > 1 else "") for axis, bound in bounds.items()
     )
@@ -139,7 +139,7 @@ def _notes(found: WorstEngagement) -> Iterator[str]:
     }[found.objective]
     yield f"searched: starts in the uncertainty, errors within their bounds, {target}; objective: {objective}"
     yield (
-        "any state of the set: greatest miss of a state that a section contained when control ended for it; the "
+        "any state of the set: maximum miss of a state that a section contained when control ended for it; the "
         "sections contain at least all states that agree with the measurements"
     )
     yield (

@@ -105,7 +105,7 @@ def _nominal(scenario: Scenario) -> TruthPair:
     """Return the best pair at the nominal range and closing speed, or at the possible ones nearest to them."""
     box = scenario.set_model.bounds
     nominal = ((box.x_m, scenario.nominal_range_m), (box.vx_m_s, -scenario.set_model.closing_speed_m_s))
-    label_m, vx_m_s = (min(max(value, least), greatest) for (least, greatest), value in nominal)
+    label_m, vx_m_s = (min(max(value, minimum), maximum) for (minimum, maximum), value in nominal)
     return pair_at(scenario, label_m, vx_m_s)
 
 
@@ -215,8 +215,8 @@ def _parts(
         f"nominal ones: {number(nominal.bound_m)} m"
     )
     for axis in scenario.set_model.axes:
-        greatest = scenario.set_model.axis(axis).disturbance_m_s2
-        yield f"acceleration of the object along {axis} in these pairs: at most {greatest:.3g} m/s^2"
+        maximum = scenario.set_model.axis(axis).disturbance_m_s2
+        yield f"acceleration of the object along {axis} in these pairs: at most {maximum:.3g} m/s^2"
     if scenario.is_spatial:
         shape, axes = ("disc", "one axis") if scenario.set_model.angle_sensor.is_disc else ("box", "both axes")
         yield f"errors of the angles in a {shape}: the states of a pair differ along {axes}"
@@ -224,15 +224,15 @@ def _parts(
     yield from value.lines()
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
-    yield "pairs: greatest miss of the states that prove the bound"
+    yield "pairs: maximum miss of the states that prove the bound"
     searched_by = (
         f"`infoset adversary` with --objective fixed-truth --model {model} --budget {options.budget} --seed "
         f"{options.seed}"
     )
-    found = f"greatest misses found by {searched_by}" if options.budget else "not searched"
+    found = f"maximum misses found by {searched_by}" if options.budget else "not searched"
     yield f"set never empty, also empty: {found}"
-    yield "miss / bound: greatest miss of pairs and search, without sets that became empty, divided by the bound"
-    yield "guaranteed: greatest bound Phi on the miss, computed during these engagements"
+    yield "miss / bound: maximum miss of pairs and search, without sets that became empty, divided by the bound"
+    yield "guaranteed: maximum bound Phi on the miss, computed during these engagements"
     if any(strategy.results.set_emptied.any() for strategy in worst):
         hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
         yield f"in some engagements a measurement contradicted all states of the set, which became empty{hint}"

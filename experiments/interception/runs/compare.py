@@ -56,7 +56,7 @@ def run(options: Compare) -> None:
         result = {
             **summary_head(scenario, warnings),
             "model": scenario.information_set.model.value,
-            "range_meter": scenario.range_sensor is not None,
+            "range_sensor": scenario.range_sensor is not None,
             "seed": options.seed,
             "runs": options.runs,
             "elapsed_s": perf_counter() - began_s,

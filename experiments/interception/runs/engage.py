@@ -88,7 +88,7 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
         "elapsed_s": elapsed_s,
         "published_curve": 1 + (scenario.range_sensor is not None) + 2 * (scenario.noise is NoiseKind.GAME),
         "noise": scenario.noise.value,
-        "range_meter": scenario.range_sensor is not None,
+        "range_sensor": scenario.range_sensor is not None,
         **{name: values[0] for name, values in outcome_columns(record.result).items()},
         "hit": record.result.hit.tolist()[0],
         "inconsistency": contradiction,

@@ -15,7 +15,7 @@ from sim import Record
 from sim.results import ending
 
 FIGURES = ("figure-2-process", "figure-3-sets", "figure-approach")
-MOST_TIMES = 12
+MAX_TIMES = 12
 
 
 def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
@@ -26,7 +26,7 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     columns: list[tuple[str, dict[str, str]]] = []
     for record in records:
         result = {name: values[0] for name, values in record.result.to_dict().items()}
-        meter = " + range meter" if record.scenario.range_sensor is not None else ""
+        meter = " + range sensor" if record.scenario.range_sensor is not None else ""
         values = {
             "miss, m": number(result["miss_m"]),
             **{f"miss along {axis}, m": number(result.get(f"miss_{axis}_m")) for axis in ("y", "z") if lateral},
@@ -71,7 +71,7 @@ def _both_failures(record: Record) -> str:
     """Return a line if the set became empty and the budget was spent: the outcome names only one of them."""
     result, thruster = record.result, record.scenario.thruster
     left_m_s = thruster.budget_m_s - float(result.impulse_m_s[0])
-    if not result.set_emptied[0] or left_m_s >= max(thruster.least_impulse_m_s, 1e-9 * thruster.budget_m_s):
+    if not result.set_emptied[0] or left_m_s >= max(thruster.min_impulse_m_s, 1e-9 * thruster.budget_m_s):
         return ""
     budget = f"the impulse budget of {thruster.budget_m_s:g} m/s was spent"
     return f"{record.noise_name} noise: the set became empty, and {budget}"
@@ -89,10 +89,10 @@ def read_times(text: str | None, folder: Path | None) -> tuple[float, ...]:
     if text is None:
         return ()
     parts = text.split(",")
-    if len(parts) > MOST_TIMES:
-        raise InputError(f"--times: at most {MOST_TIMES} times fit in a figure, found {len(parts)}; omit some")
+    if len(parts) > MAX_TIMES:
+        raise InputError(f"--times: at most {MAX_TIMES} times fit in a figure, found {len(parts)}; omit some")
     example = "--times 0.5,40,90"
-    return tuple(read_number("--times", float, part, least=0.0, greatest=None, example=example) for part in parts)
+    return tuple(read_number("--times", float, part, minimum=0.0, maximum=None, example=example) for part in parts)
 
 
 def need_times(text: str | None, times_s: Sequence[float], records: Sequence[Record]) -> None:

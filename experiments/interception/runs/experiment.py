@@ -59,7 +59,7 @@ def run(options: Experiment) -> None:
             say(f"{scenario.name} has no [range_sensor]: curves 1 and 3 only", options.quiet)
         began_s = perf_counter()
         slowest_first = [
-            (curve, flown, f"curve {curve}: {flown.noise.value}{' + range meter' if flown.range_sensor else ''}")
+            (curve, flown, f"curve {curve}: {flown.noise.value}{' + range sensor' if flown.range_sensor else ''}")
             for curve, flown in reversed(curve_scenarios(scenario))
         ]
         jobs = [(flown, own, begin(title)) for _, flown, title in slowest_first]
@@ -98,7 +98,7 @@ def run(options: Experiment) -> None:
 
 
 def _key(curve: Curve) -> dict[str, int | str | bool]:
-    return {"published_curve": curve.number, "noise": curve.noise.value, "range_meter": curve.range_meter}
+    return {"published_curve": curve.number, "noise": curve.noise.value, "range_sensor": curve.range_sensor}
 
 
 def _csv(curves: Sequence[Curve]) -> str:
@@ -124,7 +124,7 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
         bounds, of_theorem_8 = results.guaranteed_miss_m.compressed(), results.theorem_8_miss_m.compressed()
         rows = (
             (f"{curve.number} {curve.noise.value}", "miss, m", results.miss_m),
-            ("  + range meter" if curve.range_meter else "", "impulse, m/s", results.impulse_m_s),
+            ("  + range sensor" if curve.range_sensor else "", "impulse, m/s", results.impulse_m_s),
         )
         for title, quantity, values in rows:
             table.add_row(title, quantity, *(number(value) for value in shown_quantiles(values, levels)))
@@ -150,7 +150,7 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
         figures = "; ".join(
             f"{noise} noise: miss {miss} m, impulse {fuel} m/s" for noise, (miss, fuel) in printed_single_runs().items()
         )
-        notes.append(f"paper (one run from z = -8 km, no range meter): {figures}")
+        notes.append(f"paper (one run from z = -8 km, no range sensor): {figures}")
     runs = len(curves[0].results)
     notes += quantile_notes(runs, levels)
     burns = [burn_table(scenario, curves)] if scenario.thruster.impulses_s else []
@@ -192,7 +192,7 @@ def burn_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
         for burn in burns_key(scenario, curve.results).get("burns", []):
             share = burn["share"]
             table.add_row(
-                f"{curve.number} {curve.noise.value}{' + range meter' if curve.range_meter else ''}",
+                f"{curve.number} {curve.noise.value}{' + range sensor' if curve.range_sensor else ''}",
                 f"{burn['before_arrival_s']:g}",
                 *(number(burn[key]) for key in LEVELS),
                 number(None if share is None else 100.0 * share),

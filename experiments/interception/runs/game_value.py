@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 from experiments.common.screen import number
 from experiments.interception.runs.shared import WorstMisses
-from experiments.interception.study import greatest_guarantee_m
+from experiments.interception.study import max_guarantee_m
 from sim import Record, Results, Scenario
 from sim.bound import LowerBound
 from sim.game_value import ValueReserve, value_reserve, why_no_value
@@ -32,33 +32,33 @@ class WorstOfStrategy:
 
     @property
     def pairs_m(self) -> float:
-        """Greatest miss of the pairs, m."""
+        """Maximum miss of the pairs, m."""
         return max(float(flight.results.miss_m.max()) for _, flight in self.flights)
 
     @property
     def worst_m(self) -> float:
-        """Greatest miss of all simulations, m."""
+        """Maximum miss of all simulations, m."""
         return float(self.results.miss_m.max())
 
     @property
     def set_kept_m(self) -> float | None:
-        """Greatest miss of the engagements whose set never became empty, m; None if there is none."""
+        """Maximum miss of the engagements whose set never became empty, m; None if there is none."""
         results = self.results
         return max(results.miss_m[~results.set_emptied].tolist(), default=None)
 
     @property
     def guaranteed_m(self) -> float | None:
-        """Greatest guaranteed miss of all simulations, m; None if the model has no guarantee."""
-        return greatest_guarantee_m(self.results)
+        """Maximum guaranteed miss of all simulations, m; None if the model has no guarantee."""
+        return max_guarantee_m(self.results)
 
     def over(self, lower: LowerBound) -> float | None:
-        """Return the greatest miss with the set never empty, divided by the bound; None if one of them is missing."""
+        """Return the maximum miss with the set never empty, divided by the bound; None if one of them is missing."""
         return self.set_kept_m / lower.bound_m if lower.bound_m > 0.0 and self.set_kept_m is not None else None
 
 
 @dataclass(frozen=True)
 class GameValue:
-    """The least miss that a strategy can guarantee: its lower end, and what is known of the upper one.
+    """The minimum miss that a strategy can guarantee: its lower end, and what is known of the upper one.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class GameValue:
     reasons : tuple of str
         Assumptions of the proof that the scenario does not meet.
     best : WorstOfStrategy or None
-        The strategy whose greatest miss found is least; None without a search.
+        The strategy whose maximum miss found is minimum; None without a search.
     """
 
     lower_m: float
@@ -94,7 +94,7 @@ class GameValue:
             )
         else:
             yield (
-                f"the value of the game is at least {number(self.lower_m)} m; the least of the greatest misses found "
+                f"the value of the game is at least {number(self.lower_m)} m; the minimum of the maximum misses found "
                 f"is {number(self.best.worst_m)} m, of {self.best.name}: what it guarantees is that or more"
             )
         yield f"no upper end is proved, because of: {', '.join(self.reasons)}"

@@ -6,7 +6,7 @@ from experiments.common.errors import InputError
 from experiments.common.output import output_of
 from experiments.common.screen import figure_files, progress_bar, say, show
 from experiments.interception.command import Replay
-from experiments.interception.page import MOST_RECORDS, interception_page
+from experiments.interception.page import MAX_RECORDS, interception_page
 from experiments.interception.record_file import load_record
 from experiments.interception.runs.engagement_table import (
     FIGURES,
@@ -19,7 +19,7 @@ from experiments.interception.runs.engagement_table import (
 
 def run(options: Replay) -> None:
     """Read the records, write the files and print the table."""
-    if len(options.records) > MOST_RECORDS:
+    if len(options.records) > MAX_RECORDS:
         raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
     times_s = read_times(options.times, options.out)
     if options.gif is not None and options.gif.suffix != ".gif":

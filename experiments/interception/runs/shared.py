@@ -119,7 +119,7 @@ def certificate(results: Results) -> str:
 
 @dataclass(frozen=True)
 class WorstMisses:
-    """The engagements with the greatest values of a strategy: of those whose set never became empty, and of all.
+    """The engagements with the maximum values of a strategy: of those whose set never became empty, and of all.
 
     The first is None if there was none, the second if no miss was finite.
     """
@@ -148,7 +148,7 @@ def find_worst_misses(
     begin: BeginProgress,
     objective: Objective = Objective.FIXED_TRUTH,
 ) -> WorstMisses:
-    """Search for the greatest miss with the set never empty, and for the greatest miss of all engagements.
+    """Search for the maximum miss with the set never empty, and for the maximum miss of all engagements.
 
     The second search is simulated only if the set became empty in the first one. Otherwise both are the same. The
     default objective is that of `infoset bound`, which compares simulated misses.

@@ -114,13 +114,13 @@ def test_noise_model_strategy_tie_and_meter_are_the_options(infoset: Infoset, fi
         "guaranteed",
         "--tie",
         "lower",
-        "--no-range-meter",
+        "--no-range-sensor",
     )
     assert infoset("campaign", file, "--runs", 8, "--out", tmp_path / "runs", "-q", *options)[0] == 0
     rows = CampaignFolder.read(tmp_path / "runs").table()
     assert set(rows.column("noise").to_pylist()) == {"game"}
     assert set(rows.column("tie").to_pylist()) == {"lower"}
-    assert set(rows.column("range_meter").to_pylist()) == {False}
+    assert set(rows.column("range_sensor").to_pylist()) == {False}
     assert rows.column("guaranteed_miss_m").null_count == 0
     flown = load_scenario(tmp_path / "runs" / "scenario.toml")
     assert (flown.strategy, flown.noise) == ("patient", NoiseKind.GAME)

@@ -31,8 +31,8 @@ IDEAL = [
     "angle_sensor.bias=random",
     "target.manoeuvre=none",
     "information_set.disturbance_m_s2=0",
-    "thruster.least_impulse_m_s=0",
-    "thruster.greatest_impulse_m_s=20",
+    "thruster.min_impulse_m_s=0",
+    "thruster.max_impulse_m_s=20",
     "thruster.budget_m_s=1000",
     "thruster.execution_error_relative=0",
     "thruster.pointing_error_rad=0",
@@ -53,7 +53,7 @@ def test_the_limit_of_the_chart_is_the_closed_form(infoset: Command, tmp_path: P
     pixels_rad, cut_offs_s = (np.array(axis["values"]) for axis in summary["axes"])
     met = np.array([cell["requirement"] == "met" for cell in summary["cells"]]).reshape(5, 8)
     possible_m = np.sqrt(2.0) * possible_miss_m(6140.0, pixels_rad[:, None], 0.0, FIRST_S, cut_offs_s)
-    # The greatest cut-off that meets the requirement, as the number of values up to it.
+    # The maximum cut-off that meets the requirement, as the number of values up to it.
     limits, expected = met.sum(axis=1), (possible_m < BOUND_M).sum(axis=1)
     assert (np.diff(met.astype(int), axis=1) <= 0).all()
     assert (np.abs(limits - expected) <= 1).all(), (limits, expected)

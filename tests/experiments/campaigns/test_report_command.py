@@ -16,7 +16,7 @@ from scipy.stats import pearsonr, spearmanr
 from experiments.campaigns.campaign_columns import START, CampaignColumns, correlations
 from experiments.campaigns.campaign_figures import draw_campaign_distributions, draw_convergence, draw_dispersion
 from experiments.common.screen import BeginProgress
-from experiments.interception.figures.distributions import MOST_POINTS
+from experiments.interception.figures.distributions import MAX_POINTS
 from experiments.interception.scenario_file import load_scenario
 from sim import Campaign, CampaignNoise, Scenario
 from tests.experiments.campaigns.figure_room import need_room
@@ -174,7 +174,7 @@ def test_figures_of_few_runs_and_of_many(size: int) -> None:
     both = [columns("random", size), columns("game", size)]
     left, right = draw_campaign_distributions(both).axes
     assert (left.get_xlabel().split("\n")[0], right.get_xlabel()) == ("miss, m", "impulse spent, m/s")
-    assert max(len(np.asarray(line.get_xdata())) for line in left.get_lines()) <= MOST_POINTS + 2
+    assert max(len(np.asarray(line.get_xdata())) for line in left.get_lines()) <= MAX_POINTS + 2
     panels = draw_convergence(both).axes
     assert [each.get_title() for each in panels] == [
         "(a) miss, random noise",
@@ -187,7 +187,7 @@ def test_figures_of_few_runs_and_of_many(size: int) -> None:
     assert [each.get_xlabel() for each in clouds[:4]] == [
         *("initial z, km", "initial x, km", "initial V$_z$, km/s", "initial V$_x$, km/s"),
     ]
-    assert max(len(np.asarray(line.get_xdata())) for line in clouds[0].get_lines()) <= MOST_POINTS
+    assert max(len(np.asarray(line.get_xdata())) for line in clouds[0].get_lines()) <= MAX_POINTS
 
 
 def test_texts_of_figures_never_touch() -> None:

@@ -22,15 +22,13 @@ def asteroid() -> Scenario:
 
 
 def test_the_issues_example(asteroid: Scenario) -> None:
-    text = "angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7"
+    text = "angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.max_impulse_m_s=2:20:7"
     first, second = axes = sweep_axes(text, asteroid)
-    assert (first.key, second.key) == ("angle_sensor.error_at_nominal_range_rad", "thruster.greatest_impulse_m_s")
+    assert (first.key, second.key) == ("angle_sensor.error_at_nominal_range_rad", "thruster.max_impulse_m_s")
     assert (first.values[0], first.values[-1], len(first.values)) == (5e-5, 5e-4, 8)
     assert second.values == (2.0, 5.0, 8.0, 11.0, 14.0, 17.0, 20.0)
     cells = sweep_cells(asteroid, axes)
-    found = [
-        (cell.set_model.angle_sensor.error_at_nominal_range_rad, cell.thruster.greatest_impulse_m_s) for cell in cells
-    ]
+    found = [(cell.set_model.angle_sensor.error_at_nominal_range_rad, cell.thruster.max_impulse_m_s) for cell in cells]
     assert found == list(itertools.product(first.values, second.values))
     back = {
         replace(
@@ -76,14 +74,14 @@ def test_whole_numbers_and_logarithms(asteroid: Scenario) -> None:
 @settings(deadline=None, max_examples=60)
 def test_values_rise_evenly_between_the_ends_as_written(ends: tuple[int, int], count: int, log: bool) -> None:
     asteroid = load_scenario("asteroid-1997")
-    least, greatest = min(ends), max(ends) + 1
-    (axis,) = sweep_axes(f"thruster.budget_m_s={'log:' if log else ''}{least}e-2:{greatest}e-2:{count}", asteroid)
-    assert axis.values[0] == float(f"{least}e-2")
-    assert axis.values[-1] == float(f"{greatest}e-2")
+    minimum, maximum = min(ends), max(ends) + 1
+    (axis,) = sweep_axes(f"thruster.budget_m_s={'log:' if log else ''}{minimum}e-2:{maximum}e-2:{count}", asteroid)
+    assert axis.values[0] == float(f"{minimum}e-2")
+    assert axis.values[-1] == float(f"{maximum}e-2")
     assert len(axis.values) == count
     assert list(axis.values) == sorted(set(axis.values))
     spaced = np.geomspace if log else np.linspace
-    np.testing.assert_allclose(axis.values, spaced(least / 100.0, greatest / 100.0, count), rtol=1e-11)
+    np.testing.assert_allclose(axis.values, spaced(minimum / 100.0, maximum / 100.0, count), rtol=1e-11)
 
 
 def test_keys_with_the_same_values(asteroid: Scenario) -> None:
@@ -155,8 +153,8 @@ def test_a_factor_of_all_error_bounds_of_a_sensor(asteroid: Scenario) -> None:
         ("thruster.budget_m_s=1:2:1000,nominal_range_km=5800:5801:1000", ["1000000 cells are more than the limit"]),
         (",".join(["thruster.budget_m_s=1:2:2"] * 5), ["at most 4 keys"]),
         (
-            "thruster.greatest_impulse_m_s=0.1:5:3",
-            ["asteroid-1997 with thruster.greatest_impulse_m_s = 0.1: thruster: "],
+            "thruster.max_impulse_m_s=0.1:5:3",
+            ["asteroid-1997 with thruster.max_impulse_m_s = 0.1: thruster: "],
         ),
         (
             "angle_sensor.error_at_zero_range_rad=0.1:2:2",

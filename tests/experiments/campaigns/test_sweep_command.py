@@ -60,7 +60,7 @@ FILES = [
     "sweep.parquet",
 ]
 REQUIRED = Requirement(SHOWN[1], 10.0)
-TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.greatest_impulse_m_s=log:2:8:2"
+TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.max_impulse_m_s=log:2:8:2"
 
 
 @pytest.fixture
@@ -96,7 +96,7 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
     errors, impulses = (table.column(name).to_pylist() for name in table.column_names[1:3])
     assert list(zip(errors, impulses, strict=True)) == list(itertools.product((1e-4, 2.5e-4, 4e-4), (2.0, 8.0)))
     units = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
-    assert (units["angle_sensor.error_at_zero_range_rad"], units["thruster.greatest_impulse_m_s"]) == ("rad", "m/s")
+    assert (units["angle_sensor.error_at_zero_range_rad"], units["thruster.max_impulse_m_s"]) == ("rad", "m/s")
     assert (units["miss_m_p99"], units["impulse_m_s_p99_lower"], units["runs"]) == ("m", "m/s", "")
     rows = table.to_pylist()
     for row in rows:
@@ -106,7 +106,7 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
         cell = replace(
             brief,
             **of_model(replace(brief.set_model, angle_sensor=sensor)),
-            thruster=replace(brief.thruster, greatest_impulse_m_s=row["thruster.greatest_impulse_m_s"]),
+            thruster=replace(brief.thruster, max_impulse_m_s=row["thruster.max_impulse_m_s"]),
         )
         flown = simulate(cell, 30, seed=2)
         assert row["runs"] == 30
@@ -122,18 +122,18 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
     found = json.loads((folder / "summary.json").read_text())
     assert (found["kind"], found["scenario_hash"], found["runs"]) == ("sweep", fingerprint(brief), 180)
     assert [each["unit"] for each in found["axes"]] == ["rad", "m/s"]
-    assert [each["at"] for each in found["answers"]] == [f"thruster.greatest_impulse_m_s = {each}" for each in (2, 8)]
+    assert [each["at"] for each in found["answers"]] == [f"thruster.max_impulse_m_s = {each}" for each in (2, 8)]
     assert all(each["met"] in out for each in found["answers"])
 
 
 @pytest.mark.usefixtures("rendered")
 def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_path: Path) -> None:
-    asked = ("sweep", file, "--vary", "thruster.greatest_impulse_m_s=2:8:4", "--runs", 20, "--noise", "mixed")
+    asked = ("sweep", file, "--vary", "thruster.max_impulse_m_s=2:8:4", "--runs", 20, "--noise", "mixed")
     code, out, _ = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3")
     assert code == 0
     assert out.count("noise: miss_m p90<3 is met in") == 1
     assert out.count("miss_m p90<3 is met against this adversary in") == 1
-    assert out.count("along thruster.greatest_impulse_m_s:") == 2
+    assert out.count("along thruster.max_impulse_m_s:") == 2
     table = pq.read_table(tmp_path / "a" / "sweep.parquet")
     assert table.column("noise").to_pylist() == ["random", "game"] * 4
     assert set(table.column("runs").to_pylist()) == {10}
@@ -146,7 +146,7 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
     again = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3", "--resume", "-q")
     assert again == (0, "", "")
     assert (tmp_path / "a" / "sweep.parquet").read_bytes() == before
-    code, _, err = infoset(*asked[:3], "thruster.greatest_impulse_m_s=2:9:4", *asked[4:], "--out", "a", "--resume")
+    code, _, err = infoset(*asked[:3], "thruster.max_impulse_m_s=2:9:4", *asked[4:], "--out", "a", "--resume")
     assert code == 2
     assert "axes: " in err
     assert "cells_hash" in err
@@ -156,10 +156,10 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Infoset, swept: 
     code, out, _ = infoset("report", swept, "--out", tmp_path / "report", "--require", "impulse_m_s p50<60")
     assert code == 0
     assert "impulse_m_s p50<60 is met in" in out
-    assert "angle_sensor.error_at_zero_range_rad (rows) and thruster.greatest_impulse_m_s (columns)" in out
+    assert "angle_sensor.error_at_zero_range_rad (rows) and thruster.max_impulse_m_s (columns)" in out
     assert "rows in rad, columns in m/s; lines of a cell: decision, impulse_m_s p50 in m/s (- if too few runs), " in out
     assert re.search(r"met.*\n +[\d.]+ .*\n +[\d.]+ to [\d.]+ .*\n +20 +20", out)
-    assert "brief, with range meter, model paper, strategy symmetric-miss, seed 0\n" in out
+    assert "brief, with range sensor, model paper, strategy symmetric-miss, seed 0\n" in out
     names = ["figure-sweep.pdf", "figure-sweep.png", "report.json", "scenario.toml", "sweep.parquet"]
     assert sorted(each.name for each in (tmp_path / "report").iterdir()) == names
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").num_rows == 6
@@ -197,7 +197,7 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
     ("arguments", "parts"),
     [
         (["--vary", "thruster.budget=1:2:2"], ["did you mean thruster.budget_m_s?"]),
-        (["--vary", "thruster.greatest_impulse_m_s=0.01:5:3"], ["brief with thruster.greatest_impulse_m_s = 0.01"]),
+        (["--vary", "thruster.max_impulse_m_s=0.01:5:3"], ["brief with thruster.max_impulse_m_s = 0.01"]),
         (["--runs", 0], ["--runs", "must be from 1 to "]),
         (["--require", "miss_m 10"], ["--require: must be a quantity, a quantile and a bound"]),
         (
@@ -206,7 +206,7 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
         ),
         (["--require", "miss_m p99<1e400"], ["--require: the bound must be greater than 0 and finite, found 1e400"]),
         (["--require", "miss_m p\u0669\u0669<10"], ["--require: must be a quantity, a quantile and a bound"]),
-        (["--vary", "thruster.greatest_impulse_m_s=1_0:20:2"], ["must be a number, found"]),
+        (["--vary", "thruster.max_impulse_m_s=1_0:20:2"], ["must be a number, found"]),
         (["--show", "miss_m p99,fuel p50"], ["--show: there is no quantity fuel"]),
         (["--show", ",".join(f"miss_m p{each}" for each in range(1, 20))], ["--show: at most 8"]),
         (["--noise", "loud"], ["--noise"]),
@@ -312,7 +312,7 @@ def test_the_limit_of_hits_along_the_radius_is_the_quantile_of_the_miss(brief: S
 def test_the_limit_of_hits_is_that_of_a_fine_sweep(tmp_path: Path) -> None:
     """An interpolated probability gave 1.4e-5 rad, just above the last cell that meets the requirement."""
     short = ["nominal_range_km=8841.6", "uncertainty.x_km=[8831.6, 8851.6]", "dispersion.x_km=[8836.6, 8846.6]"]
-    quick = ["step_s=20", "angle_sensor.period_s=20", "thruster.greatest_impulse_m_s=1"]
+    quick = ["step_s=20", "angle_sensor.period_s=20", "thruster.max_impulse_m_s=1"]
     scenario = load_scenario("dart-2022", [*short, *quick])
     coarse, fine = (
         limit_of_hits(
@@ -439,7 +439,7 @@ def test_runs_are_added_until_each_cell_is_decided(infoset: Infoset, file: Path,
     code, out, _ = infoset(*asked, "--runs", 10)
     assert code == 0
     assert "to add runs to these cells: repeat infoset sweep with --resume and --until decided" in out
-    code, out, _ = infoset(*asked, "--runs", 10, "--until", "decided", "--most-runs", 300, "--resume")
+    code, out, _ = infoset(*asked, "--runs", 10, "--until", "decided", "--max-runs", 300, "--resume")
     assert code == 0
     assert (
         "the decision in each cell has a confidence of at least 95 % although runs are added until it is made;" in out
@@ -460,7 +460,7 @@ def test_runs_are_added_until_each_cell_is_decided(infoset: Infoset, file: Path,
     assert report["cells"] == summary["cells"]
 
 
-@pytest.mark.parametrize("until", [(), ("--until", "decided", "--most-runs", 60)])
+@pytest.mark.parametrize("until", [(), ("--until", "decided", "--max-runs", 60)])
 def test_runs_without_a_guarantee_do_not_meet_a_bound_of_it(
     until: tuple[object, ...], infoset: Infoset, file: Path, tmp_path: Path
 ) -> None:
@@ -532,7 +532,7 @@ def test_runs_that_are_added_by_hand_are_judged_like_those_of_until(
         assert required["lower"] == max(lower, 0.95 if cell["requirement"] == "met" else 0.0)
         assert required["upper"] == min(upper, 0.95 if cell["requirement"] == "not-met" else 1.0)
     # A sweep that was watched once stays so.
-    assert infoset(*asked, "--runs", 100, "--resume", "--until", "decided", "--most-runs", 150)[0] == 0
+    assert infoset(*asked, "--runs", 100, "--resume", "--until", "decided", "--max-runs", 150)[0] == 0
     assert infoset(*asked, "--runs", 150, "--resume")[0] == 0
     assert read_manifest(tmp_path / "sweep").until is None
     assert read_manifest(tmp_path / "sweep").is_watched
@@ -604,13 +604,13 @@ def test_the_radius_can_be_varied(infoset: Infoset, file: Path, tmp_path: Path) 
 
 def test_keys_with_the_same_values_and_factors_in_tables(infoset: Infoset, file: Path, tmp_path: Path) -> None:
     one, other = "angle_sensor.error_at_zero_range_rad", "angle_sensor.error_at_nominal_range_rad"
-    asked = ("--vary", f"{one}={other}=1e-4:3e-4:2", "--vary", "thruster.greatest_impulse_m_s=2:8:2")
+    asked = ("--vary", f"{one}={other}=1e-4:3e-4:2", "--vary", "thruster.max_impulse_m_s=2:8:2")
     code, out, _ = infoset("sweep", file, *asked, "--runs", 5, "--out", "sweep", "--json", "-")
     assert code == 0
     summary = json.loads(out)
     assert [(axis["key"], axis["unit"]) for axis in summary["axes"]] == [
         (f"{one}={other}", "rad"),
-        ("thruster.greatest_impulse_m_s", "m/s"),
+        ("thruster.max_impulse_m_s", "m/s"),
     ]
     table = pq.read_table(tmp_path / "sweep" / "sweep.parquet")
     assert table.column(one).to_pylist() == table.column(other).to_pylist() == [1e-4, 1e-4, 3e-4, 3e-4]
@@ -622,8 +622,8 @@ def test_keys_with_the_same_values_and_factors_in_tables(infoset: Infoset, file:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--most-runs", 30), "--most-runs is the limit of --until; add --until decided"),
-        (("--until", "decided", "--most-runs", 9), "--most-runs: must be at least --runs, 10, found 9"),
+        (("--max-runs", 30), "--max-runs is the limit of --until; add --until decided"),
+        (("--until", "decided", "--max-runs", 9), "--max-runs: must be at least --runs, 10, found 9"),
         (("--until", "never"), "--until"),
     ],
 )
@@ -670,7 +670,7 @@ def test_figures_of_sweeps_with_two_keys(swept: Path) -> None:
     panels = [axes for axes in figure.axes if axes.get_xlabel()]
     assert panels[0].get_title() == f"(a) miss p90 under {middle:g} m; random noise"
     assert [axes.get_xlabel() for axes in panels] == ["angle sensor: error at zero range, $10^{-4}$ rad"] * 4
-    assert {axes.get_ylabel() for axes in panels} == {"thruster: greatest impulse, m/s"}
+    assert {axes.get_ylabel() for axes in panels} == {"thruster: max impulse, m/s"}
     assert all(len(axes.texts) == 6 for axes in panels)
     # Twenty runs do not show a quantile of 99 %: it has no heat map, and a dash in the map of decisions.
     few = draw_sweep(sweep_table(folder, REQUIRED), SHOWN, "random")
@@ -684,7 +684,7 @@ def test_figures_of_sweeps_with_two_keys(swept: Path) -> None:
 
 
 def test_figures_of_sweeps_with_one_key(brief: Scenario, tmp_path: Path) -> None:
-    axes = sweep_axes("thruster.greatest_impulse_m_s=2:8:3", brief)
+    axes = sweep_axes("thruster.max_impulse_m_s=2:8:3", brief)
     Sweep(brief, axes, sweep_cells(brief, axes), 30, tmp_path / "one", noise=CampaignNoise.MIXED).run()
     table = sweep_table(CampaignFolder.read(tmp_path / "one"), REQUIRED)
     for noise in ("random", "game"):
@@ -735,7 +735,7 @@ def made_table(axes: Sequence[Axis], required: Requirement | HitRequirement, val
         (Axis("angle_sensor.error_at_zero_range_rad=angle_sensor.error_at_nominal_range_rad", (1e-6, 1.1e-6, 1e-3)),),
         (
             Axis("angle_sensor.error_at_zero_range_rad", tuple(np.linspace(1.23456e-4, 9.87654e-4, 8))),
-            Axis("thruster.greatest_impulse_m_s", tuple(np.geomspace(0.1, 100.0, 15)), "log"),
+            Axis("thruster.max_impulse_m_s", tuple(np.geomspace(0.1, 100.0, 15)), "log"),
         ),
         (
             Axis("nominal_range_km", tuple(np.linspace(5701.31, 5901.39, 8))),
@@ -755,8 +755,8 @@ def made_table(axes: Sequence[Axis], required: Requirement | HitRequirement, val
     ],
 )
 def test_labels_never_touch(axes: tuple[Axis, ...], required: Requirement | HitRequirement) -> None:
-    greatest = math.prod(axis.values[-1] for axis in axes)
-    table = made_table(axes, required, lambda *values: 1000.0 * (math.prod(values) / greatest) ** 0.5)
+    maximum = math.prod(axis.values[-1] for axis in axes)
+    table = made_table(axes, required, lambda *values: 1000.0 * (math.prod(values) / maximum) ** 0.5)
     need_room(draw_sweep(table, SHOWN, "game"))
 
 

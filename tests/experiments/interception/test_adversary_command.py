@@ -29,7 +29,7 @@ KEYS = [
     "scenario_hash",
     "seed",
     "model",
-    "range_meter",
+    "range_sensor",
     "elapsed_s",
     "strategy",
     "objective",
@@ -68,7 +68,7 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert found["version"] == version("infoset")
     assert (found["scenario"], found["scenario_hash"]) == (scenario.name, fingerprint(scenario))
     assert (found["seed"], found["evaluations"], found["record"]) == (5, BUDGET, "worst.npz")
-    assert (found["strategy"], found["model"], found["range_meter"]) == ("symmetric-miss", "guaranteed", True)
+    assert (found["strategy"], found["model"], found["range_sensor"]) == ("symmetric-miss", "guaranteed", True)
     worst = find_worst(scenario, budget=BUDGET, seed=5)
     assert (found["objective"], found["searched_accelerations_m_s2"]) == ("any-state", {"z": 0.005})
     assert found["worst_any_state_miss_m"] == worst.value_m == found["history"][-1]["value_m"]
@@ -84,7 +84,7 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert record.scenario == worst.scenario
     code, out, _ = infoset("replay", "worst.npz", "--out", "figures")
     assert code == 0
-    assert "worst-found + range meter" in out
+    assert "worst-found + range sensor" in out
     assert sorted(each.name for each in (tmp_path / "figures").iterdir()) == [
         "figure-2-process.pdf",
         "figure-2-process.png",
@@ -97,13 +97,13 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
 
 def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path) -> None:
     code, out, _ = infoset(
-        "adversary", "--budget", BUDGET, "--model", "guaranteed", "--no-range-meter", "--strategy", "patient"
+        "adversary", "--budget", BUDGET, "--model", "guaranteed", "--no-range-sensor", "--strategy", "patient"
     )
     assert code == 0
-    assert "asteroid-1997, without range meter, model guaranteed, strategy patient: 12 simulated" in out
+    assert "asteroid-1997, without range sensor, model guaranteed, strategy patient: 12 simulated" in out
     lines = (
         "patient",
-        "greatest miss of any state of the set, m",
+        "maximum miss of any state of the set, m",
         "miss of the simulated truth, m",
         "searched: starts in the uncertainty, errors within their bounds, target accelerations up to 0.005 m/s^2; "
         "objective: any state of the set",
@@ -142,7 +142,7 @@ def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Sc
         assert math.hypot(*errors) <= sensor.error_bound(step.true_range_m) * (1.0 + 1e-9)
 
 
-def test_both_greatest_misses_are_those_of_bound(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
     monkeypatch.setattr("sim.bound.PERIODS_LOOKED_AT", 1)  # few pairs
     monkeypatch.setattr("sim.bound.REFINEMENTS", 0)
@@ -207,7 +207,7 @@ def test_quiet_prints_nothing(infoset: Command) -> None:
         (["--strategy", "symetric-miss"], '--strategy: there is no "symetric-miss"; did you mean symmetric-miss?'),
         (["--model", "papers"], 'there is no "papers"; did you mean paper? choose one of: paper, guaranteed'),
         (["asteroid-1998"], "asteroid-1998"),
-        (["asteroid-1997-single", "--range-meter"], "has no [range_sensor]"),
+        (["asteroid-1997-single", "--range-sensor"], "has no [range_sensor]"),
     ],
 )
 def test_what_is_refused_before_anything_is_flown(arguments: list[str], message: str, infoset: Command) -> None:

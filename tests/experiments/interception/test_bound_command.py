@@ -112,7 +112,7 @@ def test_bound_into_a_folder(
     assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
     for title in ("pairs", "set never", "also", "closing speed", "equal measurements until", "guaranteed"):
         assert title in out
-    assert "miss / bound: greatest miss of pairs and search, without sets that became empty" in out
+    assert "miss / bound: maximum miss of pairs and search, without sets that became empty" in out
     assert re.search(r"^guaranteed: ", out, re.MULTILINE)
     best = min(found["strategies"], key=lambda each: each["worst_found_m"])
     assert found["value"] == {
@@ -124,7 +124,7 @@ def test_bound_into_a_folder(
         "best_strategy_worst_found_m": best["worst_found_m"],
     }
     assert (
-        f"the value of the game is at least {found['lower_bound_m']:.3g} m; the least of the greatest misses found is "
+        f"the value of the game is at least {found['lower_bound_m']:.3g} m; the minimum of the maximum misses found is "
         f"{best['worst_found_m']:.3g} m, of {best['name']}: what it guarantees is that or more\n"
     ) in out
     assert (
@@ -311,19 +311,19 @@ def test_figure_of_few_labels_and_of_many(short: Scenario, planar: LowerBound) -
     assert len(left.get_lines()[0].get_xydata()) == 3  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("greatest_m", [40.0, 4e3])
-def test_figure_of_strategies(greatest_m: float, short: Scenario, planar: LowerBound) -> None:
-    worst_m = {"patient": greatest_m, "least-effort": 26.0, "module.OfAnEngineer": 30.0}
+@pytest.mark.parametrize("max_m", [40.0, 4e3])
+def test_figure_of_strategies(max_m: float, short: Scenario, planar: LowerBound) -> None:
+    worst_m = {"patient": max_m, "least-effort": 26.0, "module.OfAnEngineer": 30.0}
     figure = draw_bound(short, planar, worst_m)
     width_mm, _ = 25.4 * figure.get_size_inches()
     assert width_mm == pytest.approx(88.0)  # a column of a paper
     axes = figure.axes[2]
-    assert axes.get_xscale() == ("linear" if greatest_m < 100.0 else "log")
+    assert axes.get_xscale() == ("linear" if max_m < 100.0 else "log")
     marks = [line.get_xydata().tolist()[0] for line in axes.get_lines() if line.get_marker() == "o"]  # type: ignore[union-attr]
-    assert marks == [[26.0, 0.0], [30.0, 1.0], [greatest_m, 2.0]]
+    assert marks == [[26.0, 0.0], [30.0, 1.0], [max_m, 2.0]]
     assert axes.get_lines()[0].get_xdata()[0] == planar.bound_m  # type: ignore[index]
     named = [text.get_text() for text in axes.texts]
-    assert named == ["bound", "least-effort, 26 m", "module.OfAnEngineer, 30 m", f"patient, {number(greatest_m)} m"]
+    assert named == ["bound", "least-effort, 26 m", "module.OfAnEngineer, 30 m", f"patient, {number(max_m)} m"]
     frame = axes.get_window_extent()
     assert all(text.get_window_extent().x1 <= frame.x1 for text in axes.texts)
 
@@ -333,7 +333,7 @@ def test_bound_by_one_motion(infoset: Infoset, short: Scenario, tmp_path: Path) 
     """From 1.1 km with impulses of at most 0.5 m/s, for which 30 s are too few."""
     model = short.set_model
     box = replace(model.bounds, z_m=(900.0, 1100.0), vz_m_s=(0.0, 0.0))
-    weak = replace(short, thruster=replace(short.thruster, greatest_impulse_m_s=0.5))
+    weak = replace(short, thruster=replace(short.thruster, max_impulse_m_s=0.5))
     weak = replace(weak, **of_model(replace(model, bounds=box)), dispersion=box)
     file = tmp_path / "weak.toml"
     file.write_text(to_toml(weak))

@@ -49,7 +49,7 @@ def test_compare_as_json(infoset: Infoset, brief: Scenario, brief_file: Path, tm
     found = as_json(infoset, brief_file, *TWO, "--runs", 4, "--seed", 3)
     assert found["version"] == version("infoset")
     assert (found["scenario"], found["scenario_hash"]) == ("brief", fingerprint(with_model(brief, Model.GUARANTEED)))
-    assert (found["seed"], found["runs"], found["model"], found["range_meter"]) == (3, 4, "guaranteed", True)
+    assert (found["seed"], found["runs"], found["model"], found["range_sensor"]) == (3, 4, "guaranteed", True)
     strategies = found["strategies"]
     assert [(each["name"], each["noise"]) for each in strategies] == [
         ("symmetric-miss", "random"),
@@ -60,7 +60,7 @@ def test_compare_as_json(infoset: Infoset, brief: Scenario, brief_file: Path, tm
     for each in strategies:
         for quantity in ("miss_m", "impulse_m_s"):
             assert list(each[quantity]) == LEVELS
-            # Three runs show the median and the greatest value only.
+            # Three runs show the median and the maximum value only.
             assert [name for name, value in each[quantity].items() if value is not None] == ["p50", "max"]
             assert each[quantity]["p50"] <= each[quantity]["max"]
         assert each["truth_kept"] == each["phi_held"] == 4
@@ -97,9 +97,9 @@ def test_what_is_said_is_told_apart_from_what_is_piped(infoset: Infoset, brief_f
 
 
 def test_the_table(infoset: Infoset) -> None:
-    code, out, _ = infoset(*TWO, "--runs", 2, "--no-range-meter")
+    code, out, _ = infoset(*TWO, "--runs", 2, "--no-range-sensor")
     assert code == 0
-    assert "asteroid-1997, without range meter, model guaranteed: quantiles of 2 runs" in out
+    assert "asteroid-1997, without range sensor, model guaranteed: quantiles of 2 runs" in out
     for part in ("p10", "p50", "p99", "max", "symmetric-miss  miss, m", "impulse, m/s", "random", "game"):
         assert part in out
     lines = [line.rstrip() for line in out.splitlines()[1:] if not line.startswith("game noise (")]
@@ -108,7 +108,7 @@ def test_the_table(infoset: Infoset) -> None:
 
 def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Path) -> None:
     asked = (brief_file, *TWO)
-    assert infoset(*asked, "--runs", 3, "--out", "out", "--csv", "beside.csv", "--no-range-meter")[0] == 0
+    assert infoset(*asked, "--runs", 3, "--out", "out", "--csv", "beside.csv", "--no-range-sensor")[0] == 0
     assert sorted(each.name for each in (tmp_path / "out").iterdir()) == FILES
     text = (tmp_path / "out" / "results.csv").read_text()
     assert text == (tmp_path / "beside.csv").read_text()
@@ -141,7 +141,7 @@ def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Pat
         (["--seed", "-1"], ["--seed"]),
         (["--model", "papr"], ["--model", 'there is no "papr"; did you mean paper? choose one of: paper, guaranteed']),
         (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
-        (["asteroid-1997-single", "--range-meter"], ["--range-meter", "[range_sensor]"]),
+        (["asteroid-1997-single", "--range-sensor"], ["--range-sensor", "[range_sensor]"]),
         (["--json", "-", "--csv", "-"], ["--json and --csv"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
     ],
@@ -170,6 +170,7 @@ def test_the_strategies_of_a_comparison(infoset: Infoset, brief_file: Path) -> N
         assert [each["name"] for each in found[::2]] == names
     assert set(COMPARED) < set(strategy_names())
     _, help_text, _ = infoset("--help")
+    help_text = "".join(help_text.split())
     assert all(name in help_text for name in COMPARED)
 
 

@@ -89,7 +89,7 @@ def test_process_rows_share_limits_and_hold_the_impulse_limit(records: list[Reco
     for first, second in zip(figure.axes[::2], figure.axes[1::2], strict=True):
         assert first.get_ylim() == second.get_ylim()
     low, high = figure.axes[4].get_ylim()
-    limit = records[0].scenario.thruster.greatest_impulse_m_s
+    limit = records[0].scenario.thruster.max_impulse_m_s
     assert low < -limit < limit < high
 
 
@@ -312,9 +312,9 @@ def test_equal_values_are_drawn(curves: list[Curve]) -> None:
     figure = draw_distributions([replace(curves[0], results=results)])
     assert [kind for kind, content in figure_bytes(figure) if content] == ["pdf", "png"]
     for axes, value in zip(figure.axes, (0.0, 5.0), strict=False):
-        least, greatest = axes.get_xlim()
-        assert least <= value <= greatest
-        assert least < greatest
+        minimum, maximum = axes.get_xlim()
+        assert minimum <= value <= maximum
+        assert minimum < maximum
 
 
 def test_files_are_written_twice_the_same(curves: list[Curve]) -> None:

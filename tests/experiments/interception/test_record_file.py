@@ -225,7 +225,7 @@ def test_an_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_file_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record_file, "LARGEST_FILE_BYTES", 10)
+    monkeypatch.setattr(record_file, "MAX_FILE_BYTES", 10)
     (tmp_path / "x.npz").write_bytes(b"x" * 11)
     with pytest.raises(InputError, match="more than any record"):
         load_record(tmp_path / "x.npz")

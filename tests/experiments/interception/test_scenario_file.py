@@ -116,11 +116,14 @@ def test_the_start_for_an_own_scenario_has_every_key() -> None:
     [
         (["information_set.sections=3"], "sections must be at least fewest_sections, 5: got 3"),
         (["range_sensor.period_s=0.7"], "range_sensor.period_s must be a whole number of steps of 0.5 s: got 0.7 s"),
-        (["information_set.range_threshold_km=5500"], "range_threshold_m must be less than the least range of bounds"),
-        (["angle_sensor.error_at_nominal_range_rad=1e-6"], "its error bound must be positive up to the greatest"),
-        (["sun.distance_km=6000"], "sun.distance_m must be greater than the greatest possible range"),
-        (["body.radius_km=5400"], "body.radius_m must be less than the least possible range"),
-        (["thruster.greatest_impulse_m_s=0.1"], "least_impulse_m_s must not exceed greatest_impulse_m_s"),
+        (
+            ["information_set.range_threshold_km=5500"],
+            "range_threshold_m must be less than the minimum range of bounds",
+        ),
+        (["angle_sensor.error_at_nominal_range_rad=1e-6"], "its error bound must be positive up to the maximum"),
+        (["sun.distance_km=6000"], "sun.distance_m must be greater than the maximum possible range"),
+        (["body.radius_km=5400"], "body.radius_m must be less than the minimum possible range"),
+        (["thruster.max_impulse_m_s=0.1"], "min_impulse_m_s must not exceed max_impulse_m_s"),
         (["thruster.impulses_s=[20, 60]"], "impulses_s, times before the arrival, must decrease"),
         (["thruster.impulses_s=[200]"], "thruster.impulses_s: the first impulse can be given 100.022 s before"),
         (["thruster.last_impulse_s=101"], "thruster.last_impulse_s excludes all impulses"),
@@ -168,7 +171,7 @@ def test_impulses_that_lead_near_the_attracting_body() -> None:
     endless = "thruster.budget_m_s=1e12"
     assert on_board_model(load_scenario("own-scenario", [endless])).speed_error < 0.02
     with pytest.raises(InputError, match="gravity has no bound: the motions may come too near"):
-        load_scenario("own-scenario", [endless, "thruster.greatest_impulse_m_s=1e12"])
+        load_scenario("own-scenario", [endless, "thruster.max_impulse_m_s=1e12"])
 
 
 def test_steep_lines_of_sight_in_the_papers_model_are_warned_of() -> None:
@@ -239,12 +242,12 @@ def test_warning(setting: str, part: str) -> None:
     assert part in warning
 
 
-def _floats(least: float, greatest: float) -> st.SearchStrategy[float]:
-    return st.floats(least, greatest).filter(lambda value: value == 0 or abs(value) > 1e-90)
+def _floats(minimum: float, maximum: float) -> st.SearchStrategy[float]:
+    return st.floats(minimum, maximum).filter(lambda value: value == 0 or abs(value) > 1e-90)
 
 
-def _intervals(least: float, greatest: float) -> st.SearchStrategy[tuple[float, float]]:
-    return st.tuples(_floats(least, greatest), _floats(least, greatest)).map(lambda ends: (min(ends), max(ends)))
+def _intervals(minimum: float, maximum: float) -> st.SearchStrategy[tuple[float, float]]:
+    return st.tuples(_floats(minimum, maximum), _floats(minimum, maximum)).map(lambda ends: (min(ends), max(ends)))
 
 
 def _boxes(*, is_spatial: bool) -> st.SearchStrategy[StateBox]:
@@ -300,7 +303,7 @@ def _scenarios(draw: st.DrawFn) -> Scenario:
     nominal_range_m = draw(_floats(1e6, 3e7))
     step_s = draw(_floats(0.25, 2.0))
     sections = draw(st.integers(1, 10_000))
-    least_impulse, greatest_impulse = sorted(draw(st.tuples(_floats(0.0, 100.0), _floats(1e-3, 100.0))))
+    min_impulse, max_impulse = sorted(draw(st.tuples(_floats(0.0, 100.0), _floats(1e-3, 100.0))))
     at_zero = draw(_floats(1e-6, 0.3))
     bounds = draw(_boxes(is_spatial=False))
     suns = st.builds(Sun, _floats(1e18, 1e22), _floats(1e11, 1e13), _floats(-6.25, 6.25))
@@ -327,7 +330,7 @@ def _scenarios(draw: st.DrawFn) -> Scenario:
             )
         ),
         range_sensor=draw(st.none() | st.builds(RangeSensor, periods, _floats(1e-6, 0.99))),
-        thruster=Thruster(draw(_floats(0.0, 1e5)), least_impulse, max(greatest_impulse, 1e-3)),
+        thruster=Thruster(draw(_floats(0.0, 1e5)), min_impulse, max(max_impulse, 1e-3)),
         strategy=draw(st.sampled_from(strategy_names())),
         noise=draw(st.sampled_from(NoiseKind)),
         tie=draw(st.sampled_from(TieRule)),

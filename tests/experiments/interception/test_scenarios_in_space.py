@@ -105,7 +105,7 @@ def test_the_error_law_is_checked_where_the_object_goes_across_along_y() -> None
     law = "error_at_nominal_range_rad = 0.00002"
     assert read_text(Scenario, re.sub("error_at_nominal_range_rad = 0.00015", law, spatial()), "mine.toml").is_spatial
     wide = re.sub("error_at_nominal_range_rad = 0.00015", law, spatial(uncertainty__y_km="[-9000.0, 9000.0]"))
-    assert "its error bound must be positive up to the greatest distance" in message_of(wide)
+    assert "its error bound must be positive up to the maximum distance" in message_of(wide)
 
 
 def test_the_guaranteed_model_needs_labels_in_space_too() -> None:

@@ -20,7 +20,7 @@ from experiments.interception.course import Clock, Courses, duration_text, possi
 from experiments.interception.curves import Curve
 from experiments.interception.figures.animation import animate
 from experiments.interception.figures.approach import draw_approach
-from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, greatest_guarantee
+from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, max_guarantee
 from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets, planes_at
@@ -126,19 +126,19 @@ def test_ellipses_contain_their_share_of_the_runs() -> None:
     assert {"ellipse: 50 % of the runs", "ellipse: 99 % of the runs"} <= set(legend(figure))
 
 
-def test_the_greatest_guaranteed_miss_of_the_runs_is_a_circle(results: Results) -> None:
+def test_the_max_guaranteed_miss_of_the_runs_is_a_circle(results: Results) -> None:
     bound = float(results.guaranteed_miss_m.max())
     assert cloud("paper model", [results]).guaranteed_m is None
     sound = cloud("guaranteed", [replace(results, guarantees=True)])
     assert sound.guaranteed_m == bound
     figure = draw_b_plane([replace(sound, guaranteed_m=1.5 * float(results.miss_m.max()))])
     assert circles(figure.axes[0])["_guarantee"] == 1.5 * float(results.miss_m.max())
-    assert "circle: guaranteed miss Φ, greatest of the runs" in legend(figure)
+    assert "circle: guaranteed miss Φ, maximum of the runs" in legend(figure)
     far = draw_b_plane([replace(sound, guaranteed_m=1e5)])
     assert "_guarantee" not in circles(far.axes[0])
-    assert far.axes[0].get_title().endswith("greatest Φ: 100000.0 m")
-    assert "circle: guaranteed miss Φ, greatest of the runs: beyond the axes" in legend(far)
-    assert greatest_guarantee([3.0, np.inf]) is None
+    assert far.axes[0].get_title().endswith("maximum Φ: 100000.0 m")
+    assert "circle: guaranteed miss Φ, maximum of the runs: beyond the axes" in legend(far)
+    assert max_guarantee([3.0, np.inf]) is None
 
 
 def test_samples_that_differ_much_have_limits_for_each_panel(results: Results) -> None:
@@ -173,7 +173,7 @@ def test_process_has_the_courses_of_both_axes(records: list[Record]) -> None:
     steps = records[0].steps
     assert len(figure.axes) == 8
     assert [axes.get_title() for axes in figure.axes[:2]] == ["along y", "along z"]
-    assert figure.axes[0].texts[0].get_text().startswith("random noise, range meter\nmiss ")
+    assert figure.axes[0].texts[0].get_text().startswith("random noise, range sensor\nmiss ")
     for column, axis in enumerate(AXES):
         angle, rate, _, below = figure.axes[column::2]
         for axes, field, scale in ((angle, "true_angle_rad", 1e3), (rate, "true_rate_rad_s", 1e6)):
@@ -219,7 +219,7 @@ def test_the_sets_of_both_planes_are_side_by_side(records: list[Record]) -> None
         "(c) {}\nalong y, t = 8 s",
         "(d) {}\nalong z, t = 8 s",
     ]
-    assert [axes.get_title() for axes in figure.axes] == [each.format("random noise, range meter") for each in titles]
+    assert [axes.get_title() for axes in figure.axes] == [each.format("random noise, range sensor") for each in titles]
     for number, axes in enumerate(figure.axes):
         step, axis = records[0].steps[(1, 16)[number // 2]], AXES[number % 2]
         assert axes.get_xlabel() == f"line-of-sight rate ω along {axis}, µrad/s"
@@ -300,7 +300,7 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
 @pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-space"])
 def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
-    monkeypatch.setattr("experiments.interception.course.MOST_COURSES", 3)
+    monkeypatch.setattr("experiments.interception.course.MAX_COURSES", 3)
     scenario = load_scenario(name)
     scenario = replace(scenario, **of_model(replace(scenario.set_model, sections=5)))
     courses = Courses(scenario, 4)
@@ -310,17 +310,17 @@ def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.
     for run in range(3):
         record = fly_one(scenario, run)
         _, misses = possible_misses(record)
-        greatest = np.hypot.reduce([np.abs(interval).max(axis=1) for interval in misses.values()])
+        maximum = np.hypot.reduce([np.abs(interval).max(axis=1) for interval in misses.values()])
         stored = courses.possible_m[run]
-        greatest = greatest[: min(len(greatest) - 1, len(stored))]
-        np.testing.assert_array_equal(stored[: len(greatest)], greatest)
-        assert np.isnan(stored[len(greatest) :]).all()
+        maximum = maximum[: min(len(maximum) - 1, len(stored))]
+        np.testing.assert_array_equal(stored[: len(maximum)], maximum)
+        assert np.isnan(stored[len(maximum) :]).all()
         given = [abs(step.impulse_m_s) for step in record.steps[: len(stored)]]
         np.testing.assert_allclose(courses.impulse_m_s[run, : len(given)], given, rtol=1e-12)
 
 
-def test_courses_of_long_flights_keep_the_greatest_impulses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.interception.course.MOST_STEPS", 40)
+def test_courses_of_long_flights_keep_the_max_impulses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.interception.course.MAX_STEPS", 40)
     scenario = load_scenario("haiv-2013")
     courses = Courses(scenario, 2)
     assert len(courses.steps) <= 44
@@ -343,16 +343,16 @@ def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
     figure = draw_corridor([curve, curve], [courses, courses])
     left, right, left_impulse, _ = figure.axes
     assert left.get_title() == "(a) random noise, 3 runs"
-    median, greatest = (np.asarray(line.get_xydata(), dtype=np.float64) for line in left.lines[:2])
+    median, maximum = (np.asarray(line.get_xydata(), dtype=np.float64) for line in left.lines[:2])
     np.testing.assert_allclose(median[:, 1], np.median(courses.possible_m, axis=0)[: len(median)])
-    np.testing.assert_allclose(greatest[:, 1], courses.possible_m.max(axis=0)[: len(greatest)])
+    np.testing.assert_allclose(maximum[:, 1], courses.possible_m.max(axis=0)[: len(maximum)])
     assert left.get_ylim() == right.get_ylim()
     assert left.get_xlim() == left_impulse.get_xlim()
     assert legend(figure) == [
         "possible miss: median",
-        "possible miss: greatest",
+        "possible miss: maximum",
         "impulse: median",
-        "greatest guaranteed miss Φ",
+        "maximum guaranteed miss Φ",
         "body radius, 50 m",
         "times of the schedule",
     ]
@@ -371,7 +371,7 @@ def test_long_flights_and_schedules_have_a_logarithmic_time_axis(records: list[R
     assert legend(figure)[-1] == "last image 4 s, cut-off 10 s"
     titles = [axes.get_title() for axes in draw_sets([record], (90.0,)).axes]
     assert titles == [
-        f"({k}) random noise, range meter\nalong {axis}, 10 s before arrival"
+        f"({k}) random noise, range sensor\nalong {axis}, 10 s before arrival"
         for k, axis in zip("ab", AXES, strict=True)
     ]
     times = [duration_text(each) for each in (0.5, 59.0, 60.0, 100.0, 150.0, 14400.0, 86400.0)]
@@ -380,11 +380,11 @@ def test_long_flights_and_schedules_have_a_logarithmic_time_axis(records: list[R
 
 def test_the_axis_of_impulses_extends_to_small_impulses(records: list[Record]) -> None:
     scenario = records[0].scenario
-    strong = replace(scenario, thruster=replace(scenario.thruster, greatest_impulse_m_s=1e3))
+    strong = replace(scenario, thruster=replace(scenario.thruster, max_impulse_m_s=1e3))
     axes = draw_process([replace(records[0], scenario=strong)]).axes[4]
-    greatest = max(step.impulse_m_s for step in records[0].steps)
-    assert axes.get_ylim() == pytest.approx((-1.2 * greatest, 1.35 * greatest))
-    assert axes.texts[0].get_text() == "greatest impulse ±1000 m/s, beyond the axis"
+    maximum = max(step.impulse_m_s for step in records[0].steps)
+    assert axes.get_ylim() == pytest.approx((-1.2 * maximum, 1.35 * maximum))
+    assert axes.texts[0].get_text() == "maximum impulse ±1000 m/s, beyond the axis"
 
 
 def test_figures_name_the_angles_of_a_gimbal() -> None:

@@ -34,7 +34,7 @@ def sized(brief: Scenario, tmp_path: Path) -> Path:
     return file
 
 
-def test_a_better_range_meter_looks_worse_in_the_paper_and_the_study_says_why(infoset: Infoset) -> None:
+def test_a_better_range_sensor_looks_worse_in_the_paper_and_the_study_says_why(infoset: Infoset) -> None:
     """On commit 652bf7c nothing tells the two apart: the quantiles of the better meter are those of emptied sets."""
     published = load_scenario("asteroid-1997")
 
@@ -145,7 +145,7 @@ def test_the_json_of_campaigns_reports_and_sweeps_has_its_hits(infoset: Infoset,
 
 @pytest.mark.parametrize(("radius", "word"), [(1e5, "hit"), (1e-6, "missed")])
 def test_one_engagement_hits_or_misses(infoset: Infoset, sized: Path, radius: float, word: str) -> None:
-    size = ("--set", f"body.radius_m={radius}", "--no-range-meter")
+    size = ("--set", f"body.radius_m={radius}", "--no-range-sensor")
     code, out, _ = infoset("engage", sized, *size, "--record", "one.npz", "--out", "out")
     assert code == 0
     assert f"arrived, {word}" in out

@@ -278,7 +278,7 @@ ORBIT = "orbit_rate_rad_s = 1.13e-3"
         (changed("velocity_m_s = [0.0, 0.0, 0.0]", ""), [], "chaser: must have position_m and velocity_m_s, or"),
         (changed("[chaser]", "[chaser]\nepoch_s = 1.0"), [], "chaser: elements and epoch_s belong to inertial axes"),
         (changed("latest_s = 4000.0", "latest_s = 3999.0"), [], "times.latest_s: is before the last time_s"),
-        (OPTIMISED.replace("latest_s = 4000.0", "latest_s = 1000.0\nleast_gap_s = 400.0"), [], "3 visits do not fit"),
+        (OPTIMISED.replace("latest_s = 4000.0", "latest_s = 1000.0\nmin_gap_s = 400.0"), [], "3 visits do not fit"),
         (changed("[times]\nlatest_s = 4000.0", ""), ["--times", "best"], "--times best: with the last time free"),
         (OPTIMISED.replace("latest_s = 4000.0", ""), [], "times: with the last time free the energy falls to zero"),
         (targets(120), ["--order", "best"], "120 targets have 6.7e+198 orders"),
@@ -302,16 +302,16 @@ def test_unsound_problems_are_told(
 
 def test_a_bound_that_the_control_exceeds_says_by_how_much(infoset: Infoset, mine: Callable[[str], Path]) -> None:
     peak = told(infoset, "service-3")["peak_control_m_s2"]
-    code, out, err = infoset(mine(changed("[chaser]", "greatest_control_m_s2 = 0.002\n[chaser]")))
+    code, out, err = infoset(mine(changed("[chaser]", "max_control_m_s2 = 0.002\n[chaser]")))
     assert (code, out) == (2, "")
     assert f"reaches {peak:.6g} m/s^2, {peak / 0.002 - 1.0:.2%} over the bound of 0.002 m/s^2" in err
-    assert infoset(mine(changed("[chaser]", f"greatest_control_m_s2 = {peak * 1.0001}\n[chaser]")), "-q")[0] == 0
+    assert infoset(mine(changed("[chaser]", f"max_control_m_s2 = {peak * 1.0001}\n[chaser]")), "-q")[0] == 0
 
 
 LONG_LEG = """
 kind = "multipoint"
 orbit_rate_rad_s = 0.0011
-greatest_control_m_s2 = 1.2334e-06
+max_control_m_s2 = 1.2334e-06
 [chaser]
 position_m = [0.0, 0.0, 0.0]
 velocity_m_s = [0.0, 0.0, 0.0]

@@ -89,7 +89,7 @@ def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -
     assert sum(found["transfers_m2_s3"]) == pytest.approx(0.0, abs=1e-12)
     assert found["core"]["verdict"] == "empty"
     assert "the core is empty: each craft alone has zero excess" in found["core"]["reason"]
-    assert set(found["selections"]) == {"least_group_loss", "least_sum_of_costs", "least_greatest_excess", "preferred"}
+    assert set(found["selections"]) == {"min_group_loss", "min_sum_of_costs", "minimax_excess", "preferred"}
     assert len(found["sweep"]["group_loss_m2_s3"]) == len(found["sweep"]["meeting_time_s"])
     assert [each["name"] for each in found["samples"]] == ["first", "second", "third"]
     for each in found["samples"]:
@@ -155,13 +155,13 @@ def test_an_intercept_and_craft_that_start_later(infoset: Infoset, mine: Callabl
 
 
 def test_a_bound_that_another_control_meets(infoset: Infoset, mine: Callable[[str], Path]) -> None:
-    file = mine(changed("duration_s", "greatest_control_m_s2 = 1.4\nduration_s"))
+    file = mine(changed("duration_s", "max_control_m_s2 = 1.4\nduration_s"))
     code, out, _ = infoset(file, "--json", "found.json")
     assert code == 0
     found = strict(Path("found.json").read_text())["craft"]
     assert [each["feasibility"] for each in found] == ["within", "within", "another-control"]
     third = found[2]
-    assert third["least_peak_control_m_s2"] < 1.4 < third["peak_control_m_s2"]
+    assert third["min_peak_control_m_s2"] < 1.4 < third["peak_control_m_s2"]
     assert f"exceeds the bound 1.4 m/s^2 by {third['peak_control_m_s2'] / 1.4 - 1.0:.2%}" in out
 
 
@@ -229,13 +229,13 @@ def test_unsound_files_are_told(
 
 
 def test_a_bound_that_no_control_meets_says_by_how_much(infoset: Infoset, mine: Callable[[str], Path]) -> None:
-    code, out, err = infoset(mine(changed("duration_s", "greatest_control_m_s2 = 0.5\nduration_s")))
+    code, out, err = infoset(mine(changed("duration_s", "max_control_m_s2 = 0.5\nduration_s")))
     assert (code, out) == (2, "")
     assert "no control of at most 0.5 m/s^2 brings the craft third to the meeting" in err
-    least = float(err.split("at least ")[1].split(" m/s^2")[0])
-    assert f"{least / 0.5:.4g} times the bound" in err
+    minimum = float(err.split("at least ")[1].split(" m/s^2")[0])
+    assert f"{minimum / 0.5:.4g} times the bound" in err
     # Just over what is said, it can be met.
-    given = changed("duration_s", f"greatest_control_m_s2 = {least * 1.00001}\nduration_s")
+    given = changed("duration_s", f"max_control_m_s2 = {minimum * 1.00001}\nduration_s")
     assert infoset(mine(given), "-q")[0] == 0
 
 
@@ -244,7 +244,7 @@ kind = "pareto-encounter"
 orbit_rate_rad_s = 0.0011
 duration_s = 818181.8
 free = ["x"]
-greatest_control_m_s2 = 1.05e-5
+max_control_m_s2 = 1.05e-5
 [[craft]]
 name = "a"
 position_m = [1042.875, -544.668, -206.956]
@@ -296,7 +296,7 @@ start_s = 15.28
 def test_a_preferred_meeting_of_craft_that_start_late(
     wanted: float, nearest: Callable[[list[float]], float], infoset: Infoset, mine: Callable[[str], Path]
 ) -> None:
-    # With one free component the Pareto set is all between the least and the greatest ideal.
+    # With one free component the Pareto set is all between the minimum and the maximum ideal.
     code, out, err = infoset(mine(LATE), "--prefer", f"x_m={wanted}", "--json", "-", "-q")
     assert (code, err) == (0, "")
     found = strict(out)
@@ -361,7 +361,7 @@ def test_figures_say_what_they_show() -> None:
     controls = draw_controls(solution, 1.0).axes
     assert [each.get_ylabel() for each in controls][2:] == ["$u_z$ (normal), m/s$^2$", "$|u|$, m/s$^2$"]
     sweep = sweep_meeting_time(solution.encounter, [20.0, 30.0, 40.0])
-    front = draw_front(solution, {"least_group_loss": solution.point}, sweep).axes
+    front = draw_front(solution, {"min_group_loss": solution.point}, sweep).axes
     assert front[0].get_xlabel() == "x of the meeting, m"
     (hull,) = front[0].patches
     corners = np.asarray(hull.get_path().vertices)[:-1]

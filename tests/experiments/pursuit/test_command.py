@@ -116,7 +116,7 @@ def test_absurd_values_have_an_answer(settings: list[str], verdict: str, infoset
 
 
 def test_a_game_that_takes_too_long_to_follow_is_bounded(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rendezvous.pursuit_evasion.solver.follow", partial(follow, most_work=10.0))
+    monkeypatch.setattr("rendezvous.pursuit_evasion.solver.follow", partial(follow, max_work=10.0))
     code, out, _ = infoset("pursuit")
     assert code == 0
     assert "branch-not-certified: the extremals are a saddle up to a duration of" in out

@@ -29,8 +29,8 @@ KEYS = [
     *(
         "optimal_miss",
         "optimal_dimension",
-        "least_periods",
-        "least_periods_searched",
+        "min_periods",
+        "min_periods_searched",
         "sets",
         "controls",
         "control_ranges",
@@ -70,7 +70,7 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     assert found["version"] == version("infoset")
     assert (found["kind"], found["problem"], found["route"]) == ("reachable-rendezvous", "rendezvous-2021", "exact")
     assert found["problem_hash"] == fingerprint(load_rendezvous("rendezvous-2021"))
-    assert (found["optimal_miss"], found["least_periods"], found["optimal_dimension"]) == (0.0, 3, 6)
+    assert (found["optimal_miss"], found["min_periods"], found["optimal_dimension"]) == (0.0, 3, 6)
     second = found["sets"][1]
     assert second["period"] == 2
     assert [second["forward"][key] for key in ("vertices", "facets", "dimension")] == [130, 15, 6]
@@ -102,7 +102,7 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     ]
     assert len(first) == 12
     assert max(first) <= 0.5e-4
-    for piece in ("least terminal norm 0", "norm 0 needs at least 3 periods", "route: exact", "table 3", "replanned"):
+    for piece in ("minimum terminal norm 0", "norm 0 needs at least 3 periods", "route: exact", "table 3", "replanned"):
         assert piece in out
 
 
@@ -112,7 +112,7 @@ def test_json_alone_and_nothing_written(infoset: Infoset, tmp_path: Path) -> Non
     found: Any = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     assert (found["route"], found["route_reason"]) == ("lifted", "as asked")
     assert found["sets"][1]["tube"]["vertices"] is None
-    assert "least terminal norm" in err
+    assert "minimum terminal norm" in err
     assert list(tmp_path.iterdir()) == []
     assert infoset("--select", "energy", "-q") == (0, "", "")
 
@@ -160,7 +160,7 @@ def test_the_cone_is_inside_its_angle_and_kept() -> None:
         assert gaps.max() < 1e-6
     assert report.robustness is not None
     assert report.robustness.plan is not None
-    assert report.least_periods == 9
+    assert report.min_periods == 9
 
 
 def test_constraints_between_the_periods_bind(tmp_path: Path) -> None:
@@ -191,9 +191,9 @@ def test_other_values_are_not_compared_with_the_paper(tmp_path: Path) -> None:
 def test_tables_of_the_paper() -> None:
     given = load_rendezvous("rendezvous-2021")
     first, second, third = compare_published(given, solve(given.problem))
-    assert first.largest_difference <= 0.5e-4
-    assert third.largest_difference <= 0.5e-4
-    assert 1e-3 < second.largest_difference < 1e-2
+    assert first.max_difference <= 0.5e-4
+    assert third.max_difference <= 0.5e-4
+    assert 1e-3 < second.max_difference < 1e-2
     assert all(np.linalg.norm(each.ours.nonlinear[-1]) < 2.0 for each in (first, second, third))
     assert printed_tables()["table 2"].controls[0].tolist() == [-0.1254, 0.0373, -0.2612]
 
@@ -205,7 +205,7 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Infoset, tmp_path: 
     assert code == 0
     found = json.loads(out)
     assert found["optimal_miss"] == pytest.approx(611.79357068, abs=1e-8)
-    assert (found["least_periods"], found["least_periods_searched"]) == (3, 8)
+    assert (found["min_periods"], found["min_periods_searched"]) == (3, 8)
     assert found["optimal_dimension"] == 0
 
 
@@ -326,10 +326,10 @@ def test_figures_show_sets_members_and_ranges() -> None:
     assert [each.get_xlabel() for each in planes.axes] == along
     across = ["x (radial), m", "z (normal), m", "$v_x$ (radial), m/s", "$v_z$ (normal), m/s"]
     assert [each.get_ylabel() for each in planes.axes] == across
-    # The least sum of norms is the least L1 here, and is drawn once.
+    # The minimum sum of norms is the minimum L1 here, and is drawn once.
     assert [each.get_text() for each in planes.legends[0].get_texts()][2:] == [
         "start",
-        "terminal state of least norm",
+        "terminal state of minimum norm",
         "tube at t",
     ]
     assert len(controls.axes) == 3

@@ -81,7 +81,7 @@ def test_the_motion_as_published_is_equation_1_with_a_radius_of_90_km() -> None:
     np.testing.assert_allclose(to_paper(found), nonlinear(controls), rtol=0.0, atol=1e-6)
 
 
-def test_the_control_of_least_energy_gives_the_nonlinear_column_of_table_1(
+def test_the_control_of_min_energy_gives_the_nonlinear_column_of_table_1(
     numbers: dict[tuple[int, str], Comparison],
 ) -> None:
     computed = nonlinear(to_paper(minimum_energy(solve(RENDEZVOUS.problem).optimal)))
@@ -126,7 +126,7 @@ def test_nonlinear_less_linear_of_table_2_is_that_of_the_model(
 def test_misprints_follow_from_the_other_numbers(
     number: int, column: int, t: int, component: int, numbers: dict[tuple[int, str], Comparison]
 ) -> None:
-    """Least and greatest value over all controls that round to the printed ones and lead to the other positions."""
+    """Minimum and maximum value over all controls that round to the printed ones and lead to the other positions."""
     table = TABLES[number - 1]
     middle, changes = states(number)
     printed = np.array([table.linear, table.nonlinear])

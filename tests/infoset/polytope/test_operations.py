@@ -179,7 +179,7 @@ def test_an_empty_set_that_is_unbounded_by_its_directions_is_empty() -> None:
         Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [2.0, 10.0, 11.0])
 
 
-def test_the_relaxation_of_an_empty_set_is_the_least() -> None:
+def test_the_relaxation_of_an_empty_set_is_the_min() -> None:
     """Formerly it was wrong for reversed strips, normals of another length, and flat sets."""
     cube = Polytope.from_box([0.0] * 3, [1.0] * 3)
     for normal, lower, upper, wanted in (

@@ -14,9 +14,9 @@ from infoset.polytope import (
     Polytope,
     UnboundedPolytopeError,
     _qhull,
+    polytope_from_support,
     product,
     relative_interior,
-    shadow,
 )
 from tests.rendezvous.reachability.rationals import rational_hull, rational_intersection
 
@@ -218,13 +218,13 @@ def test_cut_and_product() -> None:
 
 
 @pytest.mark.parametrize("size", [2, 3])
-def test_shadow_by_supports_is_the_projection(size: int) -> None:
+def test_projection_by_supports_is_the_projection(size: int) -> None:
     solid = Polytope.from_vertices(random_points(3, 30, 5, 5))
 
     def furthest(direction: Floats) -> Floats:
         return solid.support_vector(np.concatenate([direction, np.zeros(5 - size)]))[:size]
 
-    found, expected = shadow(furthest, size), solid.project(range(size))
+    found, expected = polytope_from_support(furthest, size), solid.project(range(size))
     assert (len(found.vertices), len(found.normals)) == (len(expected.vertices), len(expected.normals))
     seen = directions(1, size)
     np.testing.assert_allclose(
@@ -232,11 +232,11 @@ def test_shadow_by_supports_is_the_projection(size: int) -> None:
     )
 
 
-def test_shadow_of_a_flat_set_and_of_one_with_too_many_facets() -> None:
+def test_projection_of_a_flat_set_and_of_one_with_too_many_facets() -> None:
     flat = Polytope.from_vertices([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
-    assert shadow(flat.support_vector, 3).dimension == 2
+    assert polytope_from_support(flat.support_vector, 3).dimension == 2
     with pytest.raises(ArithmeticError, match="over 20 facets"):
-        shadow(lambda direction: direction / np.linalg.norm(direction), 2, most_facets=20)
+        polytope_from_support(lambda direction: direction / np.linalg.norm(direction), 2, max_facets=20)
 
 
 def test_empty_says_by_how_much() -> None:

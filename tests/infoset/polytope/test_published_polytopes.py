@@ -18,7 +18,7 @@ from infoset.polytope import Polytope, UnboundedPolytopeError
 from tests.rationals import Fraction
 
 CASES: list[dict[str, Any]] = json.loads((Path(__file__).parent / "published_polytopes.json").read_text())["cases"]
-MOST_SUBSETS = 3000
+MAX_SUBSETS = 3000
 Row = tuple[Fraction, ...]
 
 
@@ -77,7 +77,7 @@ def test_constraints(case: dict[str, Any]) -> None:
     size = float(np.abs(polytope.vertices).max(initial=1.0))
     heights = table[:, 0] + polytope.vertices @ table[:, 1:].T
     assert float(heights.min(initial=0.0)) >= -1e-12 * size * float(np.abs(table).sum(axis=1).max())
-    if math.comb(len(sides), max(0, len(rows[0]) - 1 - len(equations))) > MOST_SUBSETS:
+    if math.comb(len(sides), max(0, len(rows[0]) - 1 - len(equations))) > MAX_SUBSETS:
         return
     wanted = exact_vertices(rows, equations)
     assert len(polytope.vertices) == len(wanted)

@@ -28,7 +28,7 @@ class DenseSolution:
     cost : float
         I, m^2/s^3.
     matrix : ndarray, shape (3 N + 3, 3 N + 3)
-        Q with its rows and columns scaled to a greatest entry of one.
+        Q with its rows and columns scaled to a maximum entry of one.
     """
 
     costate_start: Floats

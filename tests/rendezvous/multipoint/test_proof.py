@@ -16,7 +16,7 @@ from scipy.linalg import expm
 from scipy.sparse import csc_matrix
 
 from rendezvous.multipoint import DriftingTargets, Meet, Nodes, Target, Tour, solve_segments
-from rendezvous.piecewise import greatest_control
+from rendezvous.piecewise import max_control
 from rendezvous.relative_motion import (
     ClohessyWiltshire,
     EllipticOrbit,
@@ -70,7 +70,7 @@ def some_tour(seed: int, motion: LinearMotion, *, dwell: bool = False, flybys: b
 
 
 def flown(tour: Tour, times: Floats) -> tuple[Floats, float]:
-    """Greatest miss of the nodes in units of the segments, and the cost, by DOP853 under the computed control."""
+    """Maximum miss of the nodes in units of the segments, and the cost, by DOP853 under the computed control."""
     path = tour.fly(range(len(times)), times)
     worst, spent = 0.0, 0.0
     for index, (start, end) in enumerate(zip(path.starts_s, path.nodes.arrive_s, strict=True)):
@@ -107,7 +107,7 @@ def test_flying_the_control_passes_the_nodes_at_the_cost(name: str, seed: int) -
 
 
 def quadratic_program(tour: Tour, times: Floats) -> float:
-    """Least cost over controls at Gauss points, by clarabel; the transition from a plain matrix exponential."""
+    """Minimum cost over controls at Gauss points, by clarabel; the transition from a plain matrix exponential."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     matrix = tour.motion.dynamics(0.0)
     which = np.arange(len(times))
@@ -231,7 +231,7 @@ def test_no_peak_of_a_long_leg_is_missed() -> None:
     tour = Tour(motion, DriftingTargets((Target("T1", Meet.RENDEZVOUS),), motion, state), np.zeros(6))
     path = tour.fly((0,), [363636.364])
     sizes = np.linalg.norm(path.control(np.linspace(0.0, 363636.364, 400_001)), axis=1)
-    peak = greatest_control(path.control, path.breaks())
+    peak = max_control(path.control, path.breaks())
     assert sizes.max() <= peak <= sizes.max() * (1.0 + 1e-6)
     assert peak == pytest.approx(1.3052e-6, rel=1e-4)  # an independent computation
 

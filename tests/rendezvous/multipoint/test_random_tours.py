@@ -23,7 +23,7 @@ from rendezvous.multipoint import (
     best_order_of_slots,
     best_times,
 )
-from rendezvous.piecewise import greatest_control
+from rendezvous.piecewise import max_control
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ def transitions(motion: LinearMotion, times: Floats) -> Floats:
 
 
 def least_squares(tour: Tour, times: Floats) -> tuple[float, float]:
-    """The least cost over controls at Gauss points, stretch by stretch between rendezvous, and its doubt."""
+    """The minimum cost over controls at Gauss points, stretch by stretch between rendezvous, and its doubt."""
     places, weights = np.polynomial.legendre.leggauss(10)
     targets, cost, doubt = tour.targets, 0.0, 0.0
     begin_s, begin, first = tour.start_s, tour.start_state, 0
@@ -124,7 +124,7 @@ def least_squares(tour: Tour, times: Floats) -> tuple[float, float]:
         found = np.linalg.lstsq(system, goals, rcond=1e-15)[0]
         values = np.linalg.svd(system, compute_uv=False)
         cost += 0.5 * float(found @ found) / duration
-        # What rounding and integration of the goals leave, through the least singular value.
+        # What rounding and integration of the goals leave, through the minimum singular value.
         wrong = 1e-12 * float(np.abs(begin / scale).max() * np.abs(phi).max() / size.min() + np.abs(goals).max())
         doubt += float(np.sqrt(2.0 * cost * duration) * wrong / values[-1] + (wrong / values[-1]) ** 2) / duration
         leave = times[last] + target.dwell_s
@@ -145,7 +145,7 @@ def the_peak_agrees(seed: int) -> None:
     random = np.random.default_rng(seed)
     tour, times = some_tour(random, int(random.integers(1, 4)), 1000.0)
     path = tour.fly(range(len(times)), times)
-    found = greatest_control(path.control, path.breaks())
+    found = max_control(path.control, path.breaks())
     top = sampled_peak(path)
     rounding = 1e-14 * float(np.abs(times).max() / (times - path.starts_s).min())
     assert found == pytest.approx(top, rel=1e-8 + rounding)
@@ -153,7 +153,7 @@ def the_peak_agrees(seed: int) -> None:
 
 
 def sampled_peak(path: Path) -> float:
-    """The greatest of many samples of each leg, searched for around the greatest of them."""
+    """The maximum of many samples of each leg, searched for around the maximum of them."""
     top = 0.0
     for start, end in zip(path.starts_s, path.nodes.arrive_s, strict=True):
         times = np.linspace(start, end, 3001)
@@ -212,14 +212,14 @@ def times_agree(seed: int) -> None:
     stays = tour.dwell_s
     latest = float(times[-1])
     room = latest - tour.start_s - float(stays[:-1].sum())
-    least = float(random.choice([0.0, 0.9 / count, random.uniform(0.01, 0.3)])) * room / count
+    minimum = float(random.choice([0.0, 0.9 / count, random.uniform(0.01, 0.3)])) * room / count
     price = 0.0
     if random.random() < 0.4:
         price = tour.fly(range(count), times).cost / room * 10.0 ** random.uniform(-2.0, 1.0)
-    limits = TimeLimits(latest, least, price)
+    limits = TimeLimits(latest, minimum, price)
     found = best_times(tour, range(count), limits)
     gaps = np.diff(np.concatenate([[tour.start_s], found.time_s])) - np.concatenate([[0.0], stays[:-1]])
-    floor = max(least, 1e-6 * room)
+    floor = max(minimum, 1e-6 * room)
     assert (gaps >= floor * (1.0 - 1e-9)).all()
     assert found.time_s[-1] <= latest + 1e-9 * room
     paid = price * float(found.time_s[-1] - tour.start_s)
@@ -275,7 +275,7 @@ def test_random_tours(check: Check, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [1097, 1099, 1428])
 def test_times_in_the_lowest_of_several_valleys(seed: int) -> None:
-    # From few starts, the valley of a worse minimum was found: 1.7 to 2.6 times the least cost.
+    # From few starts, the valley of a worse minimum was found: 1.7 to 2.6 times the minimum cost.
     times_agree(seed)
 
 

@@ -125,10 +125,10 @@ def test_orders_are_counted_without_a_list_of_them() -> None:
     try:
         with pytest.raises(ValueError, match="no order fits the times"):
             best_order_of_slots(tour, 400.0 * np.arange(1.0, 9.0))
-        _, most_bytes = tracemalloc.get_traced_memory()
+        _, max_bytes = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert most_bytes < 500_000
+    assert max_bytes < 500_000
 
 
 def test_a_long_stay_fits_where_it_is_last() -> None:
@@ -159,8 +159,8 @@ def test_visits_that_just_fit_are_not_refused_for_rounding(seed: int) -> None:
     found = best_order(tour, TimeLimits(float(times[-1]), gap))
     swapped = (order[1], order[0], order[2])
     middle = start_s + np.cumsum(np.full(3, gap)) + np.append(0.0, np.cumsum(stays[list(swapped)])[:2])
-    least = min(tour.fly(order, times).cost, tour.fly(swapped, middle).cost)
-    assert found.objective == pytest.approx(least, rel=1e-7)
+    minimum = min(tour.fly(order, times).cost, tour.fly(swapped, middle).cost)
+    assert found.objective == pytest.approx(minimum, rel=1e-7)
     assert found.unfit == 4
 
 
@@ -215,7 +215,7 @@ def test_bounds_leave_orders_unseen(tours: Make) -> None:
 def test_gaps_and_stays_are_kept(tours: Make) -> None:
     meets = [Meet.FLYBY, Meet.RENDEZVOUS, Meet.FLYBY]
     tour = tours(3, meets, [0.0, 500.0, 0.0])
-    found = best_times(tour, (0, 1, 2), TimeLimits(latest_s=4500.0, least_gap_s=1300.0))
+    found = best_times(tour, (0, 1, 2), TimeLimits(latest_s=4500.0, min_gap_s=1300.0))
     times, leave = found.time_s, found.path.nodes.leave_s
     gaps = np.diff(np.concatenate([[0.0], times])) - np.array([0.0, 0.0, 500.0])
     assert (gaps >= 1300.0 * (1.0 - 1e-9)).all()
@@ -248,7 +248,7 @@ def test_a_free_last_time_needs_a_limit_or_a_price() -> None:
         TimeLimits()
 
 
-@pytest.mark.parametrize("changes", [{"least_gap_s": -1.0}, {"price_per_s": np.nan}, {"latest_s": np.inf}])
+@pytest.mark.parametrize("changes", [{"min_gap_s": -1.0}, {"price_per_s": np.nan}, {"latest_s": np.inf}])
 def test_unsound_limits_are_refused(changes: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="finite"):
         TimeLimits(**{"latest_s": 100.0, **changes})
@@ -256,7 +256,7 @@ def test_unsound_limits_are_refused(changes: dict[str, float]) -> None:
 
 def test_visits_that_do_not_fit_are_refused(tours: Make) -> None:
     with pytest.raises(ValueError, match="do not fit before the latest time, 1000 s"):
-        best_times(tours(3), (0, 1, 2), TimeLimits(latest_s=1000.0, least_gap_s=400.0))
+        best_times(tours(3), (0, 1, 2), TimeLimits(latest_s=1000.0, min_gap_s=400.0))
     with pytest.raises(ValueError, match="do not fit"):
         best_order(tours(2), TimeLimits(latest_s=-5.0))
 

@@ -27,9 +27,9 @@ from rendezvous.pareto import (
     check_bound,
     distances,
     front_of_two,
-    least_greatest_excess,
-    least_peak,
-    least_sum_of_costs,
+    min_peak,
+    min_sum_of_costs,
+    minimax_excess,
     nearest_to,
     pareto_set,
     peak_control,
@@ -112,17 +112,17 @@ def test_weights_cover_the_simplex(count: int) -> None:
 
 @given(SEEDS, st.integers(1, 5), st.booleans(), st.sampled_from(list(Meeting)))
 @settings(max_examples=30, deadline=None)
-def test_the_least_sum_of_costs_is_least(seed: int, count: int, own_starts: bool, meeting: Meeting) -> None:
+def test_the_min_sum_of_costs_is_min(seed: int, count: int, own_starts: bool, meeting: Meeting) -> None:
     solution = some(seed, count, own_starts=own_starts, meeting=meeting)
 
     def value(point: Floats) -> float:
         return float(solution.encounter.weights @ np.sqrt(solution.cost_squared(point)))
 
-    found = value(least_sum_of_costs(solution))
+    found = value(min_sum_of_costs(solution))
     spread = float(np.ptp(solution.ideals, axis=0).max()) + 1.0
     random = np.random.default_rng(seed)
     for size in (1.0, 0.1, 1e-2, 1e-3):
-        near = least_sum_of_costs(solution) + size * spread * random.normal(size=(40, 3))
+        near = min_sum_of_costs(solution) + size * spread * random.normal(size=(40, 3))
         values = np.sqrt(solution.cost_squared(near)) @ solution.encounter.weights
         assert values.min() >= found * (1.0 - 1e-10)
 
@@ -133,15 +133,15 @@ def test_an_intercept_in_which_one_craft_outweighs_the_rest_is_where_that_one_co
         replace(each, weight=weight) for each, weight in zip(solution.encounter.craft, (9.0, 1.0, 1.0), strict=True)
     )
     heavy = solve_encounter(replace(solution.encounter, craft=craft))
-    np.testing.assert_allclose(least_sum_of_costs(heavy), heavy.costs[0].ideal, rtol=1e-9)
+    np.testing.assert_allclose(min_sum_of_costs(heavy), heavy.costs[0].ideal, rtol=1e-9)
     assert heavy.costs[0].ideal_cost_squared == 0.0
 
 
 @given(SEEDS, st.integers(2, 6), st.booleans())
 @settings(max_examples=30, deadline=None)
-def test_the_least_greatest_excess_is_least(seed: int, count: int, own_starts: bool) -> None:
+def test_the_minimax_excess_is_min(seed: int, count: int, own_starts: bool) -> None:
     solution = some(seed, count, own_starts=own_starts)
-    weights, point = solution.encounter.weights, least_greatest_excess(solution)
+    weights, point = solution.encounter.weights, minimax_excess(solution)
     excess = weights * solution.excess(point)
     top = float(excess.max())
     # Optimal where a mix of the slopes of those that bind vanishes: then no direction lowers them all.
@@ -277,7 +277,7 @@ def test_peak_and_impulse_of_a_flight() -> None:
     assert total_impulse(plan) == pytest.approx(trapezoid(sizes, times), rel=1e-8)
 
 
-def test_the_least_peak_of_a_hundred_and_forty_revolutions() -> None:
+def test_the_min_peak_of_a_hundred_and_forty_revolutions() -> None:
     # A fixed rule of 16 panels gave 1.1396e-5 m/s^2, above what suffices.
     motion = ClohessyWiltshire(0.0011)
     states = [
@@ -287,9 +287,9 @@ def test_the_least_peak_of_a_hundred_and_forty_revolutions() -> None:
     craft = tuple(Craft(name, np.array(state), motion) for name, state in zip("ab", states, strict=True))
     solution = solve_encounter(Encounter(craft, 818181.8, (Component.X,), np.zeros(6)))
     plan = solution.plan(0)
-    least = least_peak(plan)
-    # Any direction bounds it from below, here the one of least energy by a plain rule; and a control is found by hand:
-    # held over 5000 intervals, in the direction of the multipliers, corrected by least squares.
+    minimum = min_peak(plan)
+    # Any direction bounds it from below, here the one of minimum energy by a plain rule; and a control is found by
+    # hand: held over 5000 intervals, in the direction of the multipliers, corrected by least squares.
     count = 5000
     grid = np.linspace(0.0, 818181.8, count + 1)
     scale = np.array([818181.8] * 3 + [1.0] * 3)
@@ -309,56 +309,56 @@ def test_the_least_peak_of_a_hundred_and_forty_revolutions() -> None:
     controls = controls + white[2].T @ (goal - white[2] @ controls)
     np.testing.assert_allclose(rows @ controls, wanted, atol=1e-9 * np.abs(wanted).max())
     peak = float(np.linalg.norm(controls.reshape(count, 3), axis=1).max())
-    assert least <= peak <= least * 1.001
+    assert minimum <= peak <= minimum * 1.001
     assert check_bound(plan, 1.05e-5).feasibility is Feasibility.ANOTHER_CONTROL
     assert check_bound(plan, 9.9e-6).feasibility is Feasibility.IMPOSSIBLE
 
 
-def test_the_least_peak_of_a_straight_line() -> None:
+def test_the_min_peak_of_a_straight_line() -> None:
     # Far from the orbit's own motion, along one axis: rest to rest over d in T needs 4 d / T^2, intercept 2 d / T^2.
     motion = ClohessyWiltshire(1e-9)
     craft = (Craft("one", np.zeros(6), motion),)
     fixed = np.array([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     at_rest = solve_encounter(Encounter(craft, 100.0, (Component.Y,), fixed))
     plan = at_rest.plan(0, np.zeros(1))
-    assert least_peak(plan) == pytest.approx(4.0 * 10.0 / 100.0**2, rel=1e-4)
+    assert min_peak(plan) == pytest.approx(4.0 * 10.0 / 100.0**2, rel=1e-4)
     assert peak_control(plan) == pytest.approx(6.0 * 10.0 / 100.0**2, rel=1e-9)
     passing = solve_encounter(Encounter(craft, 100.0, (Component.Y,), fixed, Meeting.INTERCEPT))
-    assert least_peak(passing.plan(0, np.zeros(1)), 3) == pytest.approx(2.0 * 10.0 / 100.0**2, rel=1e-6)
+    assert min_peak(passing.plan(0, np.zeros(1)), 3) == pytest.approx(2.0 * 10.0 / 100.0**2, rel=1e-6)
 
 
 def test_bounds_are_met_or_not() -> None:
     plan = some(6, 2).plan(0)
-    peak, least = peak_control(plan), least_peak(plan)
-    assert least < peak
+    peak, minimum = peak_control(plan), min_peak(plan)
+    assert minimum < peak
     assert check_bound(plan, 1.001 * peak).feasibility is Feasibility.WITHIN
-    assert check_bound(plan, 0.5 * (peak + least)).feasibility is Feasibility.ANOTHER_CONTROL
-    check = check_bound(plan, 0.99 * least)
+    assert check_bound(plan, 0.5 * (peak + minimum)).feasibility is Feasibility.ANOTHER_CONTROL
+    check = check_bound(plan, 0.99 * minimum)
     assert check.feasibility is Feasibility.IMPOSSIBLE
-    assert check.least_peak_m_s2 == pytest.approx(least)
+    assert check.min_peak_m_s2 == pytest.approx(minimum)
     with pytest.raises(ValueError, match="bound on the control"):
         check_bound(plan, 0.0)
 
 
-def test_a_least_peak_that_is_not_certified_is_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_min_peak_that_is_not_certified_is_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = some(6, 2).plan(0)
-    monkeypatch.setattr("rendezvous.pareto.feasibility._MOST_STEPS", 1)
+    monkeypatch.setattr("rendezvous.pareto.feasibility._MAX_STEPS", 1)
     with pytest.raises(NotCertifiedError, match="between"):
-        least_peak(plan)
+        min_peak(plan)
 
 
 def test_a_nearest_meeting_that_is_not_one_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     solution = some(11, 4, own_starts=True)
-    monkeypatch.setattr("rendezvous.pareto.selections._MOST_ROUNDS", 1)
-    monkeypatch.setattr("rendezvous.pareto.selections._least_share", lambda _, begin: begin)
+    monkeypatch.setattr("rendezvous.pareto.selections._MAX_ROUNDS", 1)
+    monkeypatch.setattr("rendezvous.pareto.selections._min_share", lambda _, begin: begin)
     with pytest.raises(NotOptimalError, match="is known"):
         nearest_to(solution, solution.ideals.mean(axis=0) + 3.0 * np.ptp(solution.ideals, axis=0))
 
 
-def test_no_control_beats_the_least_peak() -> None:
+def test_no_control_beats_the_min_peak() -> None:
     # A bound of one component after another by a linear program's relaxation: |u| on 16 directions of a cone.
     plan = some(8, 1, (Component.X,)).plan(0)
-    least = least_peak(plan)
+    minimum = min_peak(plan)
     nodes, weights = np.polynomial.legendre.leggauss(60)
     times, weights = 300.0 * (1.0 + nodes), 300.0 * weights
     motion = plan.craft.motion
@@ -369,13 +369,13 @@ def test_no_control_beats_the_least_peak() -> None:
 
     def smooth_peak(shift: Floats) -> float:
         controls = (base + null @ shift).reshape(60, 3)
-        sizes = np.linalg.norm(controls, axis=1) / least
+        sizes = np.linalg.norm(controls, axis=1) / minimum
         return float(np.log(np.mean(np.exp(60.0 * (sizes - sizes.max())))) / 60.0 + sizes.max())
 
     base = np.linalg.lstsq(rows, achieved, rcond=None)[0]
     null = np.linalg.svd(rows)[2][6:].T
     found = minimize(smooth_peak, np.zeros(null.shape[1]), method="L-BFGS-B", options={"maxiter": 60}).x
-    assert np.linalg.norm((base + null @ found).reshape(60, 3), axis=1).max() >= least * (1.0 - 1e-6)
+    assert np.linalg.norm((base + null @ found).reshape(60, 3), axis=1).max() >= minimum * (1.0 - 1e-6)
 
 
 def test_a_sweep_over_the_meeting_time() -> None:

@@ -383,8 +383,8 @@ def test_a_printed_control_with_three_digits_misses_the_meeting() -> None:
         - solution.meeting_state()
         for craft in range(3)
     ]
-    greatest = max(float(np.linalg.norm(each[:3])) for each in missed)
-    assert 1.0 < greatest < 5.0
+    maximum = max(float(np.linalg.norm(each[:3])) for each in missed)
+    assert 1.0 < maximum < 5.0
 
 
 def test_a_free_position() -> None:

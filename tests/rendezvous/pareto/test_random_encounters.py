@@ -23,9 +23,9 @@ from rendezvous.pareto import (
     Plan,
     analyse_coalitions,
     check_bound,
-    least_greatest_excess,
-    least_peak,
-    least_sum_of_costs,
+    min_peak,
+    min_sum_of_costs,
+    minimax_excess,
     nearest_to,
     peak_control,
     simplex_weights,
@@ -50,7 +50,7 @@ def some_motion(random: np.random.Generator, rate: float, *, elliptic: float = 0
     return TschaunerHempel(orbit)
 
 
-def some_encounter(seed: int, longest_rad: float = 20.0, most_craft: int = 5) -> Encounter:
+def some_encounter(seed: int, longest_rad: float = 20.0, max_craft: int = 5) -> Encounter:
     """An encounter: weights of zero, one craft, craft that coincide, late starts, any free components."""
     random = np.random.default_rng(seed)
     rate = 10.0 ** random.uniform(-5.0, -1.5)
@@ -63,7 +63,7 @@ def some_encounter(seed: int, longest_rad: float = 20.0, most_craft: int = 5) ->
     scale = np.array([duration] * 3 + [1.0] * 3) * 10.0 ** random.uniform(-1.0, 1.0)
     starts = str(random.choice(["together", "apart", "late"]))
     craft: list[Craft] = []
-    for index in range(int(random.integers(1, most_craft + 1))):
+    for index in range(int(random.integers(1, max_craft + 1))):
         state = random.normal(size=6) * scale * 10.0 ** (2.0 * random.random())
         if craft and random.random() < 0.15:
             state = craft[-1].state
@@ -132,7 +132,7 @@ def the_dense_solution_agrees(seed: int) -> None:
 
 
 def cone_program(solution: EncounterSolution, weights: Floats, floors: Floats, *, one: bool) -> float:
-    """Least sum of w_i |(R_i (p - p_i*), floor_i)|, or the least greatest of them, by clarabel."""
+    """Minimum sum of w_i |(R_i (p - p_i*), floor_i)|, or the minimax of them, by clarabel."""
     free, count = solution.point.size, len(solution.costs)
     counts = weights > 0.0
     middle = solution.ideals[counts].mean(axis=0)
@@ -165,24 +165,24 @@ def cone_program(solution: EncounterSolution, weights: Floats, floors: Floats, *
 
 
 def ideal_size(solution: EncounterSolution) -> float:
-    """The greatest weighted size of an ideal in the norm of M."""
+    """The maximum weighted size of an ideal in the norm of M."""
     pairs = zip(solution.encounter.weights, solution.costs, strict=True)
     return max(float(np.sqrt(weight) * np.linalg.norm(cost.root @ cost.ideal)) for weight, cost in pairs)
 
 
-def the_least_sum_agrees(seed: int) -> None:
+def the_min_sum_agrees(seed: int) -> None:
     solution = solve_encounter(some_encounter(seed))
     weights = solution.encounter.weights
     floors = np.sqrt([each.ideal_cost_squared for each in solution.costs])
-    value = float(weights @ np.sqrt(solution.cost_squared(least_sum_of_costs(solution))))
+    value = float(weights @ np.sqrt(solution.cost_squared(min_sum_of_costs(solution))))
     size = float(weights @ np.sqrt(solution.cost_squared())) + 1e-6 * ideal_size(solution)
     assert value == pytest.approx(cone_program(solution, weights, floors, one=False), rel=1e-7, abs=1e-8 * size)
 
 
-def the_least_greatest_agrees(seed: int) -> None:
+def the_min_max_agrees(seed: int) -> None:
     solution = solve_encounter(some_encounter(seed))
     roots = np.sqrt(solution.encounter.weights)
-    value = float((roots * np.sqrt(solution.excess(least_greatest_excess(solution)))).max())
+    value = float((roots * np.sqrt(solution.excess(minimax_excess(solution)))).max())
     # Ideals that coincide do so up to their own rounding.
     size = float((roots * np.sqrt(solution.excess())).max()) + 1e-6 * ideal_size(solution)
     wanted = cone_program(solution, roots, np.zeros(len(roots)), one=True)
@@ -224,7 +224,7 @@ def the_nearest_is_nearest(seed: int) -> None:
 
 
 def coalitions_agree(seed: int) -> None:
-    solution = solve_encounter(some_encounter(seed, most_craft=4))
+    solution = solve_encounter(some_encounter(seed, max_craft=4))
     weights = solution.encounter.weights
     found = analyse_coalitions(solution)
     size = float(found.shapley.sum()) + 1e-12 * ideal_size(solution) ** 2
@@ -236,16 +236,16 @@ def coalitions_agree(seed: int) -> None:
         )
         scale = np.where(np.linalg.norm(rows, axis=0) > 0.0, np.linalg.norm(rows, axis=0), 1.0)
         point = np.linalg.lstsq(rows / scale, right, rcond=None)[0] / scale
-        least = float(((rows @ point - right) ** 2).sum())
-        assert each.excess == pytest.approx(least, rel=1e-7, abs=1e-9 * size)
+        minimum = float(((rows @ point - right) ** 2).sum())
+        assert each.excess == pytest.approx(minimum, rel=1e-7, abs=1e-9 * size)
         common = float((weights * solution.excess())[members].sum())
-        assert each.regret == pytest.approx(common - least, rel=1e-7, abs=1e-9 * size)
+        assert each.regret == pytest.approx(common - minimum, rel=1e-7, abs=1e-9 * size)
         assert each.regret >= 0.0
 
 
 def some_plan(seed: int, longest_rad: float) -> tuple[Plan, int]:
     random = np.random.default_rng(seed)
-    encounter = some_encounter(seed, longest_rad, most_craft=2)
+    encounter = some_encounter(seed, longest_rad, max_craft=2)
     solution = solve_encounter(encounter)
     return solution.plan(int(random.integers(len(solution.costs)))), encounter.common
 
@@ -292,8 +292,8 @@ def held(plan: Plan, common: int, count: int) -> tuple[Floats, Floats]:
     return rows[:common], wanted[:common]
 
 
-def least_peak_program(plan: Plan, common: int, count: int) -> tuple[float, float]:
-    """Bounds of the least peak: of held controls by a cone program from above, of its multipliers from below."""
+def min_peak_program(plan: Plan, common: int, count: int) -> tuple[float, float]:
+    """Bounds of the minimum peak: of held controls by a cone program from above, of its multipliers from below."""
     rows, wanted = held(plan, common, count)
     # Balanced, so that the program's tolerances mean something in each component.
     left, sizes, right = np.linalg.svd(rows, full_matrices=False)
@@ -341,47 +341,47 @@ REFUSED = (1826,)
 """Of `MANY`: the direction of the control almost vanishes at some time, and the two bounds stay 5e-6 apart."""
 
 
-def the_least_peak_agrees(seed: int) -> None:
+def the_min_peak_agrees(seed: int) -> None:
     plan, common = some_plan(seed, 12.0)
     if seed in REFUSED:
         with pytest.raises(NotCertifiedError, match="not known to 1e-06"):
-            least_peak(plan, common)
+            min_peak(plan, common)
         return
-    least = least_peak(plan, common)
+    minimum = min_peak(plan, common)
     if not plan.costate.any():
-        assert least == peak_control(plan) == 0.0
+        assert minimum == peak_control(plan) == 0.0
         return
-    below, above = least_peak_program(plan, common, 100)
-    assert least >= below * (1.0 - 2e-6)
-    assert least <= above * (1.0 + 1e-7)
-    assert above <= least * 1.02
+    below, above = min_peak_program(plan, common, 100)
+    assert minimum >= below * (1.0 - 2e-6)
+    assert minimum <= above * (1.0 + 1e-7)
+    assert above <= minimum * 1.02
     peak = peak_control(plan)
-    assert least <= peak * (1.0 + 1e-9)
+    assert minimum <= peak * (1.0 + 1e-9)
     for bound, verdict in (
-        (least * (1.0 - 1e-9), Feasibility.IMPOSSIBLE),
-        (least * (1.0 + 1e-9), Feasibility.ANOTHER_CONTROL),
+        (minimum * (1.0 - 1e-9), Feasibility.IMPOSSIBLE),
+        (minimum * (1.0 + 1e-9), Feasibility.ANOTHER_CONTROL),
         (peak * (1.0 + 1e-9), Feasibility.WITHIN),
     ):
         told = check_bound(plan, bound, common).feasibility
-        # Where the two bounds coincide, the control of least energy is that of least peak.
-        assert told is verdict or (peak <= least * (1.0 + 2e-6) and told is not Feasibility.IMPOSSIBLE)
+        # Where the two bounds coincide, the control of minimum energy is that of minimum peak.
+        assert told is verdict or (peak <= minimum * (1.0 + 2e-6) and told is not Feasibility.IMPOSSIBLE)
 
 
 CHECKS = [
     the_dense_solution_agrees,
-    the_least_sum_agrees,
-    the_least_greatest_agrees,
+    the_min_sum_agrees,
+    the_min_max_agrees,
     the_nearest_is_nearest,
     coalitions_agree,
     the_peak_and_the_impulse_agree,
-    the_least_peak_agrees,
+    the_min_peak_agrees,
 ]
 
 
-def test_craft_of_weight_zero_have_no_influence_on_the_least_greatest_excess() -> None:
+def test_craft_of_weight_zero_have_no_influence_on_the_minimax_excess() -> None:
     solution = solve_encounter(some_encounter(1721))
     assert solution.encounter.weights.tolist() == [0.0, 1.0]
-    np.testing.assert_array_equal(least_greatest_excess(solution), solution.ideals[1])
+    np.testing.assert_array_equal(minimax_excess(solution), solution.ideals[1])
 
 
 @pytest.mark.parametrize("seed", FEW)

@@ -56,8 +56,8 @@ def test_all_directions_are_looked_in(solved: Solution) -> None:
     assert certificate.claims_saddle_point
     assert certificate.directions_tried == 120
     assert certificate.directions_found > 50
-    assert certificate.greatest_excess_m is not None
-    assert certificate.greatest_excess_m < 1.0
+    assert certificate.max_excess_m is not None
+    assert certificate.max_excess_m < 1.0
 
 
 def test_a_pursuer_that_does_better_alone_is_told(slides: MakeGame) -> None:
@@ -90,7 +90,7 @@ def test_what_is_not_captured_has_no_certificate(slides: MakeGame) -> None:
 
 
 def test_a_path_that_turns_too_fast_is_told(solved: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rendezvous.pursuit_evasion.paths._MOST_RATES", 100)
+    monkeypatch.setattr("rendezvous.pursuit_evasion.paths._MAX_RATES", 100)
     evader = scaled_craft(solved.game.evader, solved.game.gravity, solved.units)
     with pytest.raises(PathError, match="turns too fast"):
         steered_path(evader, Policy.PROGRADE.direction, 3.4)

@@ -1,4 +1,4 @@
-"""The least terminal norm in forty decimal digits, by a barrier method that shares nothing with the package."""
+"""The minimum terminal norm in forty decimal digits, by a barrier method that shares nothing with the package."""
 
 from __future__ import annotations
 
@@ -109,8 +109,8 @@ def cone_program(given: Dense, kind: str) -> tuple[float, Floats]:
     return np.nan, best[1]
 
 
-def precise_least_norm(problem: ReachabilityProblem, digits: float = 1e-8) -> tuple[float, float] | None:
-    """Return the least terminal norm and its rounding in doubles; None where no control is well inside.
+def precise_min_norm(problem: ReachabilityProblem, digits: float = 1e-8) -> tuple[float, float] | None:
+    """Return the minimum terminal norm and its rounding in doubles; None where no control is well inside.
 
     Notes
     -----

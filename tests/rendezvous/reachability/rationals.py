@@ -32,7 +32,7 @@ class RationalSet:
     dimension : int
         Of the affine hull.
     bounds : ndarray, shape (n, 2)
-        Least and greatest coordinates, rounded once.
+        Minimum and maximum coordinates, rounded once.
     """
 
     vertices: Floats

@@ -22,7 +22,7 @@ from rendezvous.reachability import (
     Solution,
     ThrustShape,
     effort,
-    least_periods,
+    min_periods,
     minimum_energy,
     minimum_l1,
     minimum_norms,
@@ -99,7 +99,7 @@ def test_matrices(paper: Paper) -> None:
 
 
 def ends_in_paper(bounds: Floats) -> Floats:
-    """Convert least and greatest values, shape (6, 2); the bounds of all axes are the same."""
+    """Convert minimum and maximum values, shape (6, 2); the bounds of all axes are the same."""
     return np.sort(to_paper(bounds.T).T, axis=1)
 
 
@@ -135,17 +135,17 @@ def test_route_is_told(paper: Paper) -> None:
     )
 
 
-def test_least_norms(paper: Paper, exact: Solution) -> None:
+def test_min_norms(paper: Paper, exact: Solution) -> None:
     problem = paper()
     assert exact.optimal.miss == 0.0
-    assert least_periods(problem) == 3
+    assert min_periods(problem) == 3
     assert solve(problem.first(1)).optimal.miss == pytest.approx(2947.01842678, abs=1e-8)
     assert solve(problem.first(2)).optimal.miss == pytest.approx(611.79357068, abs=1e-8)
-    assert least_periods(problem.first(2)) is None
+    assert min_periods(problem.first(2)) is None
     assert solve(paper(bound=0.15)).optimal.miss == pytest.approx(1.62757318, abs=1e-8)
 
 
-def test_least_energy_l1_and_peak(exact: Solution) -> None:
+def test_min_energy_l1_and_peak(exact: Solution) -> None:
     assert effort(minimum_energy(exact.optimal)).energy == pytest.approx(0.14323052820, abs=1e-11)
     sparse = minimum_l1(exact.optimal)
     assert effort(sparse).l1 == pytest.approx(0.88770050948, abs=1e-11)
@@ -157,7 +157,7 @@ def test_least_energy_l1_and_peak(exact: Solution) -> None:
     np.testing.assert_allclose(minimum_norms(exact.optimal), sparse, atol=1e-6)
 
 
-def test_table_1_is_the_control_of_least_energy(exact: Solution) -> None:
+def test_table_1_is_the_control_of_min_energy(exact: Solution) -> None:
     control = minimum_energy(exact.optimal)
     assert np.abs(to_paper(control) - TABLE_1).max() <= 0.5e-4 + 1e-12
     states = to_paper(exact.problem.run(control)[1:])
@@ -180,12 +180,12 @@ def test_table_3_is_optimal_to_its_rounding(exact: Solution) -> None:
     assert float(problem.excess(from_paper(TABLE_3))) <= 0.0
 
 
-def test_table_2_is_near_the_control_of_least_l1_and_contradicts_itself(exact: Solution) -> None:
+def test_table_2_is_near_the_control_of_min_l1_and_contradicts_itself(exact: Solution) -> None:
     problem, sparse = exact.problem, minimum_l1(exact.optimal)
     printed = from_paper(TABLE_2)
     np.testing.assert_allclose(sparse[[0, 3]], printed[[0, 3]], atol=1e-3)
     assert np.abs(sparse - printed).max() < 6e-3
-    # Its controls lead tens of metres past zero, its states are those of the least L1.
+    # Its controls lead tens of metres past zero, its states are those of the minimum L1.
     ends = np.abs(problem.run(printed)[-1])
     assert (ends[:2] > 4.0 * rounding_at_the_end(problem)[:2]).all()
     states = problem.run(sparse)

@@ -58,7 +58,7 @@ def test_tightening_is_by_the_support_and_no_more(paper: Paper) -> None:
     disturbance = pushes(problem, 1e-3)
     safe = tightened(problem, disturbance)
     assert safe.offsets is not None
-    # One axis: the greatest x1(4) over the corners of all disturbances is what is taken.
+    # One axis: the maximum x1(4) over the corners of all disturbances is what is taken.
     reached = [
         flown(problem, disturbance, np.zeros((4, 3)), np.array(corner).reshape(4, 1) * [[1.0, 0.0, 0.0]])[-1, 2]
         for corner in product([-1.0, 1.0], repeat=4)

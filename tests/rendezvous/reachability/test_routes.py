@@ -155,7 +155,7 @@ def test_each_choice_is_best_of_a_thousand(paper: Paper, thrust: ThrustShape) ->
         assert float(optimal.excess(centre)) < 1e-12
 
 
-def test_analytic_centre_has_the_greatest_product_of_slacks(paper: Paper) -> None:
+def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
     optimal = solve(paper(), Route.LIFTED).optimal
     space, centre = optimal.space, analytic_centre(optimal).ravel()
 
@@ -200,10 +200,10 @@ def test_exact_route_is_refused_before_it_takes_too_long_or_too_much(paper: Pape
         solve(paper(), Route.EXACT, Budget(dimension=3))
 
 
-def test_shadows_of_both_routes(paper: Paper) -> None:
+def test_projections_of_both_routes(paper: Paper) -> None:
     both = [solve(paper(), route).sets for route in Route]
     for kind, t, axes in ((SetKind.TUBE, 2, (0, 1)), (SetKind.FORWARD, 3, (0, 1, 2)), (SetKind.TUBE, 1, (3, 4, 5))):
-        one, other = (sets.shadow(kind, t, axes) for sets in both)
+        one, other = (sets.projection(kind, t, axes) for sets in both)
         seen = np.random.default_rng(0).standard_normal((40, len(axes)))
         gap = np.abs((seen @ one.T).max(axis=1) - (seen @ other.T).max(axis=1))
         assert gap.max() < 1e-8 * np.abs(one).max()
@@ -230,7 +230,7 @@ def test_wrong_arguments_are_named(paper: Paper) -> None:
             with pytest.raises(error, match=message):
                 sets.support(kind, time, np.eye(problem.states))
             with pytest.raises(error, match=message):
-                sets.shadow(kind, time, (0, 1))
+                sets.projection(kind, time, (0, 1))
             with pytest.raises(error, match=message):
                 sets.counts(kind, time)
         with pytest.raises(TypeError, match="kind must be"):
@@ -240,11 +240,11 @@ def test_wrong_arguments_are_named(paper: Paper) -> None:
                 sets.support(SetKind.TUBE, 1, directions)
         for axes in ((0, problem.states), (-1, 0)):
             with pytest.raises(ValueError, match=f"axes must be from 0 to {problem.states - 1}, .*: got"):
-                sets.shadow(SetKind.TUBE, 1, axes)
+                sets.projection(SetKind.TUBE, 1, axes)
         wrong_axes: tuple[Any, ...] = (("x", "y"), (0, 1.5), 3, ())
         for axes in wrong_axes:
             with pytest.raises(TypeError, match="axes must be a list of indices of states: got"):
-                sets.shadow(SetKind.TUBE, 1, axes)
+                sets.projection(SetKind.TUBE, 1, axes)
 
 
 def test_a_solution_is_shown_in_few_lines(paper: Paper) -> None:

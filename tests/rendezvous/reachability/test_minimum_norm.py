@@ -1,4 +1,4 @@
-"""The least terminal norm against programs of its own kind and forty digits, from well inside to the edges."""
+"""The minimum terminal norm against programs of its own kind and forty digits, from well inside to the edges."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rendezvous.reachability import (
     analytic_centre,
     between_periods,
     chebyshev_centre,
-    least_periods,
+    min_periods,
     minimum_energy,
     minimum_l1,
     minimum_norms,
@@ -33,7 +33,7 @@ from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.optimum import block_optimum
 from rendezvous.reachability.solve import OptimalControls
 
-from .high_precision import Dense, cone_program, precise_least_norm
+from .high_precision import Dense, cone_program, precise_min_norm
 from .random_rendezvous import random_rendezvous
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ def size_of(problem: ReachabilityProblem) -> float:
 
 def assert_precise(problem: ReachabilityProblem, miss: float) -> bool:
     """Whether forty digits could tell, and then that they agree."""
-    found = precise_least_norm(problem)
+    found = precise_min_norm(problem)
     if found is None:
         return False
     expected, rounding = found
@@ -87,14 +87,14 @@ def test_misses_with_thrust_in_a_ball_to_forty_digits(name: str) -> None:
 
 @pytest.mark.parametrize("thrust", list(ThrustShape))
 @pytest.mark.parametrize("gap", [1e-1, 1e-5, 1e-9])
-def test_just_under_the_least_bound_that_reaches_zero(paper: Paper, thrust: ThrustShape, gap: float) -> None:
+def test_just_under_the_min_bound_that_reaches_zero(paper: Paper, thrust: ThrustShape, gap: float) -> None:
     problem = paper(periods=3, thrust=thrust)
-    least = cone_program(Dense(problem), "bound")[0]
-    below = replace(problem, control_bounds=np.full(3, least * (1.0 - gap)))
+    minimum = cone_program(Dense(problem), "bound")[0]
+    below = replace(problem, control_bounds=np.full(3, minimum * (1.0 - gap)))
     miss = optimal_controls(below).miss
     assert miss > 0.0
     assert assert_precise(below, miss)
-    above = replace(problem, control_bounds=np.full(3, least * (1.0 + gap)))
+    above = replace(problem, control_bounds=np.full(3, minimum * (1.0 + gap)))
     assert optimal_controls(above).miss == 0.0
 
 
@@ -111,7 +111,7 @@ def test_flat_sets_of_optimal_controls(paper: Paper, bound: float, route: Route)
 
 
 def test_every_dimension_down_to_a_point(paper: Paper) -> None:
-    """At the least bound that reaches zero the set loses dimensions; with fewer periods it is a point."""
+    """At the minimum bound that reaches zero the set loses dimensions; with fewer periods it is a point."""
     problem, dimensions = paper(), []
     for shape in ThrustShape:
         given = replace(problem, thrust=shape)
@@ -185,8 +185,8 @@ def check(seed: int, *, precise_to: int = 0, members: bool = True) -> str:
             assert float(optimal.excess(select(optimal))) < 1e-8
         assert float(optimal.excess(samples(optimal, 2, np.random.default_rng(seed))).max()) < 1e-8
         optimal.ranges()
-        least = least_periods(problem)
-        assert (least is not None) == (miss == 0.0)
+        minimum = min_periods(problem)
+        assert (minimum is not None) == (miss == 0.0)
     return told
 
 
@@ -223,9 +223,9 @@ def test_gaps_of_more_periods(paper: Paper, thrust: ThrustShape, periods: int, c
     if checks:
         motion = motion_of(EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14), MotionModel.FROZEN)
         problem = replace(problem, between=between_periods(motion, periods, 720.0 / periods, 0.15, checks))
-    least = cone_program(Dense(problem), "bound")[0]
+    minimum = cone_program(Dense(problem), "bound")[0]
     for gap in 10.0 ** -np.arange(1.0, 10.0):
-        below = replace(problem, control_bounds=np.full(3, least * (1.0 - gap)))
+        below = replace(problem, control_bounds=np.full(3, minimum * (1.0 - gap)))
         assert_precise(below, optimal_controls(below).miss) if periods <= 6 else optimal_controls(below)
         if periods > 6 and gap > 1e-4:
             assert optimal_controls(below).miss == pytest.approx(cone_program(Dense(below), "norm")[0], rel=1e-4)

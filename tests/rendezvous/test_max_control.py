@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rendezvous.piecewise import greatest_control
+from rendezvous.piecewise import max_control
 
 Floats = NDArray[np.float64]
 
@@ -19,40 +19,40 @@ def test_the_top_of_a_hump_is_found_between_samples_and_at_both_ends(at: float) 
         size = 3.0 / (1.0 + 9.0 * (time_s - at) ** 2)
         return np.stack([0.6 * size, np.zeros_like(size), -0.8 * size], axis=1)
 
-    assert greatest_control(control, np.linspace(0.0, 10.0, 11)) == pytest.approx(3.0, rel=1e-11)
-    assert greatest_control(control, np.array([0.0, 10.0])) == pytest.approx(3.0, rel=1e-11)
+    assert max_control(control, np.linspace(0.0, 10.0, 11)) == pytest.approx(3.0, rel=1e-11)
+    assert max_control(control, np.array([0.0, 10.0])) == pytest.approx(3.0, rel=1e-11)
 
 
 def test_a_control_that_is_zero_has_no_size() -> None:
-    assert greatest_control(lambda time_s: np.zeros((len(time_s), 3)), np.array([5.0, 6.0])) == 0.0
+    assert max_control(lambda time_s: np.zeros((len(time_s), 3)), np.array([5.0, 6.0])) == 0.0
 
 
 def test_a_jump_at_a_break_belongs_to_both_sides() -> None:
     def control(time_s: Floats) -> Floats:
         return np.where(time_s[:, None] < 3.0, [[1.0, 0.0, 0.0]] * time_s[:, None], [[0.0, 2.0, 0.0]])
 
-    assert greatest_control(control, np.array([0.0, 3.0, 4.0])) == pytest.approx(3.0, rel=1e-12)
+    assert max_control(control, np.array([0.0, 3.0, 4.0])) == pytest.approx(3.0, rel=1e-12)
 
 
 def test_equal_peaks_of_a_thousand_revolutions() -> None:
     def control(time_s: Floats) -> Floats:
         return np.stack([np.sin(time_s), 0.0 * time_s, 0.0 * time_s], axis=1)
 
-    assert greatest_control(control, np.linspace(0.0, 6283.0, 6284)) == pytest.approx(1.0, rel=1e-9)
+    assert max_control(control, np.linspace(0.0, 6283.0, 6284)) == pytest.approx(1.0, rel=1e-9)
 
 
 def test_no_time_is_refused() -> None:
     with pytest.raises(ValueError, match="no break is later"):
-        greatest_control(lambda time_s: np.ones((len(time_s), 3)), np.array([5.0, 5.0]))
+        max_control(lambda time_s: np.ones((len(time_s), 3)), np.array([5.0, 5.0]))
 
 
 def test_values_that_are_not_finite_are_refused() -> None:
     with pytest.raises(ValueError, match="not finite"):
-        greatest_control(lambda time_s: np.full((len(time_s), 3), np.nan), np.array([0.0, 1.0]))
+        max_control(lambda time_s: np.full((len(time_s), 3), np.nan), np.array([0.0, 1.0]))
 
 
 def sinusoids_and_secular_terms(seed: int) -> None:
-    """The control of a circular orbit, whose greatest size is between a fine sampling and its error bound."""
+    """The control of a circular orbit, whose maximum size is between a fine sampling and its error bound."""
     random = np.random.default_rng(seed)
     turns = 10.0 ** random.uniform(-2.0, 2.0)
     coefficients = random.normal(size=(3, 4)) * 10.0 ** random.uniform(-2.0, 2.0, size=4)
@@ -65,7 +65,7 @@ def sinusoids_and_secular_terms(seed: int) -> None:
         return np.asarray((coefficients @ basis).T)
 
     breaks = np.linspace(begin, begin + turns, max(1, int(np.ceil(turns))) + 1)
-    found = greatest_control(control, breaks)
+    found = max_control(control, breaks)
     times = np.linspace(begin, begin + turns, 20_001)
     sizes = np.linalg.norm(control(times), axis=1)
     step = times[1] - times[0]
@@ -76,7 +76,7 @@ def sinusoids_and_secular_terms(seed: int) -> None:
     # Times are rounded: between short panels far from t = 0 the control is known no better.
     rounding = 1e-10 + 1e-15 * abs(begin) / turns
     assert sizes.max() * (1.0 - rounding) <= found <= above * (1.0 + rounding)
-    # Around the greatest sample a parabola through three of |u|^2 gives the top to the fourth order.
+    # Around the maximum sample a parabola through three of |u|^2 gives the top to the fourth order.
     at = int(sizes.argmax())
     if 0 < at < len(times) - 1:
         low, top, high = sizes[at - 1 : at + 2] ** 2
