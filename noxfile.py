@@ -34,6 +34,13 @@ def wheel(session: nox.Session) -> None:
     run_tests(session)
 
 
+@nox.session(python="3.11")
+def thorough(session: nox.Session) -> None:
+    """Run the tests marked thorough, which take about half an hour, against the installed wheel."""
+    session.install("-c", str(ROOT / "constraints.txt"), f"{built(session)[0]}[test]")
+    run_tests(session, "-m", "thorough")
+
+
 @nox.session(python=PYTHONS)
 def tests(session: nox.Session) -> None:
     """Run every test with another version of Python."""

@@ -723,7 +723,7 @@ def test_a_file_takes_whatever_python_takes(place: tuple[tuple[str, ...], str], 
     agree(place, first, second)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_file_takes_whatever_python_takes_2000_times() -> None:
     draw = np.random.default_rng(18)
     taken = 0

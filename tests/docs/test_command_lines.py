@@ -56,7 +56,7 @@ SLOW = (
     r"^infoset engage (?!.* --record\b).* --out\b",
     r"^python ",
 )
-"""Lines that run with -m slow only."""
+"""Lines that run with -m thorough only."""
 
 ELSEWHERE = {
     "python benchmarks/page_speed.py": "it takes minutes in a browser; tests/browser opens the same pages",
@@ -191,7 +191,7 @@ def test_the_quick_lines_run(page: Page, pages: list[Page], folder: Path) -> Non
         run(line, folder, WRITTEN)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_all_lines_run_in_their_order(page: Page, folder: Path) -> None:
     lines = lines_to_run(page)
     if any(map(is_slow, lines)):

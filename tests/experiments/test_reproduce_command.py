@@ -307,7 +307,7 @@ def test_numbers_of_another_model_have_a_column(infoset: Infoset, monkeypatch: p
     assert [each["other_model"] for each in json.loads(out)["papers"][0]["numbers"]] == [1.2512, None, 1.35]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_whole_run(infoset: Infoset) -> None:
     code, out, err = infoset("--json", "-", "-q")
     assert (code, err) == (0, "")

@@ -15,6 +15,8 @@ from experiments.campaigns.flight import campaign_progress
 from sim.campaign import Progress
 from tests.faults.conftest import Infoset, need_whole
 
+pytestmark = pytest.mark.thorough
+
 YEAR_S = 365.25 * 86_400.0
 
 

@@ -21,6 +21,8 @@ from infoset.limits import shown
 from rendezvous import _compile as _compile_of_rendezvous
 from tests.faults.conftest import begin, ended
 
+pytestmark = pytest.mark.thorough
+
 PACKAGES = ("infoset", "guidance", "sim", "rendezvous", "experiments")
 
 
@@ -176,7 +178,6 @@ def environment_of(installation: Path, temporary: Path, home: Path) -> dict[str,
     }
 
 
-@pytest.mark.slow
 def test_a_read_only_installation_and_no_home(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
     sealed, temporary = tmp_path / "home", tmp_path / "tmp"
     sealed.mkdir(mode=0o500)
@@ -196,7 +197,6 @@ def test_a_read_only_installation_and_no_home(installation: Path, tmp_path: Path
     assert list(stored.rglob("*.nbc"))
 
 
-@pytest.mark.slow
 def test_a_read_only_installation_and_a_home(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
     (tmp_path / "home").mkdir()
     environment = environment_of(installation, tmp_path, tmp_path / "home")
@@ -206,7 +206,6 @@ def test_a_read_only_installation_and_a_home(installation: Path, tmp_path: Path,
     assert list((tmp_path / "home").rglob("*.nbc"))
 
 
-@pytest.mark.slow
 def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
     """The library alone, as in a notebook: it works, and one line says what to do."""
     code = (
@@ -229,7 +228,6 @@ def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: 
     assert "set NUMBA_CACHE_DIR" in done.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("command", [("pareto", "--json", "-"), ("multipoint", "--json", "-")])
 def test_two_processes_compile_at_once_into_one_cache(command: tuple[str, ...], tmp_path: Path) -> None:
     environment: Mapping[str, str] = {VARIABLE: str(tmp_path / "kernels")}

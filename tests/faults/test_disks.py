@@ -17,6 +17,8 @@ from experiments.common.figure_style import new_figure
 from experiments.common.output import Output
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
+pytestmark = pytest.mark.thorough
+
 COMMANDS = {
     "experiment": ("experiment", "brief.toml", "--runs", 2),
     "compare": ("compare", "brief.toml", "--model", "paper", "--runs", 2, "--strategies", "patient"),
@@ -31,7 +33,7 @@ QUICK = ("experiment", "pareto")
 
 
 def slow_but(*quick: str) -> list[object]:
-    return [name if name in quick else pytest.param(name, marks=pytest.mark.slow) for name in COMMANDS]
+    return [name if name in quick else pytest.param(name, marks=pytest.mark.thorough) for name in COMMANDS]
 
 
 def refused(left: Left) -> str:
@@ -52,14 +54,13 @@ def test_a_full_disk(name: str, infoset: Infoset, file: Path, small_disk: Path) 
     need_whole(small_disk)
 
 
-@pytest.mark.slow
 def test_a_report_on_a_full_disk(infoset: Infoset, file: Path, small_disk: Path) -> None:
     assert infoset("campaign", file, "--runs", 32, "--out", "flown", "-q").code == 0
     assert "No space left on device" in refused(infoset("report", "flown", "--out", small_disk / "o"))
     need_whole(small_disk)
 
 
-@pytest.mark.parametrize("page", ["--html", pytest.param("--gif", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("page", ["--html", pytest.param("--gif", marks=pytest.mark.thorough)])
 def test_a_page_or_a_film_that_does_not_fit(page: str, infoset: Infoset, file: Path, small_disk: Path) -> None:
     assert infoset("engage", file, "--record", "flight.npz", "-q").code == 0
     (small_disk / "filler").write_bytes(b"\0" * 27_000)
@@ -69,7 +70,6 @@ def test_a_page_or_a_film_that_does_not_fit(page: str, infoset: Infoset, file: P
 
 
 @pytest.mark.skipif(not hasattr(resource, "RLIMIT_FSIZE"), reason="there are no such limits")
-@pytest.mark.slow
 def test_files_that_may_not_be_so_large(file: Path, tmp_path: Path) -> None:
     """Where nobody may mount anything: what does not fit is refused by the system, with EFBIG."""
     code = (
@@ -85,7 +85,6 @@ def test_files_that_may_not_be_so_large(file: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("setpriv") is None and os.getuid() == 0, reason="root may write everywhere")
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [*COMMANDS, "campaign", "sweep"])
 def test_a_folder_that_may_not_be_written(name: str, file: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
     sealed = tmp_path / "sealed"

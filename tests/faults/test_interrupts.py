@@ -24,7 +24,7 @@ from sim.storage import CampaignFolder, CampaignWriter
 from sim.storage.codec import to_json
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX signals")
+pytestmark = [pytest.mark.thorough, pytest.mark.skipif(os.name != "posix", reason="POSIX signals")]
 
 RESUME = "interrupted; the stored runs are complete: continue with --resume"
 
@@ -105,7 +105,7 @@ COMMANDS: dict[str, list[object]] = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", COMMANDS)
 def test_interrupted_at_random_moments(name: str, infoset: Infoset, file: Path, tmp_path: Path) -> None:
     assert infoset("engage", file, "--record", "flight.npz", "-q").code == 0
@@ -135,7 +135,7 @@ def test_interrupted_at_random_moments(name: str, infoset: Infoset, file: Path, 
     assert any(codes)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_campaign_interrupted_ten_times_gives_the_same_bits(brief: Scenario, file: Path, tmp_path: Path) -> None:
     many = ("--runs", 2000, "--chunk", 8, "--noise", "mixed", "--model", "paper")
     asked = ("campaign", file, *many, "--out", "runs", "--resume", "-q")

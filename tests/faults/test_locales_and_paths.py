@@ -18,6 +18,8 @@ from sim import Scenario
 from sim.storage import CampaignFolder
 from tests.faults.conftest import Infoset, begin, ended, need_whole
 
+pytestmark = pytest.mark.thorough
+
 GERMAN = "de_DE.UTF-8"
 ODD = ("with some spaces", "標的-🛰", 'quote\'s "and" $HOME', "-rf", "line\nbreak")
 
@@ -70,7 +72,6 @@ def test_files_are_the_same_with_a_decimal_comma(
     assert all(float(row["miss_m"]) >= 0.0 for row in rows)
 
 
-@pytest.mark.slow
 def test_every_file_of_a_command_in_a_german_process(
     german: dict[str, str], brief: Scenario, file: Path, tmp_path: Path
 ) -> None:
@@ -91,7 +92,7 @@ def hard_names() -> list[object]:
     """The hardest by default: 255 bytes, the most that a name may have."""
     hardest = f"{'n' * 240} Ünï-цель"
     assert len(hardest.encode()) == 255
-    return [hardest, *(pytest.param(each, marks=pytest.mark.slow) for each in ODD)]
+    return [hardest, *(pytest.param(each, marks=pytest.mark.thorough) for each in ODD)]
 
 
 @pytest.mark.parametrize("name", hard_names())

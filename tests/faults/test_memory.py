@@ -14,6 +14,8 @@ from sim.chunk import Chunk, fly_chunk
 from sim.storage import CampaignFolder
 from tests.faults.conftest import Infoset, Left, need_whole
 
+pytestmark = pytest.mark.thorough
+
 LIMITED = (
     "import resource, sys\n"
     "from experiments.cli import main\n"
@@ -66,7 +68,6 @@ def test_no_memory_is_a_message_that_says_how_to_go_on(
     assert infoset(*asked, "--resume", "-q").code == 0
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="how much memory is taken is told here otherwise")
 def test_a_campaign_under_a_limit_ends_and_is_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
     """With however little memory: the shards that are there are complete, and the campaign can be resumed.

@@ -26,6 +26,8 @@ from .measured import Measured, measured
 from .mutations import mutated_bytes
 from .subjects import attempted, named_shard, read_campaign, small_campaign
 
+pytestmark = pytest.mark.thorough
+
 ROWS = 8
 """Of the second shard, which is the one damaged here."""
 
@@ -79,7 +81,6 @@ def test_100_damaged_shards_and_manifests(folder: Path) -> None:
     assert attack(folder, 50, 50, seed=1) > 80
 
 
-@pytest.mark.slow
 def test_5000_damaged_shards_and_manifests(folder: Path) -> None:
     assert attack(folder, 2500, 2500, seed=2) > 4000
 
@@ -161,7 +162,6 @@ def test_millions_of_rows_are_refused_in_a_second_and_200_mb(folder: Path) -> No
     check_refused(found, "has 67108864 rows instead of 1000000")
 
 
-@pytest.mark.slow
 def test_billions_of_rows_are_refused_in_a_second_and_200_mb(folder: Path) -> None:
     """1.4e9 of them: over 10 GB."""
     many_rows(folder, 334)

@@ -16,6 +16,8 @@ from sim.scenario import of_model
 
 from .flights import engagement, fly, numbers
 
+pytestmark = pytest.mark.thorough
+
 SUN = Sun(1.32712440018e20, 1.5e11, 0.9)
 
 

@@ -52,6 +52,8 @@ from sim.scenario import of_model
 
 from .flights import Flight, engagement, fly, mirrored, numbers, scaled
 
+pytestmark = pytest.mark.thorough
+
 ANGLES_RAD = (1e-12, 1e-9, 1e-6, 1e-3, 1e-2, 0.1, 0.5, 1.0)
 RANGES_M = (1.0, 1e3, 1e6, 1e9, 1e12)
 SPEEDS_M_S = (1.0, 1e2, 1e4, 1e5)
@@ -130,7 +132,6 @@ def test_combinations_work_or_are_refused(
     assert_works_or_is_refused(combination, model, convention)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize("step_s", STEPS_S)
 def test_all_combinations_work_or_are_refused(model: Model, step_s: float) -> None:
@@ -171,7 +172,6 @@ def test_whole_flights_work_however_few_their_steps(
     assert_whole_flight_works(combination, Model.GUARANTEED, convention, camera=camera)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("range_m", RANGES_M[:-1])
 def test_all_whole_flights_work(range_m: float) -> None:
     """A flight from 1e9 km takes more steps of 1000 s than these, even at 100 km/s."""

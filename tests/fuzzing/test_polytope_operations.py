@@ -29,6 +29,8 @@ from infoset.polytope import (
 )
 from rendezvous.reachability import EmptyTubeError, ReachabilityProblem, Route, SetKind, Solution, solve
 
+pytestmark = pytest.mark.thorough
+
 some = settings(max_examples=4, deadline=None)
 few = settings(max_examples=2, deadline=None)
 

@@ -25,6 +25,8 @@ from .measured import Measured, measured
 from .mutations import mutated_bytes
 from .subjects import attempted, remade_record, same_records, small_record
 
+pytestmark = pytest.mark.thorough
+
 REMEDY = "make a record with `infoset engage --record FILE.npz`"
 
 
@@ -86,7 +88,6 @@ def test_100_damaged_records(content: bytes, record: Record, tmp_path: Path) -> 
     assert attack(content, record, tmp_path / "x.npz", 100, seed=1) > 50
 
 
-@pytest.mark.slow
 def test_5000_damaged_records(content: bytes, record: Record, tmp_path: Path) -> None:
     assert attack(content, record, tmp_path / "x.npz", 5000, seed=2) > 2500
 
@@ -113,7 +114,6 @@ ABSURD = [
 ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "record"), ABSURD, indirect=["record"])
 def test_absurd_numbers_under_a_sound_checksum_are_drawn_or_refused(
     name: str, content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -28,6 +28,8 @@ from hypothesis import strategies as st
 from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 
+pytestmark = pytest.mark.thorough
+
 some = settings(max_examples=10, deadline=None)
 few = settings(max_examples=3, deadline=None)
 

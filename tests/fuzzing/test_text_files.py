@@ -28,6 +28,8 @@ from .documents import KINDS
 from .mutations import VALUES, mutated_toml
 from .subjects import attempted, text_files
 
+pytestmark = pytest.mark.thorough
+
 FILES = text_files()
 MAX_SECONDS = 2.0
 
@@ -75,7 +77,6 @@ def test_any_sound_file_is_run(kind: str, data: st.DataObject, infoset: Infoset,
     run_any(kind, data.draw(KINDS[kind][1]), infoset, tmp_path / "any.toml")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
@@ -112,7 +113,6 @@ def test_30_mutated_files(kind: str, tmp_path: Path) -> None:
     assert attack(kind, 30, seed=1, file=tmp_path / "mutated.toml") > 12
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_2000_mutated_files(kind: str, tmp_path: Path) -> None:
     assert attack(kind, 2000, seed=2, file=tmp_path / "mutated.toml") > 800
@@ -139,7 +139,6 @@ def test_100_hostile_settings(kind: str) -> None:
     assert attack_settings(kind, 100, seed=4) > 60
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_5000_hostile_settings(kind: str) -> None:
     assert attack_settings(kind, 5000, seed=5) > 3000

@@ -116,7 +116,7 @@ def test_the_reference_is_a_miss_that_no_strategy_prevents(guaranteed: Scenario)
     assert set(found) == {0.0}
 
 
-@pytest.mark.parametrize(("budget", "seeds"), [(800, 1), pytest.param(8000, 5, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("budget", "seeds"), [(800, 1), pytest.param(8000, 5, marks=pytest.mark.thorough)])
 def test_the_worst_miss_without_a_range_sensor_is_near_the_bound(guaranteed: Scenario, budget: int, seeds: int) -> None:
     """Searches find 74 to 77 m for U_s and at most 30 m for least effort; no strategy guarantees less than 24.4 m."""
     for seed in range(seeds):

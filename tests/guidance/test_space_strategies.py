@@ -331,7 +331,7 @@ def in_free_space(name: str, noise: NoiseKind, tie: TieRule = TieRule.RANDOM) ->
     return replace(scenario, rate_sensor=RateSensor(0.5, 1e-6))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", strategy_names())
 @pytest.mark.parametrize("noise", list(NoiseKind))
 def test_an_engagement_with_exchanged_axes_is_the_same_bit_for_bit(name: str, noise: NoiseKind) -> None:
@@ -343,7 +343,7 @@ def test_an_engagement_with_exchanged_axes_is_the_same_bit_for_bit(name: str, no
     assert np.array_equal(back.lateral_miss, there.lateral_miss[:, ::-1])
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["symmetric-miss", "patient", "zero-effort-miss"])
 @pytest.mark.parametrize("signs", [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0)])
 def test_a_mirrored_engagement_is_mirrored(name: str, signs: tuple[float, float]) -> None:
@@ -361,7 +361,7 @@ def test_a_mirrored_engagement_is_mirrored(name: str, signs: tuple[float, float]
     np.testing.assert_allclose(other.lateral_miss, one.lateral_miss * mirror, rtol=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("noise", "tie"), [(NoiseKind.RANDOM, TieRule.UPPER), *((NoiseKind.GAME, tie) for tie in TieRule)]
 )

@@ -333,7 +333,7 @@ def flown(name: str, noise: NoiseKind, meter: bool) -> Results:
     return simulate(scenario if meter else replace(scenario, range_sensor=None), 1000)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("meter", [True, False])
 def test_patient_spends_little_for_the_same_miss(meter: bool) -> None:
     """Bounds set from an independent implementation: 91 m/s and 1.3 m, 147 m/s and 12.8 m."""
@@ -344,7 +344,7 @@ def test_patient_spends_little_for_the_same_miss(meter: bool) -> None:
     assert np.median(game.miss_m) < 13.5
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["kalman", "least-squares"])
 def test_the_estimators_are_good_ones(name: str) -> None:
     """A filter of two states with plain zero-effort guidance: 3.3 m for 379 m/s, in an independent implementation."""

@@ -290,7 +290,7 @@ def test_the_true_state_is_inside_with_errors_at_their_bounds() -> None:
     assert kept_of_two_states(3000, 1) == 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_true_state_is_inside_in_100_000_runs() -> None:
     assert kept_of_two_states(100_000, 2) == 1.0
 
@@ -423,7 +423,7 @@ def test_the_true_state_of_four_states_is_inside() -> None:
     assert kept_of_four_states(20, 10) == 20
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_true_state_of_four_states_is_inside_in_2000_runs() -> None:
     assert kept_of_four_states(2000, 10) == 2000
 

@@ -19,6 +19,8 @@ from infoset import polygon, polygon_hull, polygon_sum
 from infoset.arrays import Floats
 from tests.rationals import Fraction
 
+pytestmark = pytest.mark.thorough
+
 Exact = tuple[Fraction, Fraction]
 
 EPS = Fraction(1, 2**52)

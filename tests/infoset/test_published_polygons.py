@@ -17,6 +17,8 @@ from infoset import ConvexPolygons
 from tests.infoset.test_polygon_oracle import Case, U, assert_same_set, exact, exact_sum, hull, outside_by
 from tests.infoset.test_set_library import exact_difference, exact_distance_between, exact_intersection, holds
 
+pytestmark = pytest.mark.thorough
+
 PAIRS: list[dict[str, Any]] = json.loads((Path(__file__).parent / "published_polygons.json").read_text())["pairs"]
 NAMES = [f"{pair['source']}: {pair['case']}" for pair in PAIRS]
 

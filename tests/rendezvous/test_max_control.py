@@ -89,7 +89,7 @@ def test_controls_of_a_circular_orbit(seed: int) -> None:
     sinusoids_and_secular_terms(seed)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("seeds", [MANY])
 def test_many_controls_of_a_circular_orbit(seeds: range) -> None:
     assert len(seeds) == 2000

@@ -19,6 +19,8 @@ from rendezvous.linear_game import (
     mass_loss_capture,
 )
 
+pytestmark = pytest.mark.thorough
+
 Floats = NDArray[np.float64]
 Check = Callable[[int], None]
 MASS_KG = 1000.0
@@ -193,7 +195,6 @@ def test_random_games(check: Check) -> None:
         check(seed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_many_random_games(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
     check_seeds(check, range(1000, 3000))

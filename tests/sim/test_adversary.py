@@ -209,7 +209,7 @@ def test_starts_do_not_come_from_the_dispersion(coarse: Scenario) -> None:
     assert found.position_m.tolist() != [0.0, 5801.3e3]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 1])
 def test_symmetric_miss_in_the_papers_model_misses_by_85_m_with_its_set_kept(asteroid: Scenario, seed: int) -> None:
     found = find_worst(asteroid, budget=4000, seed=seed, keep_set=True, threads=2)
@@ -219,7 +219,7 @@ def test_symmetric_miss_in_the_papers_model_misses_by_85_m_with_its_set_kept(ast
     assert_flies_again(found)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 1])
 def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenario, seed: int) -> None:
     scenario = guaranteed(asteroid)
@@ -234,7 +234,7 @@ def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenari
     assert_flies_again(found)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 1])
 def test_symmetric_miss_in_space_misses_by_90_m_below_phi(asteroid: Scenario, seed: int) -> None:
     scenario = guaranteed(in_space(asteroid))

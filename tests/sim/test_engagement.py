@@ -118,7 +118,7 @@ def test_the_truth_stays_in_its_section_in_the_models_own_dynamics(asteroid: Sce
     assert Outcome.SET_EMPTY not in results.outcomes
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
 def test_the_truth_stays_in_its_section_in_ten_thousand_engagements(asteroid: Scenario, noise: NoiseKind) -> None:
     rules = list(TieRule)

@@ -56,7 +56,11 @@ def sound(results: Results) -> bool:
 
 @pytest.mark.parametrize(
     ("hostile", "batches", "batch"),
-    [(False, 4, 32), (True, 8, 32), *(pytest.param(each, 32, 80, marks=pytest.mark.slow) for each in (False, True))],
+    [
+        (False, 4, 32),
+        (True, 8, 32),
+        *(pytest.param(each, 32, 80, marks=pytest.mark.thorough) for each in (False, True)),
+    ],
 )
 def test_nothing_breaks_the_guarantee(
     soundness: ModuleType, hostile: bool, batches: int, batch: int, monkeypatch: pytest.MonkeyPatch
@@ -69,7 +73,7 @@ def test_nothing_breaks_the_guarantee(
     assert vars(total) == {"engagements": engagements, "outside": 0, "lost": 0, "above": 0, "unknown": 0, "refused": 0}
 
 
-@pytest.mark.parametrize("batches", [12, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("batches", [12, pytest.param(60, marks=pytest.mark.thorough)])
 def test_nothing_breaks_the_guarantee_of_a_camera(
     soundness: ModuleType, batches: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -90,7 +94,7 @@ def test_the_test_can_fail(soundness: ModuleType, asteroid: Scenario) -> None:
     assert soundness.fly(faster, 0, 80, 2).outside > 0
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_soundness_costs_little(asteroid: Scenario) -> None:
     """On the same seeds: at most 15 % more median miss for random noise, 30 % for game noise."""
     for noise, most in ((NoiseKind.RANDOM, 1.15), (NoiseKind.GAME, 1.30)):
@@ -187,7 +191,7 @@ def test_gravity_moves_the_model_motion_within_its_bounds(asteroid: Scenario, sp
     assert (maximum > 0.25).all()  # the bound is not lavish, and what it bounds was there
 
 
-@pytest.mark.parametrize("runs", [16, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [16, pytest.param(100, marks=pytest.mark.thorough)])
 def test_a_rate_sensor_helps_and_stays_sound(asteroid: Scenario, hundred: Results, runs: int) -> None:
     sensor = RateSensor(period_s=1.0, error_rad_s=1e-6)
     scenario = replace(guaranteed(asteroid), rate_sensor=sensor)

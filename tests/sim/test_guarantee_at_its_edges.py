@@ -59,7 +59,7 @@ def test_what_broke_the_guarantee_once(case: str, seed: int, noise: NoiseKind, t
 @pytest.mark.skipif(not HAS_BENCHMARKS, reason="benchmarks are in a checkout only")
 @pytest.mark.parametrize("rate_sensor", [False, True])
 @pytest.mark.parametrize(
-    ("first", "scenarios", "batch"), [(0, 12, 16), pytest.param(10_000, 150, 80, marks=pytest.mark.slow)]
+    ("first", "scenarios", "batch"), [(0, 12, 16), pytest.param(10_000, 150, 80, marks=pytest.mark.thorough)]
 )
 def test_random_scenarios_keep_the_guarantee(
     rate_sensor: bool, first: int, scenarios: int, batch: int, monkeypatch: pytest.MonkeyPatch
@@ -132,7 +132,7 @@ def round_scenario(number: int) -> Scenario:
     )
 
 
-@pytest.mark.parametrize(("first", "number"), [(0, 60), pytest.param(1000, 2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("first", "number"), [(0, 60), pytest.param(1000, 2000, marks=pytest.mark.thorough)])
 def test_round_numbers_give_no_warning_and_finite_results(first: int, number: int) -> None:
     for case in range(first, first + number):
         scenario = round_scenario(case)

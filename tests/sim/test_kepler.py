@@ -162,7 +162,7 @@ def closest_by_scipy(position: Floats, velocity: Floats, sun: Sun, longest_s: fl
     return float(solution.t[-1]), float(np.linalg.norm(relative[:, -1])), float(nearest)
 
 
-@pytest.mark.parametrize("flights", [60, pytest.param(300, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("flights", [60, pytest.param(300, marks=pytest.mark.thorough)])
 def test_the_miss_is_exact_in_gravity_of_any_strength(flights: int) -> None:
     """From a planet to a star, ranges of up to 80 % of the distance from it, speeds from a tenth of the orbital one."""
     random, flown, strongest = np.random.default_rng(flights), 0, 0.0

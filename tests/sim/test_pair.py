@@ -259,7 +259,7 @@ def test_one_of_the_pair_misses_by_the_bound_in_the_scenario_of_1997(
     ).all()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("make", [random_scenario, random_in_space])
 @pytest.mark.parametrize("number", range(QUICK, QUICK + 20))
 def test_one_of_the_pair_misses_by_the_bound_in_more_scenarios(number: int, make: Callable[[int], Scenario]) -> None:

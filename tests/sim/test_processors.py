@@ -47,7 +47,7 @@ def flown(folder: Path, processor: str) -> NDArray[np.float64]:
     return np.asarray(np.load(place, allow_pickle=False))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_results_do_not_depend_on_the_processor(tmp_path: Path) -> None:
     here, plainest = flown(tmp_path, ""), flown(tmp_path, "generic")
     assert here.shape == (16, 20)

@@ -12,7 +12,7 @@ from infoset import Recovery
 from sim import Scenario, simulate
 from sim.scenario import of_model
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.thorough
 
 
 def test_random_noise(asteroid: Scenario) -> None:

@@ -49,8 +49,8 @@ def flat(box: StateBox) -> StateBox:
     ("name", "strategy"),
     [
         ("asteroid", "symmetric-miss"),
-        pytest.param("asteroid", "patient", marks=pytest.mark.slow),
-        pytest.param("ranging", "symmetric-miss", marks=pytest.mark.slow),
+        pytest.param("asteroid", "patient", marks=pytest.mark.thorough),
+        pytest.param("ranging", "symmetric-miss", marks=pytest.mark.thorough),
     ],
 )
 @pytest.mark.parametrize("model", list(Model))
@@ -128,7 +128,7 @@ def exchanged(scenario: Scenario) -> Scenario:
     return replace(scenario, dispersion=exchanged_box(scenario.dispersion), **of_model(known))
 
 
-@pytest.mark.parametrize("name", ["asteroid", pytest.param("ranging", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["asteroid", pytest.param("ranging", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize(("noise", "tie"), NOISES)
 def test_an_exchange_of_the_axes_changes_nothing(
@@ -314,7 +314,7 @@ class Mistaken:
         return self._noise.measure(replace(sight, sensors={**sight.sensors, "angle": self._sensor}), predicted)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("convention", [Convention.GIMBAL, Convention.CONE])
 def test_the_bands_of_the_conventions_are_needed(convention: Convention, asteroid: Scenario) -> None:
     # Theory, section 1: taken for plane angles, some true states are outside.

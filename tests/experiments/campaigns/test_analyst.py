@@ -37,7 +37,7 @@ def test_the_readme_asks_what_the_page_answers() -> None:
     assert asked[asked.index("--require") + 1] == "hit>=0.95"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="the wheel has no pages")
 def test_the_answer_is_the_same_with_more_runs_in_each_cell(infoset: Infoset, tmp_path: Path) -> None:
     asked = command("docs/requirements.md")

@@ -432,7 +432,7 @@ def test_killed_and_resumed(infoset: Infoset, brief: Scenario, file: Path, tmp_p
     assert _table(tmp_path / "runs").equals(expected)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.skipif(os.name != "posix", reason="there is no kill -9")
 def test_killed_at_twenty_random_moments_and_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
     stored = _killed_at_random_moments(file, tmp_path / "runs", 4000, 20, seed=2)
@@ -488,7 +488,7 @@ def test_a_second_campaign_in_the_folder_is_refused(infoset: Infoset, file: Path
     assert "another campaign is running in this folder" in err
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_processes_give_the_same_bits_and_die_with_their_parent(brief: Scenario, file: Path, tmp_path: Path) -> None:
     arguments = ["campaign", file, "--runs", 6000, "--chunk", 8, "--noise", "mixed", "--out", tmp_path / "runs", "-q"]
     brief = with_model(brief, Model.GUARANTEED)

@@ -205,7 +205,7 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
         yield found
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("default")  # of the cluster's own client
 def test_two_workers_give_the_same_bits_and_one_that_dies_loses_nothing(
     infoset: Infoset, brief: Scenario, processes: Processes, tmp_path: Path
@@ -235,7 +235,7 @@ def test_two_workers_give_the_same_bits_and_one_that_dies_loses_nothing(
     assert CampaignFolder.read(tmp_path / "killed").table().equals(expected)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
 def test_a_scheduler_that_dies_is_one_message_and_the_campaign_goes_on_without(
     brief: Scenario, processes: Processes, tmp_path: Path
@@ -265,7 +265,7 @@ def test_a_scheduler_that_dies_is_one_message_and_the_campaign_goes_on_without(
     assert result.complete
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
 def test_workers_of_another_version_and_no_workers_at_all(
     infoset: Infoset, brief: Scenario, processes: Processes, tmp_path: Path
@@ -288,7 +288,7 @@ def test_workers_of_another_version_and_no_workers_at_all(
     assert not (tmp_path / "runs").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make a certificate")
 def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(

@@ -359,7 +359,7 @@ def test_ripples_are_split_where_no_label_was_looked_at() -> None:
     assert len(ripples(np.array([1.0]), np.array([2.0]))) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_bound_of_the_published_scenario_in_the_guaranteed_model(infoset: Infoset) -> None:
     code, out, _ = infoset("asteroid-1997", "--model", "guaranteed", "--json", "-")
     assert code == 0

@@ -99,7 +99,7 @@ def test_the_json_has_what_it_is_asked_for(infoset: Infoset) -> None:
 @pytest.mark.parametrize(
     ("settings", "verdict"),
     [
-        pytest.param(["gravity.parameter_km3_s2=1e14"], "branch-not-certified", marks=pytest.mark.slow),
+        pytest.param(["gravity.parameter_km3_s2=1e14"], "branch-not-certified", marks=pytest.mark.thorough),
         (["pursuer.thrust_N=1e9"], "propellant-exhausted"),
         (["pursuer.mass_kg=1e-9", "pursuer.dry_mass_kg=0"], "branch-not-certified"),
         (["longest_s=1e-9"], "branch-not-certified"),
@@ -139,7 +139,7 @@ def test_time_between_plans_suits_the_game(infoset: Infoset) -> None:
     assert "more than 2000 plans" in err
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_folder_has_the_problem_the_results_and_the_figures(infoset: Infoset, tmp_path: Path) -> None:
     code, out, _ = infoset("pursuit", "leo-pursuit", "--feedback", "coast", "--replan-s", "60", "--out", "found")
     assert code == 0

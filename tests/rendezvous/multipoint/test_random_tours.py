@@ -26,6 +26,8 @@ from rendezvous.multipoint import (
 from rendezvous.piecewise import max_control
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
+pytestmark = pytest.mark.thorough
+
 Floats = NDArray[np.float64]
 Check = Callable[[int], None]
 
@@ -291,12 +293,10 @@ def test_an_order_is_not_dropped_for_a_local_minimum_of_its_beginning(seed: int)
     order_and_times_agree(seed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_many_random_tours(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
     check_seeds(check, MANY)
 
 
-@pytest.mark.slow
 def test_many_orders_with_their_times(check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
     check_seeds(order_and_times_agree, range(100))

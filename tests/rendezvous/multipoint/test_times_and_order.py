@@ -48,7 +48,7 @@ def test_branch_and_bound_finds_what_brute_force_finds(seed: int) -> None:
     assert sorted(found.order) == [0, 1, 2]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize(("seed", "count"), [(0, 4), (1, 4), (2, 5), (3, 5), (4, 6)])
 def test_branch_and_bound_finds_what_brute_force_finds_of_more(seed: int, count: int) -> None:
     tour, limits = random_tour(seed, count, 0.3), TimeLimits(latest_s=1500.0 * count)

@@ -34,6 +34,8 @@ from rendezvous.pareto import (
 )
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
+pytestmark = pytest.mark.thorough
+
 Floats = NDArray[np.float64]
 Check = Callable[[int], None]
 
@@ -390,7 +392,6 @@ def test_random_encounters(check: Check, seed: int) -> None:
     check(seed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_many_random_encounters(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
     check_seeds(check, MANY)

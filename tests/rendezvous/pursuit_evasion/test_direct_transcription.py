@@ -40,7 +40,7 @@ def fly_batch(start: Floats, steering: Floats, duration: Floats, thrust: float, 
     return state
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 1])
 def test_no_steering_captures_the_fixed_path_earlier(seed: int, solved: Solution) -> None:
     assert solved.capture is not None

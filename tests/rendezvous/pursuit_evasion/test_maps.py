@@ -88,7 +88,7 @@ def test_what_is_no_capture_is_masked_and_named(slides: MakeGame) -> None:
     assert told == [0.5, 1.0]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_at_nine_tenths_of_the_thrust_nothing_certified_is_wrong(slides: MakeGame) -> None:
     plain: Counter[str] = Counter()
     certified, agreed = 0, 0

@@ -78,7 +78,7 @@ def test_misses_that_were_wrong_or_refused(name: str) -> None:
     assert miss == pytest.approx(cone_program(Dense(problem), "norm")[0], rel=RELATIVE, abs=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["s2_2_26", "s2_2_68"])
 def test_misses_with_thrust_in_a_ball_to_forty_digits(name: str) -> None:
     problem = load_rendezvous(CASES / f"{name}.toml").problem
@@ -205,13 +205,13 @@ def test_random_problems() -> None:
     assert told["missed"] > 3
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_two_thousand_random_problems() -> None:
     told = Counter(check(seed, precise_to=4, members=False) for seed in range(2000))
     assert told["refused"] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("thrust", list(ThrustShape))
 @pytest.mark.parametrize("periods", [3, 6, 10, 16])
 @pytest.mark.parametrize("checks", [0, 2])
