@@ -87,6 +87,11 @@ class CampaignFolder:
         parts = [self._read(index, columns) for index in self._wanted(cell)]
         return self._tables.joined(parts, columns, with_cell=bool(self.manifest.axes))
 
+    def runs(self, columns: Sequence[str] | None = None, cell: int | None = None) -> Any:
+        """Return the stored runs as a pandas.DataFrame, in the order of cells and runs; None is all of them."""
+        frame = self._tables.frame(self.table(cell=cell), guarantees=self.manifest.scenario.set_model.is_guaranteed)
+        return frame if columns is None else frame[list(columns)]
+
     def shards(
         self, quantities: Sequence[str], texts: Mapping[str, Sequence[str]], cell: int | None = None
     ) -> Iterator[tuple[dict[str, Numbers], dict[str, Codes]]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
@@ -167,6 +168,21 @@ def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
 def joined(parts: Sequence[Any], columns: Sequence[str] | None, *, with_cell: bool) -> Any:
     """Return several tables as one; without tables, a table without rows."""
     return pa.concat_tables(parts or [_some(columns, with_cell=with_cell).empty_table()])
+
+
+def frame(table: Any, *, guarantees: bool) -> Any:
+    """Return the rows as a pandas.DataFrame with the columns of `Results`, the cell and the noise."""
+    frame = table.to_pandas(types_mapper={pa.bool_(): pd.BooleanDtype()}.get, categories=["noise", "outcome"])
+    for column in _COLUMNS:
+        if column.name.endswith(("_km", "_km_s")):
+            name = f"start_{column.name}".replace("_km", "_m")
+            frame[name] = frame.pop(column.name) * M_PER_KM
+    if "cell" not in frame:
+        frame.insert(0, "cell", np.zeros(len(frame), dtype=np.int32))
+    frame["truth_kept"] = (frame["truth_margin_m"].fillna(0.0) >= 0.0).astype("boolean")
+    known = frame["guaranteed_miss_m"].notna() & guarantees
+    frame["phi_held"] = (frame["miss_m"] <= frame["guaranteed_miss_m"]).astype("boolean").where(known)
+    return frame.drop(columns=["tie", "range_sensor"])
 
 
 def _some(columns: Sequence[str] | None, *, with_cell: bool) -> Any:
