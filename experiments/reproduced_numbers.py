@@ -10,10 +10,11 @@ from itertools import groupby
 import typer
 from rich.text import Text
 
-from experiments.common.output import library_version, output_of, to_json
+from experiments.common.output import output_of, to_json
 from experiments.common.printed_numbers import Comparison, Origin, PrintedNumber, Progress, Reproduction, Verdict
 from experiments.common.screen import Part, print_parts, progress_bar, table_console
 from experiments.reproduce import Reproduce
+from sim.versions import versions
 
 PAPERS = ("interception", "pareto", "multipoint", "reachability", "pursuit")
 
@@ -34,7 +35,7 @@ def run(options: Reproduce) -> None:
     papers = PAPERS if options.paper is None else (options.paper,)
     with output_of(options) as written, progress_bar(options.quiet) as begin:
         reproductions = [reproduce_paper(name, begin(name)) for name in papers]
-        summary = {"version": library_version(), "papers": [_summary(each) for each in reproductions]}
+        summary = {"versions": versions(), "papers": [_summary(each) for each in reproductions]}
         written.deliver("--json", to_json(summary))
     if not options.quiet:
         console = table_console(written.stdout_taken)

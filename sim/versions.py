@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import platform
 from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -20,6 +21,11 @@ class VersionError(Exception):
 def calculating_versions() -> tuple[tuple[str, str], ...]:
     """Return the names and versions of the packages on which results depend."""
     return tuple((name, _version(name)) for name in CALCULATING)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that results and records carry: those of the packages, and that of Python."""
+    return {**dict(calculating_versions()), "python": platform.python_version()}
 
 
 def differences(here: tuple[tuple[str, str], ...], there: tuple[tuple[str, str], ...]) -> list[str]:

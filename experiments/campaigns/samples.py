@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.common.output import hit_key, library_version
+from experiments.common.output import hit_key
 from experiments.common.screen import Part, number, number_table, quantile_notes, some_runs
 from experiments.interception.runs.shared import bound_name
 from experiments.interception.study import SetCounts, game_note, hit_text, set_counts, set_warnings
@@ -20,6 +20,7 @@ from sim import HitEstimate, Outcome, QuantileEstimate, estimate_hits, estimate_
 from sim.statistics import level_name, shows
 from sim.stopping_rule import QUANTITIES
 from sim.storage import CampaignFolder, fingerprint
+from sim.versions import versions
 
 LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
 WORST = 10
@@ -137,7 +138,7 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
     """Return the keys with which every JSON file of a campaign or a sweep begins."""
     manifest = folder.manifest
     return {
-        "version": library_version(),
+        "versions": versions(),
         "kind": manifest.kind,
         "scenario": manifest.scenario.name,
         "scenario_hash": fingerprint(manifest.scenario),

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from experiments.common.errors import InputError
-from experiments.common.output import library_version
 from rendezvous.two_body import OrbitalElements, orbit_fault, semi_major_axis_m
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 
 MAX_RADIANS, MIN_RADIANS = 1000.0, 1e-9
 """Angles of the orbit during a problem, within which linear motion is meaningful."""
@@ -40,7 +40,7 @@ class Problem(Protocol):
 
 def head(problem: Problem) -> dict[str, object]:
     """Return the first keys of the JSON of a command."""
-    return {"version": library_version(), "problem": problem.name, "problem_hash": fingerprint(problem)}
+    return {"versions": versions(), "problem": problem.name, "problem_hash": fingerprint(problem)}
 
 
 def need_finite(problem: Problem, *results: ArrayLike) -> None:

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from importlib.metadata import version
 from itertools import chain, product
 from pathlib import Path
 from typing import get_type_hints
@@ -25,6 +24,7 @@ from experiments.interception.scenario_file import load_scenario
 from infoset import kernels
 from sim import Scenario, simulate
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 from tests.built_in import scenario_text
 from tests.experiments.command_line import Command
 
@@ -51,7 +51,7 @@ def names_in(folder: Path) -> list[str]:
 
 
 def test_version(infoset: Command) -> None:
-    assert infoset("--version") == (0, f"infoset {version('infoset')}\n", "")
+    assert infoset("--version") == (0, f"infoset {versions()['infoset']}\n", "")
 
 
 @pytest.mark.parametrize("command", [[], ["experiment"], ["engage"], ["replay"], ["scenarios"]])
@@ -118,9 +118,9 @@ def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_
 
 def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
     found = infoset.json("experiment", "--runs", 3, "--seed", 5)
-    assert list(found) == ["version", "scenario", "scenario_hash", "seed", "runs", "elapsed_s", "curves", "notes"]
+    assert list(found) == ["versions", "scenario", "scenario_hash", "seed", "runs", "elapsed_s", "curves", "notes"]
     scenario = load_scenario("asteroid-1997")
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     assert found["scenario"] == "asteroid-1997"
     assert found["scenario_hash"] == fingerprint(scenario)
     assert (found["seed"], found["runs"]) == (5, 3)
@@ -249,7 +249,7 @@ def test_the_guaranteed_model_shows_its_certificate(infoset: Command) -> None:
 def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     found = infoset.json("engage")
     assert [key for key in found if key not in {"run", "runs"}] == [
-        *("version", "scenario", "scenario_hash", "seed", "elapsed_s"),
+        *("versions", "scenario", "scenario_hash", "seed", "elapsed_s"),
         *CURVE_KEYS,
         "hit",
         "inconsistency",
@@ -317,7 +317,7 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
         assert part in out
     found = json.loads((folder / "results.json").read_text())
     assert [key for key in found if key in {"random", "game"}] == ["random", "game"]
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     assert found["game"]["steps"]
     alone = infoset.json(*arguments[:2], "--noise", "game")
     same = [key for key in alone if key != "elapsed_s"]

@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from experiments.pareto import published as pareto
 from experiments.pareto.file import load_pareto
 from experiments.reproduced_numbers import PAPERS, reproduce_paper
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 
 Infoset = Callable[..., tuple[int, str, str]]
 X = PrintedNumber("table 1", "x (m)", "1.25")
@@ -152,7 +152,7 @@ def test_json_of_one_paper(infoset: Infoset, tmp_path: Path) -> None:
     code, out, err = infoset("--paper", "pareto", "--json", file)
     assert (code, err.splitlines()[-1]) == (0, f"wrote numbers.json in {tmp_path}")
     found = json.loads(file.read_text(), parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     (paper,) = found["papers"]
     assert paper["paper"] == "pareto"
     assert paper["problems"] == [{"name": "pareto-2008", "hash": fingerprint(load_pareto("pareto-2008"))}]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from experiments.common.input_file import to_toml
-from experiments.common.output import Cell, library_version, outcome_columns, output_of, to_csv, to_json
+from experiments.common.output import Cell, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, show
 from experiments.interception.choices import scenario_with
 from experiments.interception.command import Engage
@@ -27,6 +27,7 @@ from infoset import AngleSensor, Convention
 from infoset.sensors import SENSORS
 from sim import AxisStep, Record, StepRecord, fly_one
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 
 
 def run(options: Engage) -> None:
@@ -64,7 +65,7 @@ def run(options: Engage) -> None:
                 **_summary(record, perf_counter() - began_s),
             }
         need_times(options.times, times_s, records)
-        head = {"version": library_version(), "scenario_hash": fingerprint(scenario)}
+        head = {"versions": versions(), "scenario_hash": fingerprint(scenario)}
         summary = {**head, **summaries} if both else summaries[noises[0].value]
         written.save("scenario.toml", to_toml(scenario if both else records[0].scenario))
         written.save("results.json", to_json(summary), "--json")

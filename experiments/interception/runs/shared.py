@@ -11,7 +11,6 @@ from threading import Event
 import numpy as np
 
 from experiments.common.errors import InputError
-from experiments.common.output import library_version
 from experiments.common.screen import NOT_FINITE, BeginProgress, some_runs
 from experiments.interception.course import Courses
 from experiments.interception.study import set_counts
@@ -21,6 +20,7 @@ from sim.adversary import BudgetError, NothingCountsError, Objective, WorstEngag
 from sim.gravity import on_board_model
 from sim.scenario import strategy_name
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 
 Progress = Callable[[float], None]
 
@@ -66,7 +66,7 @@ def need_finite(results: Results) -> None:
 def summary_head(scenario: Scenario, warnings: Sequence[str], own: Strategy | None = None) -> dict[str, object]:
     """Return the first keys of a summary; ``strategy`` only if it is not the scenario's."""
     return {
-        "version": library_version(),
+        "versions": versions(),
         "scenario": scenario.name,
         "scenario_hash": fingerprint(scenario),
         **({"warnings": warnings} if warnings else {}),

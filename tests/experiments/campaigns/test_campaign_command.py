@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -31,7 +31,7 @@ from sim import Campaign, CampaignNoise, Scenario, fly_one
 from sim.chunk import chunk_size
 from sim.storage import CampaignFolder
 from sim.storage.codec import fingerprint
-from sim.versions import install_command
+from sim.versions import install_command, versions
 
 Infoset = Callable[..., tuple[int, str, str]]
 FILES = [".lock", "manifest.json", "scenario.toml", "shards", "summary.json"]
@@ -58,7 +58,7 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
     )
     assert load_scenario(folder / "scenario.toml") == brief
     found = json.loads((folder / "summary.json").read_text())
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     assert (found["scenario"], found["scenario_hash"]) == ("brief", fingerprint(brief))
     assert (found["runs"], found["seed"], found["complete"], found["redone"]) == (150, 4, True, [])
     miss = stored.table(["miss_m", "noise"])

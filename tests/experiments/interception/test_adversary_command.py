@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +17,14 @@ from infoset import ErrorShape, Model
 from sim import Scenario
 from sim.adversary import find_worst
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 from tests.experiments.command_line import Command
 from tests.space import in_space
 
 pytestmark = pytest.mark.usefixtures("unrendered")
 
 KEYS = [
-    "version",
+    "versions",
     "scenario",
     "scenario_hash",
     "seed",
@@ -65,7 +65,7 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     found: dict[str, Any] = json.loads(out)
     assert list(found) == KEYS
     scenario = with_model(load_scenario("asteroid-1997"), Model.GUARANTEED)
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     assert (found["scenario"], found["scenario_hash"]) == (scenario.name, fingerprint(scenario))
     assert (found["seed"], found["evaluations"], found["record"]) == (5, BUDGET, "worst.npz")
     assert (found["strategy"], found["model"], found["range_sensor"]) == ("symmetric-miss", "guaranteed", True)

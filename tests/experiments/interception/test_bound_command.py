@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +22,12 @@ from sim import Scenario
 from sim.bound import LowerBound, lower_bound, pair_at
 from sim.scenario import of_model
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 from tests.space import in_space
 
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
 KEYS = [
-    *("version", "scenario", "scenario_hash", "model", "elapsed_s", "disturbance_m_s2"),
+    *("versions", "scenario", "scenario_hash", "model", "elapsed_s", "disturbance_m_s2"),
     *("lower_bound_m", "reached_at", "at_nominal_range", "by_label", "strategies", "value"),
 ]
 IS_VALUE = "the bound is the value of the game up to a reserve of "
@@ -81,7 +81,7 @@ def test_bound_into_a_folder(
     found = json.loads((folder / "results.json").read_text())
     assert list(found) == KEYS
     flown = load_scenario(folder / "scenario.toml")
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     assert (found["scenario"], found["model"]) == ("short", "guaranteed")
     assert found["scenario_hash"] == fingerprint(flown)
     expected = planar

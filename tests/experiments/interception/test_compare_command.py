@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from guidance.registry import COMPARED
 from infoset import Model
 from sim import Scenario, simulate
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 from tests.experiments.command_line import Command
 
 TWO = ("--strategies", "symmetric-miss,patient")
@@ -47,7 +47,7 @@ def as_json(infoset: Infoset, *arguments: object) -> Any:
 
 def test_compare_as_json(infoset: Infoset, brief: Scenario, brief_file: Path, tmp_path: Path) -> None:
     found = as_json(infoset, brief_file, *TWO, "--runs", 4, "--seed", 3)
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     assert (found["scenario"], found["scenario_hash"]) == ("brief", fingerprint(with_model(brief, Model.GUARANTEED)))
     assert (found["seed"], found["runs"], found["model"], found["range_sensor"]) == (3, 4, "guaranteed", True)
     strategies = found["strategies"]

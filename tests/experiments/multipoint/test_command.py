@@ -4,7 +4,6 @@ import re
 import time
 from collections.abc import Callable
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +16,13 @@ from experiments.multipoint.figures import draw_control, draw_costates, draw_pat
 from experiments.multipoint.file import Axes, MultipointProblem, load_multipoint
 from experiments.multipoint.report import Scene, cost_curves
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 from tests.built_in import problem_text
 from tests.experiments.command_line import strict
 
 FIGURES = ["figure-control", "figure-costates", "figure-path", "figure-times"]
 KEYS = [
-    *("version", "problem", "problem_hash", "units", "order_chosen", "times_chosen", "cost_m2_s3", "order", "times_s"),
+    *("versions", "problem", "problem_hash", "units", "order_chosen", "times_chosen", "cost_m2_s3", "order", "times_s"),
     *(
         "time_gradient_m2_s4",
         "nodes",
@@ -78,7 +78,7 @@ def test_three_targets_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     )
     found = strict((tmp_path / "results" / "results.json").read_text())
     assert list(found) == KEYS
-    assert (found["version"], found["problem"]) == (version("infoset"), "service-3")
+    assert (found["versions"], found["problem"]) == (versions(), "service-3")
     assert found["problem_hash"] == fingerprint(load_multipoint("service-3"))
     assert (found["order_chosen"], found["times_chosen"], found["evaluations"]) == ("given", "given", 1)
     # The acceptance, N = 3.

@@ -3,7 +3,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,13 @@ from experiments.pareto.figures import draw_controls, draw_costs, draw_front, dr
 from experiments.pareto.file import load_pareto
 from rendezvous.pareto import analyse_coalitions, solve_encounter, sweep_meeting_time, total_impulse
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 from tests.built_in import problem_text
 from tests.experiments.command_line import strict
 
 FIGURES = ["figure-controls", "figure-costs", "figure-front", "figure-trajectories"]
 KEYS = [
-    *("version", "problem", "problem_hash", "units", "meeting_time_s", "meet", "free", "meeting", "craft"),
+    *("versions", "problem", "problem_hash", "units", "meeting_time_s", "meet", "free", "meeting", "craft"),
     *(
         "group_loss_m2_s3",
         "matrix",
@@ -64,7 +64,7 @@ def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -
     )
     found = strict((tmp_path / "results" / "results.json").read_text())
     assert list(found) == KEYS
-    assert (found["version"], found["problem"], found["meet"]) == (version("infoset"), "pareto-2008", "rendezvous")
+    assert (found["versions"], found["problem"], found["meet"]) == (versions(), "pareto-2008", "rendezvous")
     assert found["problem_hash"] == fingerprint(load_pareto("pareto-2008"))
     # Numbers of the acceptance, w = 0.001176, at nine digits.
     assert list(found["meeting"]) == STATE

@@ -4,7 +4,6 @@ import json
 import time
 from collections.abc import Callable
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -19,6 +18,7 @@ from experiments.pursuit.map_figure import axis_name, draw_map
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus, Policy, Solution, fly, history, solve
 from rendezvous.pursuit_evasion._branch import follow
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 
 FIGURES = ["figure-control", "figure-distance", "figure-feedback", "figure-orbits", "figure-relative"]
 MAP_FILES = ["figure-map.pdf", "figure-map.png", "map.csv", "problem.toml", "results.json"]
@@ -37,7 +37,7 @@ def test_the_slides_case_as_json(infoset: Infoset, tmp_path: Path) -> None:
     assert code == 0
     found = json.loads(out)
     assert list(tmp_path.iterdir()) == []
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     assert found["problem"] == "geo-pursuit"
     assert found["problem_hash"] == fingerprint(load_pursuit("geo-pursuit"))
     assert found["verdict"] == "captured"

@@ -5,7 +5,6 @@ import json
 import re
 from collections.abc import Callable
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +20,12 @@ from experiments.reachability.printed_tables import compare_published, is_publis
 from experiments.reachability.report import Request, make_report
 from rendezvous.reachability import solve
 from sim.storage.codec import fingerprint
+from sim.versions import versions
 from tests.built_in import problem_text
 
 FIGURES = ["figure-controls", "figure-planes", "figure-positions", "figure-velocities"]
 KEYS = [
-    *("version", "problem", "problem_hash", "kind", "units", "elapsed_s", "route", "route_reason"),
+    *("versions", "problem", "problem_hash", "kind", "units", "elapsed_s", "route", "route_reason"),
     *(
         "optimal_miss",
         "optimal_dimension",
@@ -67,7 +67,7 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     )
     found = json.loads((folder / "results.json").read_text())
     assert list(found) == KEYS
-    assert found["version"] == version("infoset")
+    assert found["versions"] == versions()
     assert (found["kind"], found["problem"], found["route"]) == ("reachable-rendezvous", "rendezvous-2021", "exact")
     assert found["problem_hash"] == fingerprint(load_rendezvous("rendezvous-2021"))
     assert (found["optimal_miss"], found["min_periods"], found["optimal_dimension"]) == (0.0, 3, 6)
