@@ -17,7 +17,7 @@ _DEGREES = ("deg", 180.0 / np.pi)
 def pursuit_page(name: str, description: str, solution: Solution, claim: str = "") -> str:
     """Return the page of a game as HTML, with what its certificate claims.
 
-    Raise `ValueError` if the solution has neither a capture nor a fallback.
+    Raise `ValueError` if the solution has no capture.
     """
     sampled = history(solution, MOMENTS)
     pursuer, evader = sampled.pursuer, sampled.evader

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +9,7 @@ import numpy as np
 from experiments.common.display_units import M_PER_KM
 from experiments.common.printed_numbers import Progress, Reproduction, read_paper
 from experiments.pursuit.file import load_pursuit
-from rendezvous.linear_game import (
-    Thruster,
-    circular_orbit_capture,
-    free_space_capture,
-    mass_loss_capture,
-)
-from rendezvous.pursuit_evasion import Capture, Game, Gravity, Player, Policy, Solution, certify, fly, solve
+from rendezvous.pursuit_evasion import Capture, Policy, Solution, certify, fly, solve
 from sim.storage.codec import fingerprint
 
 PAPER = "pursuit"
@@ -49,7 +42,7 @@ def reproduce(progress: Progress) -> Reproduction:
         ours[f"replanned, E {policy.value if policy else 'optimal'}"] = [_replanned_s(solution, policy)]
     progress(0.9)
     paper = read_paper(PAPER)
-    numbers = paper.compare(ours | _analytic())
+    numbers = paper.compare(ours)
     progress(1.0)
     return Reproduction(paper, ((problem.name, fingerprint(problem)),), numbers)
 
@@ -79,38 +72,3 @@ def _replanned_s(solution: Solution, policy: Policy | None) -> float:
     """Return the capture time that the last plan predicts, with a plan every 600 s."""
     steering = policy.direction if policy else None
     return float(fly(solution.game, steering, replan_s=600.0, solution=solution).predicted_s[-1])
-
-
-def _analytic() -> dict[str, list[float | None]]:
-    ahead, far = np.array([100e3, 0.0, 0.0]), np.array([1000e3, 500e3, -200e3])
-    offset, drift = np.array([100e3, 50e3, -20e3]), np.array([20.0, -50.0, 10.0])
-    pursuer, evader = Thruster(20.0, 2000.0, _EXHAUST_M_S), Thruster(10.0, 2000.0, _EXHAUST_M_S)
-    rate = math.sqrt(_MU_M3_S2 / _GEO_M**3)
-    about, speed = np.array([100e3, 1500e3, 200e3]), np.array([10.0, -20.0, 15.0])
-    cases = {
-        "free space, from rest": free_space_capture(ahead, np.zeros(3), 0.01, 0.005),
-        "free space": free_space_capture(offset, drift, 0.01, 0.005),
-        "loss of mass": mass_loss_capture(far, drift, pursuer, evader),
-        "linear game about a circle": circular_orbit_capture(about, speed, 0.01, 0.005, rate),
-    }
-    ours = {name: [None if capture is None else capture.time_s] for name, capture in cases.items()}
-    for share in _SHARES:
-        small = circular_orbit_capture(share * about, share * speed, share * 0.01, share * 0.005, rate)
-        capture = solve(_small_game(share, share * about, share * speed, rate)).capture
-        ratio = None if capture is None or small is None else capture.time_s / small.time_s - 1.0
-        ours[f"{share:g} of that game"] = [ratio]
-    return ours
-
-
-def _small_game(share: float, offset: np.ndarray, drift: np.ndarray, rate: float) -> Game:
-    """Return a game with a share of the linear game's offset and thrust, in central gravity, with constant masses."""
-    (x, y, z), (vx, vy, vz) = offset, drift
-    angle, radius = y / _GEO_M, _GEO_M + x
-    outward = np.array([math.cos(angle), math.sin(angle), 0.0])
-    ahead = np.array([-math.sin(angle), math.cos(angle), 0.0])
-    up = np.array([0.0, 0.0, 1.0])
-    position = radius * outward + z * up
-    velocity = vx * outward + radius * (rate + vy / _GEO_M) * ahead + vz * up
-    pursuer = Player((_GEO_M, 0.0, 0.0), (0.0, rate * _GEO_M, 0.0), 2000.0, 200.0, share * 20.0, math.inf)
-    evader = Player(tuple(position), tuple(velocity), 2000.0, 200.0, share * 10.0, math.inf)
-    return Game(Gravity(_MU_M3_S2, 6378137.0), pursuer, evader)

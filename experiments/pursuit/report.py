@@ -38,8 +38,6 @@ _FEWEST = 10
 _METHODS = {
     Route.CONTINUATION: "extremals for increasing durations, from zero to the capture",
     Route.SWITCHED: "extremals for increasing durations, with a change to those that keep the evader farther away",
-    Route.HOMOTOPY: "the thrust of the evader raised from zero in steps",
-    Route.LINEAR_GAME: "the linear game as initial guess",
 }
 STATUS_WORDS = {
     PointStatus.FOLLOWED: "solved from scratch",
@@ -89,8 +87,6 @@ def report_json(report: Report) -> dict[str, object]:
         "route": solution.route,
         "looked_at_s": solution.looked_at_s,
         "propellant_exhausted_by": solution.exhausted,
-        "fallback_capture_time_s": None if solution.fallback is None else solution.fallback.time_s,
-        "fallback_route": solution.fallback_route,
         "axes": INERTIAL_AXES,
         "units": {"length_km": solution.units.length_m / M_PER_KM, "time_s": solution.units.time_s},
         "certificate": None if certificate is None else _certificate_json(certificate),
@@ -255,11 +251,7 @@ def _verdict(solution: Solution) -> str:
         return f"escapes: no capture until {why}, {until}"
     if solution.looked_at_s == 0.0:
         return "branch-not-certified: no game could be followed, not even a short one; check the units of the values"
-    text = f"branch-not-certified: the extremals are a saddle up to a duration of {until}; no claim for longer ones"
-    if solution.fallback is not None and solution.fallback_route is not None:
-        method = _METHODS[solution.fallback_route]
-        text += f" (another method finds an extremal at {solution.fallback.time_s:.3f} s: {method})"
-    return text
+    return f"branch-not-certified: the extremals are a saddle up to a duration of {until}; no claim for longer ones"
 
 
 def _certificate_lines(certificate: Certificate) -> Iterator[str]:

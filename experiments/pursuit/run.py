@@ -33,7 +33,7 @@ def run(options: Pursuit) -> None:
     with output_of(options, files) as written, progress_bar(options.quiet) as begin:
         report = _solve(problem, options, evader, begin)
         solution = report.solution
-        has_trajectory = solution.capture is not None or solution.fallback is not None
+        has_trajectory = solution.capture is not None
         wanted = " and ".join(option for option in ("--html", "--csv") if option in written.files)
         if wanted and not has_trajectory:
             raise InputError(

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats, Integers
-from rendezvous._repr import short_repr
 from rendezvous.multipoint._shooting import MIN_RADIUS, ROUNDING, ShotPath, blocks_of, shoot, unknowns_of
 from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, check_times, solve_segments
 from rendezvous.multipoint.tour import MovingTargets, Target, Visits, nodes_of
@@ -101,8 +100,6 @@ class TracedPath(Path):
     """A path with known states and costates at all times."""
 
     trace: Panels
-
-    __repr__ = short_repr
 
     def breaks(self) -> Floats:
         """Return the ends of its panels, s."""
@@ -271,8 +268,6 @@ class KeplerTour(Visits):
 
     ruggedness = 3.0
     """Large: revolutions and the geometry of encounters cause many local minima."""
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         mu = self.targets.gravitational_parameter_m3_s2

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Flags, Floats
-from rendezvous._repr import short_repr
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path, check_times, solve_segments
 from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times, room_s
 from rendezvous.multipoint.tour import SMOOTH, Meet, Tour, Visits, nodes_of
@@ -41,8 +40,6 @@ class BestOrder:
     evaluations: int
     lost: tuple[tuple[int, ...], ...] = ()
     unfit: int = 0
-
-    __repr__ = short_repr
 
 
 def best_order(

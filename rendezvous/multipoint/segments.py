@@ -9,7 +9,6 @@ import numpy as np
 
 from rendezvous._arrays import Flags, Floats, Integers
 from rendezvous._compile import compiled
-from rendezvous._repr import short_repr
 from rendezvous.relative_motion import LinearMotion, TimeVaryingMotion
 
 
@@ -84,8 +83,6 @@ class Path:
     costate_after: Floats
     costate_start: Floats
     time_gradient: Floats
-
-    __repr__ = short_repr
 
     @property
     def jumps(self) -> Floats:

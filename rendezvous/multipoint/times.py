@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 
 from rendezvous._arrays import Floats
 from rendezvous._halton import halton
-from rendezvous._repr import short_repr
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path
 
 FlyAt = Callable[[Floats], Flown]
@@ -95,8 +94,6 @@ class BestTimes:
     flown: Flown
     objective: float
     evaluations: int
-
-    __repr__ = short_repr
 
     @cached_property
     def path(self) -> Path:

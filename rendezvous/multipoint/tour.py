@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats, Integers
-from rendezvous._repr import short_repr
 from rendezvous.multipoint.segments import Flown, Nodes, Path, solve_segments
 from rendezvous.relative_motion import LinearMotion
 
@@ -155,8 +154,6 @@ class Tour(Visits):
 
     ruggedness = SMOOTH
     """Small: the path of given times is unique, and the costs of an order's few local minima are close."""
-
-    __repr__ = short_repr
 
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
         """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""

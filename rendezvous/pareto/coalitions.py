@@ -10,7 +10,6 @@ from math import factorial
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.pareto.solution import EncounterSolution, weighted_point
 
 MAX_CRAFT = 12
@@ -64,8 +63,6 @@ class Coalitions:
     shapley: Floats
     transfers: Floats
     core: Core
-
-    __repr__ = short_repr
 
 
 def analyse_coalitions(solution: EncounterSolution) -> Coalitions:

@@ -8,7 +8,6 @@ from enum import Enum
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.relative_motion import LinearMotion
 
 
@@ -66,8 +65,6 @@ class Encounter:
     free: tuple[Component, ...]
     fixed: Floats
     meeting: Meeting = Meeting.RENDEZVOUS
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if not self.craft:

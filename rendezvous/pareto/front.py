@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 from rendezvous._halton import halton
-from rendezvous._repr import short_repr
 from rendezvous.pareto.solution import EncounterSolution
 
 
@@ -24,8 +23,6 @@ class ParetoSet:
     weights: Floats
     points: Floats
     excess: Floats
-
-    __repr__ = short_repr
 
 
 def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.pareto.encounter import Craft, Encounter
 from rendezvous.relative_motion import TimeVaryingMotion
 
@@ -22,8 +21,6 @@ class PlanSamples:
     state: Floats
     control_m_s2: Floats
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -34,8 +31,6 @@ class Plan:
     craft: Craft
     meeting_s: float
     costate: Floats
-
-    __repr__ = short_repr
 
     def control(self, time_s: ArrayLike) -> Floats:
         """Return u(t) = B' Phi(T, t)' lambda, m/s^2, shape (..., 3): (2.1) of the paper."""
@@ -108,8 +103,6 @@ class CraftCost:
     effort_slope: Floats
     to_costate: Floats
 
-    __repr__ = short_repr
-
     @property
     def matrix(self) -> Floats:
         """M, shape (f, f)."""
@@ -131,17 +124,6 @@ class EncounterSolution:
     encounter: Encounter
     costs: tuple[CraftCost, ...]
     point: Floats
-
-    def __repr__(self) -> str:
-        encounter = self.encounter
-        free = ", ".join(
-            f"{component.name.lower()} = {value:.4g} {'m' if component.value < 3 else 'm/s'}"
-            for component, value in zip(encounter.free, self.point.tolist(), strict=True)
-        )
-        return (
-            f"<{encounter.meeting.value} of {len(self.costs)} craft at {encounter.meeting_s:g} s: "
-            f"group loss {self.group_loss():.4g} m^2/s^3\n at {free}>"
-        )
 
     @property
     def ideals(self) -> Floats:
@@ -262,8 +244,6 @@ class DurationSweep:
     cost_squared: Floats
     ideal_cost_squared: Floats
     group_loss: Floats
-
-    __repr__ = short_repr
 
 
 def sweep_meeting_time(encounter: Encounter, meeting_s: ArrayLike) -> DurationSweep:

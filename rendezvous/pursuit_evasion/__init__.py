@@ -11,7 +11,7 @@ from rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
 from rendezvous.pursuit_evasion.maps import STATUSES, CaptureMap, PointStatus, capture_map
 from rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
-from rendezvous.pursuit_evasion.solver import solve, solve_by_homotopy, solve_by_linear_game, solve_near
+from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Script, Steering
 
 __all__ = [
@@ -48,7 +48,4 @@ __all__ = [
     "history",
     "orbital_axes",
     "solve",
-    "solve_by_homotopy",
-    "solve_by_linear_game",
-    "solve_near",
 ]

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import MAX_RESIDUAL, Craft, KnownPath, Node, Pair, Side
 from rendezvous.pursuit_evasion._scan import greater, scan
@@ -95,8 +94,6 @@ class Certificate:
     directions_tried: int
     max_excess_m: float | None
     unit_length_m: float
-
-    __repr__ = short_repr
 
     @property
     def failures(self) -> tuple[str, ...]:

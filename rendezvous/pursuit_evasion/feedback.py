@@ -10,7 +10,6 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import FINE, Craft, Node, Pair
 from rendezvous.pursuit_evasion.game import Game, Units, scaled_game
@@ -86,8 +85,6 @@ class Flight:
     distances_m: Floats
     pursuer_m: Floats
     evader_m: Floats
-
-    __repr__ = short_repr
 
 
 def fly(

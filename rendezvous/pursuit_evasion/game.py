@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._pair import Craft, Pair
 from rendezvous.two_body import orbit_fault, semi_major_axis_m
 
@@ -122,8 +121,6 @@ class Game:
     evader: Player
     capture_radius_m: float = 0.0
     longest_s: float = math.inf
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         _need(self.pursuer.thrust_n > 0.0, "the pursuer's thrust must be positive")

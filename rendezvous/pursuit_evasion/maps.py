@@ -9,7 +9,6 @@ from enum import Enum
 import numpy as np
 
 from rendezvous._arrays import Floats, Places
-from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion.game import Game, Units, scaled_game
 from rendezvous.pursuit_evasion.solution import Verdict
@@ -56,8 +55,6 @@ class CaptureMap:
     status: Places
     closing_speed_m_s: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
     solved_from_nothing: int
-
-    __repr__ = short_repr
 
     def count(self, status: PointStatus) -> int:
         """Return the number of points with a `status`."""

@@ -9,7 +9,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._extremal import STATES, end_of, flow_back, rate
 from rendezvous.pursuit_evasion._pair import FINE, Craft, Node
 from rendezvous.pursuit_evasion.game import Units, scaled_game
@@ -140,8 +139,6 @@ class PlayerHistory:
     thrust_direction: Floats
     switching: Floats
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class History:
@@ -151,18 +148,16 @@ class History:
     pursuer: PlayerHistory
     evader: PlayerHistory
 
-    __repr__ = short_repr
-
 
 def history(solution: Solution, count: int = 400) -> History:
-    """Sample the capture or the fallback of a `solution` at `count` equally spaced times, from the start to the end.
+    """Sample the capture of a `solution` at `count` equally spaced times, from the start to the end.
 
     Raises
     ------
     ValueError
-        If the solution has neither.
+        If there is no capture.
     """
-    capture = solution.capture or solution.fallback
+    capture = solution.capture
     if capture is None:
         raise ValueError(f"there is no capture to sample: the verdict is {solution.verdict.value}")
     units, node = solution.units, capture.extremal

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from enum import Enum
 
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion.game import Game, Units
 
@@ -29,8 +28,6 @@ class Route(Enum):
 
     CONTINUATION = "continuation in the duration"
     SWITCHED = "continuation, with a change to a branch that keeps the evader farther away"
-    HOMOTOPY = "homotopy in the evader's thrust"
-    LINEAR_GAME = "linear game as a first guess"
 
 
 @dataclass(frozen=True)
@@ -58,8 +55,6 @@ class DistanceCurve:
     duration_s: Floats
     distance_m: Floats
     min_curvature: Floats
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -94,8 +89,6 @@ class Capture:
     residual: float
     extremal: Node
 
-    __repr__ = short_repr
-
     @property
     def is_local_saddle(self) -> bool:
         """Whether closing speed and curvature, with the capture radius, are those of a saddle."""
@@ -108,8 +101,7 @@ class Solution:
 
     There is a `capture` if the verdict is `captured`. `curve` contains the distances along the branch, and
     `looked_at_s` is the longest duration that was solved; `exhausted` is the player without propellant at that time,
-    pursuer or evader. If the branch is not certified, `fallback` is a capture by another route, which is not claimed to
-    be the first one.
+    pursuer or evader.
     """
 
     game: Game
@@ -120,10 +112,3 @@ class Solution:
     curve: DistanceCurve
     looked_at_s: float
     exhausted: str | None = None
-    fallback: Capture | None = None
-    fallback_route: Route | None = None
-
-    def __repr__(self) -> str:
-        capture = "" if self.capture is None else f", capture after {self.capture.time_s:.6g} s"
-        fallback = "" if self.fallback is None else f", fallback with a capture after {self.fallback.time_s:.6g} s"
-        return f"<pursuit: {self.verdict.value}{capture}{fallback}; durations up to {self.looked_at_s:.6g} s solved>"

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.reachability.optimum import EmptyTubeError
 from rendezvous.reachability.problem import InadmissibleStartError, ReachabilityProblem
 from rendezvous.reachability.selection import minimum_energy
@@ -36,8 +35,6 @@ class Flight:
     controls: Floats
     expected_misses: Floats
     relaxations: Floats
-
-    __repr__ = short_repr
 
     @property
     def miss(self) -> float:

@@ -155,12 +155,6 @@ class ReachabilityProblem:
         if broken:
             raise InadmissibleStartError(tuple(broken))
 
-    def __repr__(self) -> str:
-        return (
-            f"<problem of {self.sizes}: thrust in a {self.thrust.value}, "
-            f"constraints beyond the bounds: {len(self.further[0])}>"
-        )
-
     def name_of(self, constraint: int) -> str:
         """Return the name of a `constraint` beyond the bounds, by its index."""
         return self.constraint_names[constraint] if self.constraint_names else f"constraint {constraint + 1}"

@@ -11,7 +11,6 @@ from scipy.sparse import coo_array
 
 from infoset.polytope import HIGHS
 from rendezvous._arrays import Floats
-from rendezvous._repr import short_repr
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
@@ -45,8 +44,6 @@ class FeedbackPlan:
     gains: Floats
     lower: Floats
     upper: Floats
-
-    __repr__ = short_repr
 
     @property
     def worst_miss(self) -> float:

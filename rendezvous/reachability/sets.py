@@ -66,14 +66,6 @@ class ReachableSets:
     problem: ReachabilityProblem
     parts: tuple[BlockSets, ...]
 
-    def __repr__(self) -> str:
-        sizes = ", ".join(str(block.size) for block in self.problem.blocks)
-        exact = all(isinstance(part, ExactSets) for part in self.parts)
-        return (
-            f"<reachable sets for {self.problem.sizes}:\n "
-            f"{'exact' if exact else 'lifted'} sets in blocks of {sizes} states>"
-        )
-
     def bounds(self, kind: SetKind) -> Floats:
         """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
         _need_kind(kind)

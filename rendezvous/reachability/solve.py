@@ -48,12 +48,6 @@ class OptimalControls:
     problem: ReachabilityProblem
     blocks: tuple[BlockOptimum, ...]
 
-    def __repr__(self) -> str:
-        return (
-            f"<optimal controls for {self.problem.sizes}:\n "
-            f"a set of dimension {self.dimension}, minimum terminal norm {self.miss:.4g}>"
-        )
-
     @cached_property
     def space(self) -> Lifted:
         """The set in coordinates z of its affine hull; controls divided by their bounds."""
@@ -131,13 +125,6 @@ class Solution:
     sets: ReachableSets
     route: Route
     reason: str
-
-    def __repr__(self) -> str:
-        return (
-            f"<solution for {self.problem.sizes}: "
-            f"minimum terminal norm {self.optimal.miss:.4g},\n optimal controls of dimension {self.optimal.dimension}, "
-            f"{self.route.value} sets ({self.reason})>"
-        )
 
 
 def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) -> OptimalControls:

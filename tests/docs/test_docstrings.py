@@ -15,7 +15,7 @@ import pytest
 
 PACKAGES = (
     *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
-    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.polytope", "rendezvous.linear_game"),
+    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.polytope"),
     "experiments",
 )
 

@@ -13,7 +13,7 @@ import experiments
 REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
 PACKAGES = (
     *("infoset", "infoset.polytope", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto"),
-    *("rendezvous.multipoint", "rendezvous.reachability", "rendezvous.pursuit_evasion", "rendezvous.linear_game"),
+    *("rendezvous.multipoint", "rendezvous.reachability", "rendezvous.pursuit_evasion"),
 )
 
 

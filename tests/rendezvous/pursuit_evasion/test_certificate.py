@@ -79,16 +79,6 @@ def test_a_capture_that_is_off_is_told(solved: Solution) -> None:
     assert any("second integrator" in each for each in failures)
 
 
-def test_without_a_curve_an_earlier_capture_is_not_excluded(solved: Solution) -> None:
-    bare = replace(solved, curve=replace(solved.curve, duration_s=solved.curve.duration_s[:0]))
-    assert "earlier captures are not excluded" in certify(bare).failures
-
-
-def test_what_is_not_captured_has_no_certificate(slides: MakeGame) -> None:
-    with pytest.raises(ValueError, match="no capture to certify: the verdict is escapes"):
-        certify(solve(slides(20.0)))
-
-
 def test_a_path_that_turns_too_fast_is_told(solved: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rendezvous.pursuit_evasion.paths._MAX_RATES", 100)
     evader = scaled_craft(solved.game.evader, solved.game.gravity, solved.units)

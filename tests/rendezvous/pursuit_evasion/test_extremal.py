@@ -11,7 +11,6 @@ from rendezvous.pursuit_evasion._extremal import (
     derivatives,
     end_of,
     flow_back,
-    rate,
     shoot_back,
 )
 from rendezvous.pursuit_evasion._pair import across
@@ -105,16 +104,6 @@ def test_there_and_back_is_where_it_was() -> None:
     assert np.abs(y - before).max() > 0.1
     assert flow_back(y, None, craft, 3.3, 0.0, 1e-13)
     np.testing.assert_allclose(y, before, atol=1e-10)
-
-
-def test_a_path_through_the_centre_is_told_and_not_flown() -> None:
-    y = np.concatenate([[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0], np.zeros(3)])
-    assert not flow_back(y, None, np.array([1.0, 0.0, 0.0, 1.0, 0.0]), 0.0, 10.0, 1e-12)
-
-
-def test_rate_points_the_thrust_along_the_costate() -> None:
-    y = np.concatenate([[1.0, 0.0, 0.0, 0.0, 1.0, 0.0], np.zeros(3), [0.0, 0.0, 2.0]])
-    np.testing.assert_allclose(rate(y, 1.0, 0.0, 0.1), [0.0, 1.0, 0.0, -1.0, 0.0, 0.1], atol=1e-15)
 
 
 @given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
