@@ -1,7 +1,7 @@
 """Cost of long flights: time, vertices, sections and memory against the number of steps; table of docs/performance.md.
 
     python -m benchmarks.long_flights
-    python -m benchmarks.long_flights --strategies symmetric-miss,patient,kalman,least-squares
+    python -m benchmarks.long_flights --strategies symmetric-miss,patient,kalman
     python -m benchmarks.long_flights --rate-error 1e-7
 
 The flight is `dart-2022`, 4 h, with steps of 144, 14.4 and 1.44 s, one image at every step, and an engine of the same

@@ -4,7 +4,6 @@ from guidance.estimate import Estimator, MissEstimate
 from guidance.game_noise import GameNoise
 from guidance.kalman import Kalman, KalmanBank
 from guidance.least_effort import LeastEffort
-from guidance.least_squares import LeastSquares, LeastSquaresFit
 from guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, TieRule
 from guidance.patient import Patient
 from guidance.predicted_miss import symmetric_impulse, zero_effort_miss
@@ -24,8 +23,6 @@ __all__ = [
     "Kalman",
     "KalmanBank",
     "LeastEffort",
-    "LeastSquares",
-    "LeastSquaresFit",
     "LineOfSight",
     "MeasurementNoise",
     "MissEstimate",

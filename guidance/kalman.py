@@ -7,9 +7,9 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from guidance.estimate import MissEstimate, constant_error_m, correct_outside_dead_zone, independent_error_rad
+from guidance.estimate import MissEstimate
 from guidance.situation import Situation
-from infoset import RangeSensor
+from infoset import AngleSensor, Bias, RangeSensor, SetModel
 from infoset.arrays import Floats
 from infoset.limits import COUNT, Checked, NotNegative
 
@@ -89,7 +89,7 @@ class KalmanBank:
             gradient = np.zeros_like(self.mean)
             square = z * z + x * x
             gradient[..., Z], gradient[..., X] = x / square, -z / square
-            variance = independent_error_rad(situation.information.model, x) ** 2 / 3.0
+            variance = _independent_error_rad(situation.information.model, x) ** 2 / 3.0
             self._measure(situation, "angle", np.arctan2(z, x), gradient, variance)
 
     def estimate(self, situation: Situation) -> MissEstimate:
@@ -116,7 +116,7 @@ class KalmanBank:
         mean = (weight * miss).sum(axis=1)
         # Rounding may leave a small variance just below zero.
         spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[:, None]) ** 2)).sum(axis=1)
-        deviation = np.sqrt(spread + constant_error_m(situation.information.model.angle_sensor) ** 2 / 3.0)
+        deviation = np.sqrt(spread + _constant_error_m(situation.information.model.angle_sensor) ** 2 / 3.0)
         lever = np.maximum(to_go - situation.lead_s, 0.0)
         square = (weight * lever**2).sum(axis=1)
         best = np.divide((weight * miss * lever).sum(axis=1), square, out=np.zeros_like(mean), where=square > 0.0)
@@ -175,6 +175,27 @@ class KalmanBank:
         self.log_weight = self.log_weight - np.where(new[:, None], likelihood, 0.0)
 
 
+def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
+    """Return the bound of the part of an angle error that is independent between measurements, rad.
+
+    A line that falls with the range is positive up to the maximum possible distance, and an estimate can be beyond it.
+    The bound is therefore at least half of that at the maximum distance.
+    """
+    sensor = model.angle_sensor
+    if sensor.bias is Bias.CONSTANT:
+        return np.full_like(range_m, sensor.constant_error_rad)
+    return np.maximum(sensor.error_bound(range_m), 0.5 * sensor.error_bound(model.bounds.farthest_m))
+
+
+def _constant_error_m(sensor: AngleSensor) -> float:
+    """Return the bound of the part of the errors that is constant in a flight, m.
+
+    The angles then show a point at this lateral distance from the centre, which no measurement can tell from the
+    centre: the error of an estimated miss contains it unchanged.
+    """
+    return sensor.centroid_error_m if sensor.bias is Bias.CONSTANT else 0.0
+
+
 @dataclass(frozen=True)
 class Kalman(Checked):
     """Estimate as if errors were Gaussian, and correct the part of the expected miss outside a dead zone.
@@ -218,4 +239,9 @@ class Kalman(Checked):
 
     def decide(self, situation: Situation, state: KalmanBank) -> Floats:
         """Update the filters with the measurements of this step, and return the impulses, m/s."""
-        return correct_outside_dead_zone(situation, state, self.dead_zone, self.last_s)
+        state.update(situation)
+        if not situation.may_fire:
+            return np.zeros_like(situation.last_impulse_m_s)
+        estimate = state.estimate(situation)
+        is_last = (situation.last_s - situation.lead_s <= self.last_s) | (estimate.to_go_s <= self.last_s)
+        return estimate.correction_m_s(np.where(is_last, 0.0, self.dead_zone * estimate.deviation_m))

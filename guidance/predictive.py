@@ -32,8 +32,8 @@ class Predictive(Checked):
     Parameters
     ----------
     estimator : callable
-        `KalmanBank`, `LeastSquaresFit`, or another function of the number of engagements and of whether it estimates
-        the acceleration of the target; it returns an `Estimator`.
+        `KalmanBank`, or another function of the number of engagements and of whether it estimates the acceleration of
+        the target; it returns an `Estimator`.
     spacing : float
         The ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has no scheduled times.
 
@@ -61,8 +61,8 @@ class Predictive(Checked):
     References
     ----------
     Gil-Fernández, Prieto-Llanos, Panzeca and Drai, Autonomous GNC algorithms for NEO impactor missions, ISSFD, for
-    predictive guidance on a Kalman filter and on a batch-sequential least-squares filter; Hawkins, Guo and Wie (2012),
-    IJASS 13(2), 154-169. The geometric times are not from there.
+    predictive guidance on a Kalman filter; Hawkins, Guo and Wie (2012), IJASS 13(2), 154-169. The geometric times are
+    not from there.
     """
 
     estimator: EstimatorKind = KalmanBank
@@ -78,7 +78,7 @@ class Predictive(Checked):
         if not situation.may_fire:
             return np.zeros_like(state.due_s)
         estimate = state.estimator.estimate(situation)
-        whole, next_s = estimate.correction_m_s, situation.next_s
+        whole, next_s = estimate.correction_m_s(), situation.next_s
         if situation.thruster.impulses_s or next_s is None:
             return whole
         state.due_s = np.where(np.isinf(state.due_s), estimate.to_go_s / self.spacing, state.due_s)

@@ -29,8 +29,8 @@ class ProportionalNavigation(Checked):
     Parameters
     ----------
     estimator : callable
-        `KalmanBank`, `LeastSquaresFit`, or another function of the number of engagements and of whether it estimates
-        the acceleration of the target; it returns an `Estimator`.
+        `KalmanBank`, or another function of the number of engagements and of whether it estimates the acceleration of
+        the target; it returns an `Estimator`.
     is_augmented : bool
         Estimate the lateral acceleration of the target, and compensate for it (augmented proportional navigation).
     ratio : float
@@ -83,7 +83,7 @@ class ProportionalNavigation(Checked):
         if not situation.may_fire:
             return np.zeros_like(state.accumulated_m_s)
         estimate, next_s = state.estimator.estimate(situation), situation.next_s
-        whole = estimate.correction_m_s
+        whole = estimate.correction_m_s()
         left_s = np.zeros_like(whole) if next_s is None else np.maximum(estimate.to_go_s - next_s, 0.0)
         part = np.divide(left_s, estimate.to_go_s, out=np.zeros_like(whole), where=estimate.to_go_s > 0.0)
         command = state.accumulated_m_s + whole * (1.0 - part**self.ratio)

@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
 
-from guidance.kalman import Kalman, KalmanBank
+from guidance.kalman import Kalman
 from guidance.least_effort import LeastEffort
-from guidance.least_squares import LeastSquares, LeastSquaresFit
 from guidance.patient import Patient
 from guidance.predictive import Predictive
 from guidance.proportional_navigation import ProportionalNavigation
@@ -17,23 +16,18 @@ from guidance.symmetric_miss import SymmetricMiss
 from guidance.zero_effort import ZeroEffortMiss
 
 _STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType(
-    {kind.name: kind for kind in (SymmetricMiss, LeastEffort, Patient, ZeroEffortMiss, Kalman, LeastSquares)}
-    | {f"pn-{kind.name}": partial(ProportionalNavigation, kind) for kind in (KalmanBank, LeastSquaresFit)}
-    | {f"apn-{kind.name}": partial(ProportionalNavigation, kind, True) for kind in (KalmanBank, LeastSquaresFit)}
-    | {f"predictive-{kind.name}": partial(Predictive, kind) for kind in (KalmanBank, LeastSquaresFit)}
+    {kind.name: kind for kind in (SymmetricMiss, LeastEffort, Patient, ZeroEffortMiss, Kalman)}
+    | {
+        "pn-kalman": ProportionalNavigation,
+        "apn-kalman": partial(ProportionalNavigation, is_augmented=True),
+        "predictive-kalman": Predictive,
+    }
 )
-
-COMPARED = (
-    *("symmetric-miss", "least-effort", "patient", "zero-effort-miss"),
-    *("kalman", "least-squares"),
-    *("pn-kalman", "apn-kalman", "predictive-kalman"),
-)
-"""Names that commands compare by default: those on the set, both estimators, and each law on one of the estimators."""
 
 
 def strategy_names() -> list[str]:
-    """Return the names of the registered strategies, sorted."""
-    return sorted(_STRATEGIES)
+    """Return the names of the registered strategies: those on the set, then the baselines."""
+    return list(_STRATEGIES)
 
 
 def make_strategy(name: str) -> Strategy:

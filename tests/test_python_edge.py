@@ -24,7 +24,6 @@ from experiments.common.input_file import read_text, to_toml
 from guidance import (
     GameNoise,
     Kalman,
-    LeastSquares,
     Patient,
     Predictive,
     ProportionalNavigation,
@@ -381,7 +380,6 @@ def test_what_is_no_count(value: Any) -> None:
     refused(lambda: information().sections(value), "engagement")
     refused(lambda: information().section_at(5.5e6, value), "engagement")
     refused(lambda: Kalman(members=value), "members")
-    refused(lambda: LeastSquares(iterations=value), "iterations")
     refused(lambda: square().reduce_outward(value), "cap")
     refused(lambda: fly_one(scenario, value), "run")
     refused(lambda: fly_one(scenario, seed=value), "seed")
@@ -432,7 +430,7 @@ def test_what_is_no_number(value: Any) -> None:
     refused(lambda: symmetric_impulse(given.predicted_miss(), value), "closing_speed_m_s")
     refused(lambda: Kalman(dead_zone=value), "dead_zone")
     refused(lambda: Kalman(process_noise=value), "process_noise")
-    refused(lambda: LeastSquares(last_s=value), "last_s")
+    refused(lambda: Kalman(last_s=value), "last_s")
     refused(lambda: ProportionalNavigation(ratio=value), "ratio")
     refused(lambda: ProportionalNavigation(dead_band_m_s=value), "dead_band_m_s")
     refused(lambda: Predictive(spacing=value), "spacing")
@@ -612,7 +610,7 @@ NOT_CALLED = {
         *("SetStatus", "SetSettings"),
     },
     "guidance": {
-        *("Estimator", "KalmanBank", "LeastSquaresFit", "LineOfSight", "MeasurementNoise", "MissEstimate"),
+        *("Estimator", "KalmanBank", "LineOfSight", "MeasurementNoise", "MissEstimate"),
         *("LeastEffort", "NoiseKind", "Situation", "Strategy", "ZeroEffortMiss"),
     },
     "sim": {

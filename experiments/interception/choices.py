@@ -11,7 +11,6 @@ from experiments.common.options import choice
 from experiments.interception.own_strategy import is_own_strategy, own_strategy
 from experiments.interception.scenario_file import load_scenario, with_model
 from guidance import Strategy, TieRule, strategy_names
-from guidance.registry import COMPARED
 from infoset import Model
 from infoset.model import MAX_SECTIONS
 from sim import Scenario
@@ -78,14 +77,12 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
     """Return the strategies of a list: by name, with the strategy of a Python file, None for a built-in one.
 
-    `names` are built-in names and ``FILE.py:CLASS``, separated by commas; "all" is all built-in names, None those of
-    `COMPARED`. Raise `InputError` if there is no such strategy, or one is named twice.
+    `names` are built-in names and ``FILE.py:CLASS``, separated by commas; None is all built-in strategies. Raise
+    `InputError` if there is no such strategy, or one is named twice.
     """
     valid = strategy_names()
-    if names == "all":
-        names = ",".join(valid)
     chosen: dict[str, Strategy | None] = {}
-    for text in COMPARED if names is None else [part.strip() for part in names.split(",")]:
+    for text in valid if names is None else [part.strip() for part in names.split(",")]:
         own = own_strategy(text, scenario, "--strategies")
         name = choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)
         if name in chosen:

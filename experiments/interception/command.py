@@ -29,9 +29,8 @@ Strategies = Annotated[
     typer.Option(
         "--strategies",
         metavar="A,B,C",
-        help="Strategies, separated by commas: built-in names, or FILE.py:CLASS for a class in a Python file; or all, "
-        "for all built-in names. Default: symmetric-miss, least-effort, patient, zero-effort-miss, kalman, "
-        "least-squares, pn-kalman, apn-kalman and predictive-kalman.",
+        help="Strategies, separated by commas: built-in names, or FILE.py:CLASS for a class in a Python file. "
+        "Default: all built-in strategies.",
     ),
 ]
 ModelName = Annotated[

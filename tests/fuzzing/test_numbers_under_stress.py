@@ -9,7 +9,7 @@ known to a few ulp of the range at best, and a miss of 1e-14 of the range to no 
 
 Powers of two change exponents only, so they must give the same digits. They do not where times are scaled and the
 truth is integrated in more or fewer substeps for it: one is at most half a second, an absolute time. Strategies that
-count the last seconds (`patient`, `kalman`, `least-squares`) have a time of their own: it must be scaled too, and
+count the last seconds (`patient`, `kalman`) have a time of their own: it must be scaled too, and
 that of `patient` cannot be. `kalman` with a range sensor weighs by the logarithm of a length: the last digit moves.
 
 Other factors round differently, so what rounding decides is left out there: U_s where two sections tie, and all after a
@@ -35,7 +35,6 @@ from experiments.common.errors import InputError
 from experiments.common.input_file import read_text, to_toml
 from guidance import (
     Kalman,
-    LeastSquares,
     NoiseKind,
     Predictive,
     ProportionalNavigation,
@@ -230,14 +229,14 @@ def engagements(draw_value: st.DrawFn) -> Scenario:
     )
 
 
-STRATEGIES = st.sampled_from([SymmetricMiss, ZeroEffortMiss, Kalman, LeastSquares, ProportionalNavigation, Predictive])
-STEADY = st.sampled_from([ZeroEffortMiss, Kalman, LeastSquares])
+STRATEGIES = st.sampled_from([SymmetricMiss, ZeroEffortMiss, Kalman, ProportionalNavigation, Predictive])
+STEADY = st.sampled_from([ZeroEffortMiss, Kalman])
 POWERS = st.integers(-20, 20)
 
 
 def strategy_of(kind: type[Strategy], time: float) -> Strategy:
     """A strategy whose own time, if it has one, is scaled too."""
-    return kind(last_s=3.0 * time) if kind in (Kalman, LeastSquares) else kind()
+    return kind(last_s=3.0 * time) if kind is Kalman else kind()
 
 
 def digits(scenario: Scenario, kind: type[Strategy]) -> float:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-import guidance.least_squares
 from experiments import load_scenario
 from guidance import (
     Estimator,
+    Kalman,
     KalmanBank,
-    LeastSquaresFit,
     MissEstimate,
     Predictive,
     ProportionalNavigation,
@@ -24,11 +23,10 @@ from guidance import (
     make_strategy,
     strategy_names,
 )
-from guidance.estimate import independent_error_rad
+from guidance.kalman import _independent_error_rad
 from guidance.scripted_noise import ScriptedNoise
-from infoset import AngleSensor, Bias, InformationSet, Model, RangeSensor, SetModel, StateBox
+from infoset import AngleSensor, Bias, InformationSet, Model, SetModel, StateBox
 from infoset.arrays import Flags, Floats
-from infoset.sensor import Sensor
 from sim.draws import draw
 from sim.engagement import Engagements
 from sim.scenario import of_model
@@ -38,8 +36,7 @@ E = 6e3
 T = 1000.0
 """Time of flight, s."""
 ENGINE = Thruster(budget_m_s=1e9, min_impulse_m_s=0.0, max_impulse_m_s=1e9)
-KINDS = [KalmanBank, LeastSquaresFit]
-BASELINES = [name for name in strategy_names() if "kalman" in name or "least-squares" in name]
+BASELINES = [name for name in strategy_names() if "kalman" in name]
 
 
 def set_model(sensor: AngleSensor, nu: float = 0.0, width_m: float = 1e5, range_error_m: float = 0.0) -> SetModel:
@@ -326,15 +323,12 @@ def deviation_m(bounds_rad: Callable[[Floats], Floats], steps: Floats, width_m: 
     return float(np.sqrt(np.linalg.inv(normal + prior)[0, 0]))
 
 
-@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("centroid_m", [0.0, 30.0])
 @pytest.mark.parametrize("bias", list(Bias))
-def test_deviations_with_a_camera_are_those_of_a_line_through_the_positions(
-    kind: Callable[[int, bool], Estimator], centroid_m: float, bias: Bias
-) -> None:
+def test_deviations_with_a_camera_are_those_of_a_line_through_the_positions(centroid_m: float, bias: Bias) -> None:
     """Range and speed are known; a constant centroid error adds c^2/3 to the variance of the miss."""
     model = set_model(AngleSensor.camera(10.0, 1e-5, centroid_m, bias=bias))
-    estimator, now = measured(kind, model, Truth(0.0, 0.0), 60)
+    estimator, now = measured(KalmanBank, model, Truth(0.0, 0.0), 60)
     independent = centroid_m if bias is Bias.RANDOM else 0.0
     expected = deviation_m(lambda x: 1e-5 + independent / x, np.arange(60.0))
     if bias is Bias.CONSTANT:
@@ -345,26 +339,24 @@ def test_deviations_with_a_camera_are_those_of_a_line_through_the_positions(
     assert estimate.to_go_s[0] == pytest.approx(T - 590.0)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_lost_images_change_nothing_in_the_engagement_that_lost_them(kind: Callable[[int, bool], Estimator]) -> None:
+def test_lost_images_change_nothing_in_the_engagement_that_lost_them() -> None:
     generator = np.random.default_rng(1)
     seen = generator.random((3, 60)) < 0.5
     seen[2] = True
     errors = generator.uniform(-1e-5, 1e-5, 60)
-    estimator, now = measured(kind, MODEL, Truth(500.0, -2.0), 60, seen, errors)
+    estimator, now = measured(KalmanBank, MODEL, Truth(500.0, -2.0), 60, seen, errors)
     estimate = estimator.estimate(now)
     for number in range(3):
         steps = np.flatnonzero(seen[number]).astype(float)
         assert estimate.deviation_m[number] == pytest.approx(deviation_m(lambda x: 0.0 * x + 1e-5, steps), rel=1e-3)
-        single, last = measured(kind, MODEL, Truth(500.0, -2.0), 60, seen[number : number + 1], errors)
+        single, last = measured(KalmanBank, MODEL, Truth(500.0, -2.0), 60, seen[number : number + 1], errors)
         np.testing.assert_allclose(single.estimate(last).miss_m, estimate.miss_m[number], rtol=1e-9)
     assert len(set(estimate.miss_m.tolist())) == 3
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_no_measurement_so_far_is_not_a_measurement(kind: Callable[[int, bool], Estimator]) -> None:
+def test_no_measurement_so_far_is_not_a_measurement() -> None:
     """The measured value of an engagement without an image so far is NaN."""
-    estimator = kind(2, False)
+    estimator = KalmanBank(2)
     flags = {"angle": np.array([False, True])}
     now = replace(
         situation(batch=2), measured={"angle": np.array([np.nan, 1e-4])}, new=frozenset({"angle"}), seen=flags
@@ -377,9 +369,8 @@ def test_no_measurement_so_far_is_not_a_measurement(kind: Callable[[int, bool], 
     assert after < prior
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_pending_impulses_count_as_given(kind: Callable[[int, bool], Estimator]) -> None:
-    estimator, now = measured(kind, MODEL, Truth(500.0, -2.0), 60)
+def test_pending_impulses_count_as_given() -> None:
+    estimator, now = measured(KalmanBank, MODEL, Truth(500.0, -2.0), 60)
     plain = estimator.estimate(now)
     pending = ((50.0, np.array([0.5])), (1e4, np.array([9.0])))
     later = estimator.estimate(replace(now, pending=pending, lead_s=100.0))
@@ -387,10 +378,9 @@ def test_pending_impulses_count_as_given(kind: Callable[[int, bool], Estimator])
     assert later.to_go_s[0] == pytest.approx(plain.to_go_s[0] - 100.0)
 
 
-@pytest.mark.parametrize("name", ["kalman", "least-squares"])
-def test_the_dead_zone_ends_at_the_last_allowed_time(name: str) -> None:
+def test_the_dead_zone_ends_at_the_last_allowed_time() -> None:
     now = replace(situation(), measured={"angle": np.array([1e-4])}, new=frozenset({"angle"}))
-    strategy = make_strategy(name)
+    strategy = Kalman()
     assert strategy.decide(now, strategy.start(1))[0] == 0.0
     for others in ({"later_times_s": np.empty(0)}, {"later_times_s": np.array([2.0])}):
         assert strategy.decide(replace(now, **others), strategy.start(1))[0] != 0.0
@@ -398,32 +388,12 @@ def test_the_dead_zone_ends_at_the_last_allowed_time(name: str) -> None:
     assert strategy.decide(replace(now, later_times_s=np.empty(0), may_fire=False), strategy.start(1))[0] == 0.0
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_augmented_estimators_find_the_acceleration_of_the_target(kind: Callable[[int, bool], Estimator]) -> None:
+def test_augmented_estimators_find_the_acceleration_of_the_target() -> None:
     model = set_model(AngleSensor.camera(10.0, 1e-6), nu=0.01)
     truth = Truth(500.0, -2.0, a=0.006)
-    estimator, now = measured(lambda batch, _: kind(batch, True), model, truth, 60)
+    estimator, now = measured(lambda batch, _: KalmanBank(batch, True), model, truth, 60)
     assert estimator.estimate(now).miss_m[0] == pytest.approx(truth.miss_m, rel=0.02)
-    acceleration = estimator.mean[0, 0, 4] if isinstance(estimator, KalmanBank) else estimator.start[0, 4]
-    assert acceleration == pytest.approx(0.006, rel=0.02)
-
-
-def test_a_long_fit_stores_old_measurements_and_stays_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    generator = np.random.default_rng(3)
-    errors, seen = generator.uniform(-1e-5, 1e-5, 90), generator.random((4, 90)) < 0.9
-    model = set_model(AngleSensor.camera(10.0, 1e-5), range_error_m=1e5)
-    meter = {"range": RangeSensor(10.0, 0.01)}
-
-    def fit(max_kept: int, sensors: Mapping[str, Sensor]) -> tuple[LeastSquaresFit, MissEstimate]:
-        monkeypatch.setattr(guidance.least_squares, "MAX_KEPT", max_kept)
-        made, now = measured(LeastSquaresFit, model, Truth(2000.0, -1.0), 90, seen, errors, sensors=sensors)
-        return made, made.estimate(now)
-
-    for sensors in (meter, {}):
-        expected, (stored, estimate) = fit(1000, sensors)[1], fit(20, sensors)
-        assert max(len(kept.times_s) for kept in stored.measurements.values()) <= 20
-        np.testing.assert_allclose(estimate.miss_m, expected.miss_m, atol=0.02 * expected.deviation_m.min())
-        np.testing.assert_allclose(estimate.deviation_m, expected.deviation_m, rtol=5e-3)
+    assert estimator.mean[0, 0, 4] == pytest.approx(0.006, rel=0.02)
 
 
 @pytest.mark.parametrize("name", BASELINES)
@@ -433,7 +403,7 @@ def test_an_error_bound_that_falls_to_zero_beyond_the_possible_ranges(name: str)
     model = set_model(sensor)
     min_m = 1.05 * E * T / (1.0 - 1e-5)  # where the bound is zero
     ranges_m = np.array([0.5 * E * T, E * T, min_m, 2.0 * min_m])
-    bounds = independent_error_rad(model, ranges_m)
+    bounds = _independent_error_rad(model, ranges_m)
     np.testing.assert_array_equal(bounds[:2], sensor.error_bound(ranges_m[:2]))
     assert (bounds[2:] == 0.5 * sensor.error_bound(model.bounds.farthest_m)).all()
     strategy = make_strategy(name)
@@ -441,28 +411,20 @@ def test_an_error_bound_that_falls_to_zero_beyond_the_possible_ranges(name: str)
     assert np.isfinite(strategy.decide(now, strategy.start(1))).all()
 
 
-def test_names_of_the_strategies() -> None:
-    laws = {f"{law}-{kind}" for law in ("pn", "apn", "predictive") for kind in ("kalman", "least-squares")}
-    assert laws < set(strategy_names())
-    assert make_strategy("apn-kalman") == ProportionalNavigation(KalmanBank, is_augmented=True)
-    assert make_strategy("predictive-least-squares") == Predictive(LeastSquaresFit)
-
-
-@pytest.mark.parametrize("ratio", [2.0, -3.0, float("nan"), float("inf")])
-def test_a_navigation_ratio_is_greater_than_two(ratio: float) -> None:
-    with pytest.raises(ValueError, match="ratio"):
-        ProportionalNavigation(ratio=ratio)
-
-
-@pytest.mark.parametrize("spacing", [1.0, 0.5, float("nan")])
-def test_the_spacing_of_manoeuvres_is_greater_than_one(spacing: float) -> None:
-    with pytest.raises(ValueError, match="spacing"):
-        Predictive(spacing=spacing)
-
-
-def test_a_dead_band_is_not_negative() -> None:
-    with pytest.raises(ValueError, match="dead_band_m_s"):
-        ProportionalNavigation(dead_band_m_s=-1.0)
+@pytest.mark.parametrize(
+    ("make", "name", "values"),
+    [
+        (ProportionalNavigation, "ratio", (2.0, -3.0, np.nan, np.inf)),
+        (ProportionalNavigation, "dead_band_m_s", (-1.0,)),
+        (Predictive, "spacing", (1.0, 0.5, np.nan)),
+    ],
+)
+def test_settings_outside_their_limits_are_refused(
+    make: Callable[..., Strategy], name: str, values: tuple[float, ...]
+) -> None:
+    for value in values:
+        with pytest.raises(ValueError, match=name):
+            make(**{name: value})
 
 
 @pytest.mark.parametrize("name", BASELINES)

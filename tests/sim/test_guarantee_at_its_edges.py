@@ -125,7 +125,7 @@ def round_scenario(number: int) -> Scenario:
             min_impulse_m_s=one_of(0.0, 0.1),
             max_impulse_m_s=vz_m_s + 1.0,
         ),
-        strategy=str(generator.choice(["symmetric-miss", "patient", "kalman", "least-squares", "zero-effort-miss"])),
+        strategy=str(generator.choice(["symmetric-miss", "patient", "kalman", "zero-effort-miss"])),
         noise=(NoiseKind.RANDOM, NoiseKind.GAME)[int(generator.integers(2))],
         tie=list(TieRule)[int(generator.integers(4))],
         rate_sensor=None if one_of(0, 1) else RateSensor(step_s, 0.5 * error_rad / step_s),

@@ -16,7 +16,7 @@ from experiments.common.input_file import to_toml
 from experiments.common.screen import number
 from experiments.interception.figures.bound import draw_bound, ripples
 from experiments.interception.scenario_file import load_scenario
-from guidance.registry import COMPARED
+from guidance import strategy_names
 from infoset import ErrorShape, StateBox
 from sim import Scenario
 from sim.bound import LowerBound, lower_bound, pair_at
@@ -95,7 +95,7 @@ def test_bound_into_a_folder(
     assert (nominal["label_m"], nominal["closing_speed_m_s"]) == (1745e3, 58e3)
     assert nominal["bound_m"] == pair_at(short, 1745e3, -58e3).bound_m <= expected.bound_m
     assert f"at the range 1745.0 km and closing speed 58 km/s, the nominal ones: {nominal['bound_m']:.3g} m" in out
-    assert [each["name"] for each in found["strategies"]] == [*COMPARED]
+    assert [each["name"] for each in found["strategies"]] == strategy_names()
     for each in found["strategies"]:
         assert each["worst_found_m"] >= found["lower_bound_m"] * (1.0 - 1e-4)
         assert each["worst_over_bound"] == pytest.approx(each["worst_found_m"] / found["lower_bound_m"])
@@ -228,7 +228,7 @@ def test_no_name_and_no_digit_is_cut_at_60_columns(
     code, out, _ = infoset(short_file, "--budget", 1)
     assert code == 0
     assert "…" not in out
-    assert all(name in out for name in COMPARED)
+    assert all(name in out for name in strategy_names())
 
 
 def test_help_has_an_example(infoset: Infoset) -> None:
