@@ -86,8 +86,7 @@ def figures_are_small() -> Iterator[None]:
     from experiments.common import figure_style
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(figure_style._STYLE, "pdf.fonttype", 3)
-        patch.setattr(figure_style, "PNG_DPI", 50)
+        patch.setattr(figure_style, "STYLE", [*figure_style.STYLE, {"pdf.fonttype": 3, "savefig.dpi": 50}])
         yield
 
 

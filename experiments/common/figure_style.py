@@ -1,26 +1,30 @@
-"""The style of all figures: sizes, and colours that differ in grey too; figures as files."""
+"""The style of all figures: the sheet `infoset.mplstyle`, and colours and lines that differ in grey too."""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, product
+from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
+import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patheffects import Normal, Stroke
+from matplotlib.patheffects import Normal, Stroke, withStroke
 from matplotlib.ticker import FixedLocator
+from numpy.typing import NDArray
 
 from infoset.arrays import Floats
 
+STYLE: list[Any] = [Path(__file__).with_name("infoset.mplstyle")]
 WIDTH_MM = 180.0
-PNG_DPI = 200
+"""Width of a figure over two columns of a page."""
+_MM_PER_INCH = 25.4
 
 INK = "#1a1a1a"
 TRUTH = "#08306b"
@@ -29,6 +33,15 @@ IMPULSE = "#8c1c13"
 SET_FILL = "#c6d9ec"
 SET_EDGE = "#3f6f9f"
 LIMIT = "#707070"
+
+SET: dict[str, Any] = {"facecolor": SET_FILL, "edgecolor": SET_EDGE, "linewidth": 0.8}
+"""Patch of a set."""
+BOUND: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (4, 2)), "linewidth": 0.9}
+"""Line of a limit: of an engine, or of a range of values."""
+EVENT: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (1.5, 1.5)), "linewidth": 0.8}
+"""Line of an event on an axis of time."""
+HALO = [withStroke(linewidth=2.0, foreground="white")]
+"""White outline of a text or a line over others."""
 
 CURVE_LOOKS: dict[int, dict[str, Any]] = {
     1: {"color": "#08306b", "linestyle": "-"},
@@ -45,36 +58,75 @@ LINE_LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#2f6b3a", "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
     {"color": "#4d4d4d", "linestyle": (0, (3, 1, 1, 1, 1, 1)), "marker": "v"},
 )
-"""Lines and marks that stay apart in grey, for craft, optimal controls and components."""
+"""Lines and marks that differ in grey too, for craft, optimal controls and components."""
 
-_STYLE: dict[Any, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 8.0,
-    "axes.titlesize": 8.5,
-    "axes.labelsize": 8.0,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
-    "legend.fontsize": 7.5,
-    "axes.linewidth": 0.6,
-    "axes.edgecolor": INK,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "axes.unicode_minus": True,
-    "grid.color": "#e2e2e2",
-    "grid.linewidth": 0.5,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "lines.linewidth": 1.2,
-    "legend.frameon": False,
-    "legend.handlelength": 2.6,
-    "figure.facecolor": "white",
-    "pdf.fonttype": 42,
-    "path.simplify": True,
-}
-_MM_PER_INCH = 25.4
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """Apply the style of the figures: a context, or with ``@style()`` a decorator."""
+    with matplotlib.style.context(STYLE):
+        yield
+
+
+def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
+    """Return an empty figure, independent of pyplot; in the `style`, its layout is constrained."""
+    figure = Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH))
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def subplots(
+    height_mm: float,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    count: int | None = None,
+    width_mm: float = WIDTH_MM,
+    **grid: Any,
+) -> tuple[Figure, NDArray[Any]]:
+    """Return a new figure and its axes, shape (rows, columns).
+
+    With `count`, only the first axes stay, and the array is flat. `grid` are arguments of
+    `matplotlib.figure.Figure.subplots`, as ``sharex="col"``.
+    """
+    figure = new_figure(height_mm, width_mm)
+    figure.set_layout_engine("constrained")
+    axes = np.asarray(figure.subplots(rows, columns, squeeze=False, **grid))
+    if count is None:
+        return figure, axes
+    for unused in axes.flat[count:]:
+        unused.remove()
+    return figure, axes.flat[:count]
+
+
+def letters(panels: Iterable[Axes], titles: Sequence[str] = ()) -> None:
+    """Write (a), (b) ... and the titles, if any, above axes."""
+    for number, axes in enumerate(panels):
+        axes.set_title(" ".join([f"({chr(ord('a') + number)})", *titles[number : number + 1]]), loc="left")
+
+
+def legend_below(figure: Figure, handles: Sequence[Any], columns: int, **more: Any) -> None:
+    """Draw the legend of a figure below its axes."""
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
+
+
+def plain(text: str) -> str:
+    """Return a text of a file so that a figure shows it as it is: two dollars would begin a formula."""
+    return text.replace("$", r"\$")
+
+
+@style()
+def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
+    """Return a figure as PDF and as PNG, each with its file ending; the same figure gives the same bytes."""
+    files = []
+    for kind, undated in (("pdf", "CreationDate"), ("png", "Software")):
+        content = io.BytesIO()
+        figure.savefig(content, format=kind, metadata={undated: None})
+        files.append((kind, content.getvalue()))
+    return files
+
+
+# Placing by hand, until the last figure has a constrained layout.
 _CORNER_PAD = 7.0
 """Distance of the labels of a horizontal axis, in points, if they touch one of the vertical axis."""
 _POSITIONS = tuple(
@@ -85,20 +137,6 @@ _POSITIONS = tuple(
 """Positions of a label relative to its point: the side across and up, and the distance in points; better ones first."""
 _HALO = [Stroke(linewidth=2.0, foreground="white"), Normal()]
 _GROUND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.9}
-
-
-@contextlib.contextmanager
-def style() -> Iterator[None]:
-    """Apply the style of the figures: a context, or with ``@style()`` a decorator."""
-    with mpl.rc_context(_STYLE):
-        yield
-
-
-def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
-    """Return an empty figure with its own canvas, independent of pyplot."""
-    figure = Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH))
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def place_axes(
@@ -113,6 +151,7 @@ def place_axes(
 
     Margins are left, right, bottom and top; gaps are between columns and between rows.
     """
+    figure.set_layout_engine("none")
     width, height = (float(size) * _MM_PER_INCH for size in figure.get_size_inches())
     left, right, bottom, top = margins_mm
     across = (width - left - right - gaps_mm[0] * (columns - 1)) / columns
@@ -232,23 +271,7 @@ def _count_inside(box: Floats, points: Floats) -> int:
     return int(np.count_nonzero(((points > box[:2]) & (points < box[2:])).all(axis=1)))
 
 
-def plain(text: str) -> str:
-    """Return a text of a file so that a figure shows it as it is: two dollars would begin a formula."""
-    return text.replace("$", r"\$")
-
-
 def width_mm(axes: Axes) -> float:
     """Return the width of placed axes, mm."""
     figure: Any = axes.figure
     return float(axes.get_position().width * figure.get_figwidth() * _MM_PER_INCH)
-
-
-def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
-    """Return a figure as PDF and as PNG of 200 dpi, each with its file ending; the same figure gives the same bytes."""
-    files = []
-    for kind, undated in (("pdf", "CreationDate"), ("png", "Software")):
-        content = io.BytesIO()
-        with style():
-            figure.savefig(content, format=kind, metadata={undated: None}, dpi=PNG_DPI if kind == "png" else "figure")
-        files.append((kind, content.getvalue()))
-    return files

@@ -10,9 +10,6 @@ import pytest
 from experiments.common import figure_style
 from experiments.common.figure_style import figure_bytes, figure_grid, place_labels, style
 
-FONT_TYPE, PNG_DPI = figure_style._STYLE["pdf.fonttype"], figure_style.PNG_DPI
-"""Type of the fonts and resolution of the style, read before the fixture `figures_are_small` replaces them."""
-
 
 @pytest.mark.parametrize("centred", [False, True])
 def test_labels_of_nested_outlines_do_not_touch_and_stay_inside_the_axes(centred: bool) -> None:
@@ -46,8 +43,7 @@ def test_labels_of_nested_outlines_do_not_touch_and_stay_inside_the_axes(centred
 
 
 def test_pdfs_have_truetype_fonts_and_pngs_200_dpi(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(figure_style._STYLE, "pdf.fonttype", FONT_TYPE)
-    monkeypatch.setattr(figure_style, "PNG_DPI", PNG_DPI)
+    monkeypatch.setattr(figure_style, "STYLE", figure_style.STYLE[:1])
     with style():
         figure, (axes,) = figure_grid(40.0, 1, 1, (10.0, 5.0, 10.0, 5.0), (0.0, 0.0))
         axes.set_xlabel("ν² of $\\Phi_0$, −1 to 1 µm")
@@ -55,4 +51,4 @@ def test_pdfs_have_truetype_fonts_and_pngs_200_dpi(monkeypatch: pytest.MonkeyPat
     assert files["pdf"].count(b"/FontFile2") == 2
     assert b"/Type3" not in files["pdf"]
     # The header of a PNG has its width at byte 16.
-    assert int.from_bytes(files["png"][16:20], "big") == round(180.0 / 25.4 * 200.0)
+    assert int.from_bytes(files["png"][16:20], "big") == int(180.0 / 25.4 * 200.0)
