@@ -15,11 +15,9 @@ from sim.statistics import (
     Distribution,
     HitEstimate,
     QuantileEstimate,
-    band_half_width,
     empirical_distribution,
     estimate_hits,
     estimate_quantiles,
-    quantiles,
 )
 from sim.stopping_rule import QuantileName, StoppingRule
 from sim.storage import Axis
@@ -53,7 +51,6 @@ __all__ = [
     "Sweep",
     "Target",
     "WorstEngagement",
-    "band_half_width",
     "empirical_distribution",
     "estimate_hits",
     "estimate_quantiles",
@@ -61,6 +58,5 @@ __all__ = [
     "fly_one",
     "lower_bound",
     "possible_miss_of",
-    "quantiles",
     "simulate",
 ]

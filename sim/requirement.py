@@ -14,23 +14,18 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import Checked, Fraction, Positive
-from sim.statistics import estimate_hits, min_count, number_text, shows
-from sim.stopping_rule import DIGITS, NUMBER, QUANTITIES, QuantileName, parse_quantile
+from sim.statistics import estimate_hits, number_text, order_statistics, shows
+from sim.stopping_rule import DIGITS, QUANTITIES, QuantileName
 
 CONFIDENCE = 0.95
 MAX_RUNS_NEEDED = 1_000_000
 """Maximum number of runs that `Verdict.runs_needed` names."""
 _TAIL = 0.5 * (1.0 - CONFIDENCE)
-_HIT = re.compile(rf"\s*hit\s*>=?{NUMBER}")
-DEFAULT_QUANTILE = "p99"
-"""Quantile of a requirement that names none."""
-_WITHOUT_QUANTILE = re.compile(r"^\s*(?P<quantity>\w+)\s*<")
-_ALMOST = re.compile(
-    rf"\s*(?P<quantity>[a-z]\w*)\s*(?:p?(?P<level>{DIGITS})\s*%?)?\s*(?P<sign>[<>=]=?|[≤≥])\s*(?P<number>{DIGITS})"
-    r"\s*(?P<unit>%|[a-z/]*)\s*",
-    re.IGNORECASE,
+_FORM = re.compile(
+    rf"\s*(?:hit\s*>=?\s*(?P<share>{DIGITS})|(?P<quantity>\w+)(?:\s+p(?P<level>{DIGITS}))?\s*<\s*(?P<bound>{DIGITS}))\s*"
 )
-"""A requirement with a common mistake: another sign, a percentage, a unit, or a part of a name."""
+_DEFAULT_LEVEL = "99"
+"""Quantile, in percent, of a requirement that names none."""
 _STEPS = 50
 """Steps of bisection for an end of an interval."""
 
@@ -74,13 +69,6 @@ class Requirement(Checked):
 
     def __str__(self) -> str:
         return f"{self.quantile}<{number_text(self.bound)}"
-
-    @classmethod
-    def parse(cls, text: str) -> Requirement:
-        """Read `miss_m p99<10`, or `miss_m<10`, which is the same; raise ValueError for any other text."""
-        example = 'a quantity, a quantile and a bound, for example "miss_m p99<10", or "hit>=0.95"'
-        named = _WITHOUT_QUANTILE.sub(rf"\g<quantity> {DEFAULT_QUANTILE}<", text[:100])
-        return cls(*parse_quantile(named, f"<{NUMBER}", example, "the bound"))
 
     @property
     def name(self) -> str:
@@ -140,60 +128,17 @@ AnyRequirement = Requirement | HitRequirement
 
 
 def parse_requirement(text: str) -> AnyRequirement:
-    """Read `miss_m p99<10` or `hit>=0.95`, which may be written `hit>0.95`; raise ValueError for any other text."""
-    match = _HIT.fullmatch(text[:100])
-    try:
-        if match is None:
-            return Requirement.parse(text)
-        share = float(match["number"])
-        if not 0.0 < share < 1.0:
-            raise ValueError(f"the share of hits must be between 0 and 1, found {match['number']}")
-        return HitRequirement(share)
-    except ValueError as error:
-        mistake = _mistake(text[:100])
-        raise ValueError(mistake or (f"{error}; for example hit>=0.95" if match else str(error))) from None
-
-
-def _mistake(text: str) -> str | None:
-    """Return what is wrong with a requirement that is almost right, and the corrected text; None if not recognized."""
-    match = _ALMOST.fullmatch(text)
+    """Read `hit>=0.95`, `miss_m p99<10`, or `miss_m<10`, which is p99 too; raise ValueError for any other text."""
+    match = _FORM.fullmatch(text[:100])
     if match is None:
-        return None
-    name, level, sign, number, unit = match.group("quantity", "level", "sign", "number", "unit")
-    name = name.lower()
-    faults = []
-    if name.startswith("hit"):
-        if "<" in sign:
-            return f'hits must be bounded from below: write for example "hit>=0.95", found {text.strip()!r}'
-        share = float(number) / (100.0 if unit == "%" or float(number) >= 50.0 else 1.0)
-        if share == 1.0:
-            reason = "the share of hits must be less than 1, because no number of runs shows that all engagements hit"
-            return f'{reason}: write "hit>=0.99", found {text.strip()!r}'
-        if level or not 0.0 < share < 1.0 or unit not in ("", "%"):
-            return None
-        corrected = str(HitRequirement(float(f"{share:.12g}")))
-        if share != float(number):
-            faults.append("the share of hits must be a number between 0 and 1")
-    else:
-        quantity = next((known for known in QUANTITIES if known.startswith(name)), None)
-        if quantity is None or not float(number) > 0.0:
-            return None
-        own_unit = "m/s" if quantity.endswith("_m_s") else "m"
-        if unit not in ("", own_unit):
-            return f"the bound of {quantity} must be a number in {own_unit}, without its unit, found {text.strip()!r}"
-        corrected = f"{quantity} {f'p{level}' if level else DEFAULT_QUANTILE}<{number}"
-        try:
-            Requirement.parse(corrected)
-        except ValueError:
-            return None
-        if quantity != name:
-            faults.append(f"the quantity must be {quantity}")
-        if ">" in sign:
-            faults.append(f"{quantity} must be bounded from above, with <")
-        if unit:
-            faults.append("the bound must be written without its unit, which is that of the quantity")
-    faults = faults or ["the form must be QUANTITY pLEVEL<BOUND or hit>=SHARE"]
-    return f'{"; ".join(faults)}: write "{corrected}", found {text.strip()!r}'
+        raise ValueError(
+            'must be hit>=SHARE or QUANTITY pLEVEL<BOUND, for example "hit>=0.95" or "miss_m p99<10", with a quantity '
+            f"of {', '.join(QUANTITIES)}; found {text[:100]!r}"
+        )
+    if match["share"] is not None:
+        return HitRequirement(float(match["share"]))
+    quantile = QuantileName.parse(f"{match['quantity']} p{match['level'] or _DEFAULT_LEVEL}")
+    return Requirement(quantile, float(match["bound"]))
 
 
 @dataclass(frozen=True)
@@ -267,24 +212,28 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     if not size or np.isnan(values).any():
         raise ValueError("a requirement needs at least one value, and none may be NaN")
     holding = np.cumsum(requirement.holds(values))
-    fewest_met, most_missed = critical_counts(size, share, watched=watched)
+    first, last = _ranks(size, share, watched)
     value: float | None
     lower: float | None
     upper: float | None
     compared: tuple[float | None, float | None] = None, None
     if isinstance(requirement, Requirement):
+        ordered = np.sort(values)
         with np.errstate(invalid="ignore"):  # infinite values
-            value = _finite(np.quantile(values, share)) if shows(size, share) else None
+            value = _finite(np.quantile(ordered, share)) if shows(size, share) else None
+        lower = _finite(ordered[first - 1]) if first >= 1 else None
+        upper = _finite(ordered[last - 1]) if last <= size else None
         compared = value, requirement.bound
-        lower, upper = _quantile_interval(values, int(fewest_met[-1]), int(most_missed[-1]))
     else:
         estimate = estimate_hits(int(holding[-1]), size, CONFIDENCE)
         value, lower, upper = estimate.probability, estimate.lower, estimate.upper
         if watched:
             lower, upper = share_interval(int(holding[-1]), size)
     known = int(np.isfinite(values).sum())
-    looks = holding if watched else holding[-1:]
-    met, missed = looks >= fewest_met, looks <= most_missed
+    if watched:
+        met, missed = (p_value <= _TAIL for p_value in p_values(np.arange(1, size + 1), holding, share))
+    else:
+        met, missed = holding[-1:] >= last, holding[-1:] < first
     decided = np.flatnonzero(met | missed)
     if not decided.size:
         needed = runs_needed(int(holding[-1]), size, share)
@@ -298,72 +247,53 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     return Verdict(decision, size, value, lower, upper, size, known, *compared)
 
 
-def _quantile_interval(values: Floats, fewest_met: int, most_missed: int) -> tuple[float | None, float | None]:
-    """Return the order statistics that enclose a quantile."""
-    ordered = np.sort(values)
-    lower = _finite(ordered[most_missed]) if most_missed >= 0 else None
-    return lower, _finite(ordered[fewest_met - 1]) if fewest_met <= values.size else None
-
-
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+@functools.lru_cache(maxsize=64)
+def _ranks(size: int, share: float, watched: bool) -> tuple[int, int]:
+    """Return the ranks of the order statistics that enclose a quantile, as `order_statistics`.
+
+    The requirement is met if at least as many runs as the second rank satisfy the bound, and not met if fewer than the
+    first do.
+    """
+    if not watched:
+        return order_statistics(size, share, CONFIDENCE)
+    met, missed = p_values(size, np.arange(size + 1), share)
+    return int((missed <= _TAIL).sum()), int((met > _TAIL).sum())
 
 
 def share_interval(count: int, runs: int) -> tuple[float, float]:
     """Return the 95 % confidence interval of a share after `runs` runs of a confidence sequence (`judge`)."""
 
-    def end(index: int, inside: float, outside: float) -> float:
+    def end(index: int, outside: float) -> float:
+        inside = count / runs
         for _ in range(_STEPS):
             middle = 0.5 * (inside + outside)
-            if p_values(runs, count, middle, watched=True)[index] > _TAIL:
+            if p_values(runs, count, middle)[index] > _TAIL:
                 inside = middle
             else:
                 outside = middle
         return outside
 
-    share = count / runs
-    return end(0, share, 0.0) if count else 0.0, end(1, share, 1.0) if count < runs else 1.0
+    return end(0, 0.0) if count else 0.0, end(1, 1.0) if count < runs else 1.0
 
 
-def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Integers, Integers]:
-    """Return the numbers of runs that satisfy a bound, with a required share, at which a requirement is decided.
-
-    The requirement is met from the first number on (one more than the number of runs if no number decides), and not met
-    up to the second one (-1 if no number decides). With `watched` both are arrays for 1, 2, ..., `size` runs, those of
-    the confidence sequence; otherwise they have the shape (1,), for `size` runs. They are read-only.
-    """
-    if not watched:
-        return _critical_counts(size, size, share, watched)
-    # Powers of two, so that samples of different sizes share the computed counts.
-    fewest_met, most_missed = _critical_counts(1, 1 << (size - 1).bit_length(), share, watched)
-    return fewest_met[:size], most_missed[:size]
+def decides(runs: ArrayLike, count: ArrayLike, share: float) -> Flags:
+    """Return whether a confidence sequence decides a requirement: `count` of `runs` satisfy its bound (`judge`)."""
+    return np.asarray(np.minimum(*p_values(runs, count, share)) <= _TAIL)
 
 
-@functools.lru_cache(maxsize=32)
-def _critical_counts(first: int, last: int, share: float, watched: bool) -> tuple[Integers, Integers]:
-    runs = np.arange(first, last + 1)
-    fewest_met = min_count(runs, lambda count: p_values(runs, count, share, watched=watched)[0] <= _TAIL)
-    most_missed = min_count(runs, lambda count: p_values(runs, count, share, watched=watched)[1] > _TAIL) - 1
-    for counts in (fewest_met, most_missed):
-        counts.setflags(write=False)
-    return fewest_met, most_missed
-
-
-def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike, *, watched: bool) -> tuple[Floats, Floats]:
+def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike) -> tuple[Floats, Floats]:
     """Return the p-values of the hypotheses that the true share is at most, and at least, a given share.
 
-    `count` is the number of those of n `runs` that satisfy the bound; it may be fractional. If `watched`, the values
-    hold for all numbers of runs at once; then they are inverse likelihood ratios: see `judge`.
+    `count` is the number of those of n `runs` that satisfy the bound; it may be fractional. The values are inverse
+    likelihood ratios, and hold for all numbers of runs at once: see `judge`.
     """
     from scipy.special import betainc, betaln  # slow to load, and few commands need it
 
     n, k, q = (np.asarray(values, dtype=np.float64) for values in (runs, count, share))
-    if not watched:
-        # Where no run (every run) satisfies the bound, k or more (k or fewer) are certain.
-        with np.errstate(invalid="ignore"):
-            at_least = np.where(k > 0, betainc(np.maximum(k, 1e-300), n - k + 1.0, q), 1.0)
-            at_most = np.where(k < n, betainc(np.maximum(n - k, 1e-300), k + 1.0, 1.0 - q), 1.0)
-        return at_least, at_most
     # The integral of the likelihood over the shares above q is an incomplete beta function; likewise below q.
     likelihood = k * np.log(q) + (n - k) * np.log1p(-q) - betaln(k + 1.0, n - k + 1.0)
     with np.errstate(divide="ignore", over="ignore"):
@@ -379,8 +309,7 @@ def runs_needed(count: int, runs: int, share: float) -> int | None:
     """
 
     def deciding(sizes: Integers) -> Integers:
-        values = p_values(sizes, count / runs * sizes, share, watched=True)
-        return sizes[(np.minimum(*values) <= _TAIL) & (sizes > runs)]
+        return sizes[decides(sizes, count / runs * sizes, share) & (sizes > runs)]
 
     sizes = np.unique(np.geomspace(1, MAX_RUNS_NEEDED, 2000).astype(np.int64))
     enough = deciding(sizes)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from statistics import NormalDist
@@ -11,8 +12,8 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.arrays import Flags, Floats, Integers
-from infoset.limits import COUNT, FRACTION, Limits, real_values
+from infoset.arrays import Floats
+from infoset.limits import FRACTION, real_values
 
 
 @dataclass(frozen=True)
@@ -56,46 +57,20 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
     ----------
     Massart (1990), The tight constant in the Dvoretzky-Kiefer-Wolfowitz inequality.
     """
+    FRACTION.need("confidence", confidence)
+    values = _ordered(sample)
+    half = math.sqrt(math.log(2.0 / (1.0 - confidence)) / (2.0 * values.size))
+    probability = np.arange(1, values.size + 1) / values.size
+    lower, upper = (np.clip(probability + shift, 0.0, 1.0) for shift in (-half, half))
+    return Distribution(values, probability, lower, upper, confidence)
+
+
+def _ordered(sample: ArrayLike) -> Floats:
+    """Return the values of a sample in ascending order; raise ValueError unless all are finite, and there is one."""
     values = np.sort(real_values("sample", sample).ravel())
     if values.size == 0 or not np.isfinite(values).all():
-        raise ValueError("a distribution needs at least one value, all finite")
-    half = band_half_width(values.size, confidence)
-    probability = np.arange(1, values.size + 1) / values.size
-    return Distribution(
-        values,
-        probability,
-        np.clip(probability - half, 0.0, 1.0),
-        np.clip(probability + half, 0.0, 1.0),
-        confidence,
-    )
-
-
-def band_half_width(size: int, confidence: float) -> float:
-    """Return the half-width of the band for `size` n and `confidence` c: sqrt(ln(2 / (1 - c)) / (2 n)).
-
-    Raises
-    ------
-    ValueError
-        If the confidence is not between 0 and 1.
-    """
-    COUNT.need("size", size)
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie between 0 and 1: got {confidence}")
-    return math.sqrt(math.log(2.0 / (1.0 - confidence)) / (2.0 * size))
-
-
-def quantiles(sample: ArrayLike, levels: ArrayLike) -> Floats:
-    """Return quantiles of a sample at some levels in [0, 1], linearly interpolated between order statistics.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the sample is empty or not finite, or a level is out of its range.
-    """
-    values, at = real_values("sample", sample), real_values("levels", levels)
-    if values.size == 0 or not np.isfinite(values).all() or not ((at >= 0.0) & (at <= 1.0)).all():
-        raise ValueError(f"quantiles need at least one value, all finite, and levels in [0, 1]: got levels {levels!r}")
-    return np.asarray(np.quantile(values, at), dtype=np.float64)
+        raise ValueError("a sample needs at least one value, all finite")
+    return values
 
 
 def shows(size: int, level: float) -> bool:
@@ -109,8 +84,8 @@ def shows(size: int, level: float) -> bool:
 
 
 def shown_quantiles(sample: Floats, levels: Sequence[float]) -> list[float | None]:
-    """Return `quantiles`; None where the sample does not show the quantile (`shows`)."""
-    values = quantiles(sample, levels).tolist()
+    """Return quantiles of a sample with at least one value; None where it does not show the quantile (`shows`)."""
+    values = np.quantile(sample, levels).tolist()
     return [value if shows(len(sample), level) else None for level, value in zip(levels, values, strict=True)]
 
 
@@ -161,23 +136,32 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
     The ends of the interval are order statistics: the number of values below the true quantile is binomial with n
     trials and the level as probability (David, Nagaraja 2003, Order Statistics, section 7.1). O(n log n).
     """
-    values = np.sort(real_values("sample", sample).ravel())
-    if values.size == 0 or not np.isfinite(values).all():
-        raise ValueError("quantiles need at least one value, all finite")
-    if not 0.0 < confidence < 1.0 or not all(0.0 <= level <= 1.0 for level in levels):
-        raise ValueError(f"levels must lie in [0, 1], the confidence between 0 and 1: got {levels}, {confidence}")
-    bounds = [
-        (
-            float(values[lower - 1]) if lower >= 1 else None,
-            float(values[upper - 1]) if upper <= values.size else None,
-        )
+    FRACTION.need("confidence", confidence)
+    if not all(0.0 <= level <= 1.0 for level in levels):
+        raise ValueError(f"levels must lie in [0, 1]: got {levels}")
+    values = _ordered(sample)
+    ends = [
+        (float(values[lower - 1]) if lower >= 1 else None, float(values[upper - 1]) if upper <= values.size else None)
         for lower, upper in (order_statistics(values.size, level, confidence) for level in levels)
     ]
-    # overwrite_input saves a second copy of a million values.
+    # overwrite_input saves a second copy of a million values, and changes their order.
     wanted = np.quantile(values, levels, overwrite_input=True)
     return [
-        QuantileEstimate(level, float(value), *ends) for level, value, ends in zip(levels, wanted, bounds, strict=True)
+        QuantileEstimate(level, float(value), *interval)
+        for level, value, interval in zip(levels, wanted, ends, strict=True)
     ]
+
+
+@functools.lru_cache(maxsize=1024)
+def order_statistics(size: int, level: float, confidence: float) -> tuple[int, int]:
+    """Return the ranks, from 1, of the two values of a sample that enclose the quantile of a level.
+
+    A rank below 1 or above `size` means that no value bounds that side.
+    """
+    from scipy.stats import binom  # slow to load, and few commands need it
+
+    tail = 0.5 * (1.0 - confidence)
+    return int(binom.ppf(tail, size, level)), int(binom.ppf(1.0 - tail, size, level)) + 1
 
 
 @dataclass(frozen=True)
@@ -210,21 +194,21 @@ def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate
 
     Raises
     ------
-    TypeError, ValueError
+    ValueError
         If `runs` is not at least 1, `hits` is not in [0, runs], or the confidence is not between 0 and 1.
 
     References
     ----------
     Clopper, Pearson (1934), The use of confidence or fiducial limits illustrated in the case of the binomial.
     """
-    from scipy.special import betaincinv  # slow to load, and few commands need it
+    from scipy.stats import beta  # slow to load, and few commands need it
 
-    COUNT.need("runs", runs)
-    Limits(minimum=0, maximum=runs, whole=True).need("hits", hits)
     FRACTION.need("confidence", confidence)
+    if runs < 1 or not 0 <= hits <= runs:
+        raise ValueError(f"hits must be from 0 to runs, and runs at least 1: got {hits} of {runs}")
     tail = 0.5 * (1.0 - confidence)
-    lower = float(betaincinv(hits, runs - hits + 1, tail)) if hits else 0.0
-    upper = float(betaincinv(hits + 1, runs - hits, 1.0 - tail)) if hits < runs else 1.0
+    lower = float(beta.ppf(tail, hits, runs - hits + 1)) if hits else 0.0
+    upper = float(beta.ppf(1.0 - tail, hits + 1, runs - hits)) if hits < runs else 1.0
     return HitEstimate(runs, hits, hits / runs, lower, upper)
 
 
@@ -248,35 +232,6 @@ def correlation_interval(
     half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * deviation
     z = math.atanh(correlation)
     return math.tanh(z - half), math.tanh(z + half)
-
-
-def order_statistics(size: int, level: float, confidence: float) -> tuple[int, int]:
-    """Return the ranks, from 1, of the two values of a sample that enclose the quantile of a level.
-
-    A rank below 1 or above `size` means that no value bounds that side.
-    """
-    tail = 0.5 * (1.0 - confidence)
-    # A quantile of level 0 or 1 is an end of the distribution; no value bounds it on the outside.
-    if level in (0.0, 1.0):
-        return (0, 1) if level == 0.0 else (size, size + 1)
-    return _min_count(size, level, tail), _min_count(size, level, 1.0 - tail) + 1
-
-
-def _min_count(size: int, level: float, probability: float) -> int:
-    """Return the minimum k such that a binomial variable is at most k with at least this probability."""
-    from scipy.special import bdtr  # slow to load, and few commands need it
-
-    return int(min_count(np.array(size), lambda count: bdtr(count, size, level) >= probability))
-
-
-def min_count(most: Integers, is_enough: Callable[[Integers], Flags]) -> Integers:
-    """Return the minimum count from 0 to `most` that is enough, or `most` + 1; greater counts are enough too."""
-    low, high = np.zeros_like(most), most + 1
-    while (low < high).any():
-        middle = np.minimum((low + high) // 2, most)
-        enough = is_enough(middle)
-        low, high = np.where(enough | (low >= high), low, middle + 1), np.where(enough, np.minimum(middle, high), high)
-    return low
 
 
 def number_text(number: float) -> str:

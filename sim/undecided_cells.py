@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.chunk import Chunk
-from sim.requirement import AnyRequirement, critical_counts
+from sim.requirement import AnyRequirement, decides
 from sim.results import Results
 from sim.storage import CampaignWriter
 
@@ -102,8 +102,7 @@ class UndecidedCells:
             if not values.size:
                 continue
             before = state.runs[noise]
-            fewest_met, most_missed = critical_counts(before + values.size, required.share, watched=True)
-            decided = (counts >= fewest_met[before:]) | (counts <= most_missed[before:])
-            state.decided[noise] |= bool(decided.any())
+            runs = np.arange(before + 1, before + values.size + 1)
+            state.decided[noise] |= bool(decides(runs, counts, required.share).any())
             state.runs[noise], state.holding[noise] = before + values.size, int(counts[-1])
         state.chunks += 1

@@ -66,12 +66,10 @@ from sim import (
     StoppingRule,
     Sun,
     Target,
-    band_half_width,
     empirical_distribution,
     estimate_hits,
     estimate_quantiles,
     fly_one,
-    quantiles,
     simulate,
 )
 from sim.adversary import find_worst
@@ -384,7 +382,6 @@ def test_what_is_no_count(value: Any) -> None:
     refused(lambda: fly_one(scenario, value), "run")
     refused(lambda: fly_one(scenario, seed=value), "seed")
     refused(lambda: simulate(scenario, 1, seed=value), "seed")
-    refused(lambda: band_half_width(value, 0.9), "size")
     if value != [1]:
         refused(lambda: simulate(scenario, value), "run")
     for name in ("budget", "seed", "threads"):
@@ -575,7 +572,6 @@ def test_what_is_no_sample(sample: Any) -> None:
     for call in (
         lambda: empirical_distribution(sample),
         lambda: estimate_quantiles(sample, [0.5]),
-        lambda: quantiles(sample, [0.5]),
     ):
         with pytest.raises(REFUSALS):
             call()
@@ -583,13 +579,12 @@ def test_what_is_no_sample(sample: Any) -> None:
 
 @pytest.mark.parametrize("level", [-0.1, 1.1, math.nan])
 def test_what_is_no_level(level: float) -> None:
-    refused(lambda: quantiles([1.0, 2.0], [level]), "levels")
     refused(lambda: estimate_quantiles([1.0, 2.0], [level]), "levels")
 
 
 @pytest.mark.parametrize(
     ("hits", "runs", "confidence", "name"),
-    [(0, 0, 0.95, "runs"), (3, 2, 0.95, "hits"), (-1, 2, 0.95, "hits"), (1.0, 2, 0.95, "hits"), (1, 2, 1.0, "confid")],
+    [(0, 0, 0.95, "runs"), (3, 2, 0.95, "hits"), (-1, 2, 0.95, "hits"), (1, 2, 1.0, "confid")],
 )
 def test_hits_are_a_part_of_the_runs(hits: Any, runs: int, confidence: float, name: str) -> None:
     refused(lambda: estimate_hits(hits, runs, confidence), name)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,36 +13,9 @@ from experiments.common import screen
 from experiments.interception.scenario_file import scenario_warnings
 from guidance import Thruster
 from sim.closed_form import possible_miss_of
-from sim.requirement import parse_requirement
 from sim.scenario import of_model
 from tests.built_in import problem_text, scenario_text
 from tests.experiments.command_line import Command
-
-
-@pytest.mark.parametrize(
-    ("text", "mistake", "corrected"),
-    [
-        ("hit>=99%", "a number between 0 and 1", "hit>=0.99"),
-        ("hit>=95", "a number between 0 and 1", "hit>=0.95"),
-        ("hit<=0.5", "from below", "hit>=0.95"),
-        ("Hits = 0.9", "the form must be", "hit>=0.9"),
-        ("hit>=100%", "no number of runs", "hit>=0.99"),
-        ("miss_m>10", "from above", "miss_m p99<10"),
-        ("miss_m 90% <= 10", "the form must be", "miss_m p90<10"),
-        ("miss<10 m", "the quantity must be miss_m; the bound must be written without", "miss_m p99<10"),
-    ],
-)
-def test_a_requirement_that_is_almost_right_is_corrected(text: str, mistake: str, corrected: str) -> None:
-    with pytest.raises(ValueError, match=mistake) as error:
-        parse_requirement(text)
-    assert re.search(f'write (for example )?"{corrected}"', str(error.value))
-    parse_requirement(corrected)
-
-
-@pytest.mark.parametrize(("text", "unit"), [("miss<10 km", "m"), ("impulse<5 cm/s", "m/s"), ("miss_m<5%", "m")])
-def test_a_requirement_in_another_unit_is_not_corrected(text: str, unit: str) -> None:
-    with pytest.raises(ValueError, match=f"must be a number in {unit}, without its unit"):
-        parse_requirement(text)
 
 
 @pytest.mark.parametrize(

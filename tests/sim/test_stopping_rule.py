@@ -22,12 +22,12 @@ def test_rules_are_read_and_written() -> None:
     assert rule == StoppingRule(QuantileName("miss_m", 0.99), 0.5)
     assert str(rule) == "miss_m p99 ci<0.5"
     assert StoppingRule.parse("  impulse_m_s  p99.9  ci < 1e-1 ").quantile.level == 0.999
-    required = Requirement.parse("guaranteed_miss_m p50<12.5")
+    required = parse_requirement("guaranteed_miss_m p50<12.5")
     assert required == Requirement(QuantileName("guaranteed_miss_m", 0.5), 12.5)
     assert str(required) == "guaranteed_miss_m p50<12.5"
     assert QuantileName.parse("miss_m p5") == QuantileName("miss_m", 0.05)
     assert [level_name(each) for each in (0.05, 0.5, 0.99, 0.999, 0.9999)] == ["p5", "p50", "p99", "p99.9", "p99.99"]
-    assert str(Requirement.parse("miss_m p99.99995<1e-07")) == "miss_m p99.99995<1e-07"
+    assert str(parse_requirement("miss_m p99.99995<1e-07")) == "miss_m p99.99995<1e-07"
     assert str(StoppingRule.parse("miss_m p0.5 ci<1234567.5")) == "miss_m p0.5 ci<1234567.5"
     assert QuantileName.parse("miss_m p1e-3") == QuantileName("miss_m", 1e-5)
     assert [level_name(each) for each in (0.001, 1e-5, 1e-20)] == ["p0.1", "p0.001", "p1e-18"]
@@ -75,7 +75,7 @@ def test_what_is_no_rule(text: str) -> None:
 @pytest.mark.parametrize("text", ["miss_m p99<0", "miss_m p99 10", "miss p99<10", "p99<10", "miss_m p99<1e400"])
 def test_what_is_no_requirement(text: str) -> None:
     with pytest.raises(ValueError, match=r"must be|there is no quantity|greater than 0"):
-        Requirement.parse(text)
+        parse_requirement(text)
 
 
 def samples(chunks: int, size: int) -> list[Floats]:

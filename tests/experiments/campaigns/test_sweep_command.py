@@ -43,7 +43,6 @@ from sim import (
     Scenario,
     Sweep,
     estimate_hits,
-    quantiles,
     simulate,
 )
 from sim.requirement import Decision, HitRequirement, Verdict, judge, parse_requirement, share_interval
@@ -110,9 +109,9 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
         )
         flown = simulate(cell, 30, seed=2)
         assert row["runs"] == 30
-        assert row["miss_m_p90"] == quantiles(flown.miss_m, 0.9)
+        assert row["miss_m_p90"] == np.quantile(flown.miss_m, 0.9)
         assert row["miss_m_p99"] is None
-        assert row["impulse_m_s_p50"] == quantiles(flown.impulse_m_s, 0.5)
+        assert row["impulse_m_s_p50"] == np.quantile(flown.impulse_m_s, 0.5)
         assert row["miss_m_max"] == flown.miss_m.max()
         assert row["miss_m_p99_upper"] is None
         assert row["miss_m_p50_lower"] in flown.miss_m
@@ -199,13 +198,7 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
         (["--vary", "thruster.budget=1:2:2"], ["did you mean thruster.budget_m_s?"]),
         (["--vary", "thruster.max_impulse_m_s=0.01:5:3"], ["brief with thruster.max_impulse_m_s = 0.01"]),
         (["--runs", 0], ["--runs", "must be from 1 to "]),
-        (["--require", "miss_m 10"], ["--require: must be a quantity, a quantile and a bound"]),
-        (
-            ["--require", "hit>=1"],
-            ["--require: the share of hits must be less than 1, because no number of runs", 'write "hit>=0.99"'],
-        ),
-        (["--require", "miss_m p99<1e400"], ["--require: the bound must be greater than 0 and finite, found 1e400"]),
-        (["--require", "miss_m p\u0669\u0669<10"], ["--require: must be a quantity, a quantile and a bound"]),
+        (["--require", "miss_m 10"], ["--require: must be hit>=SHARE or QUANTITY pLEVEL<BOUND, for example"]),
         (["--vary", "thruster.max_impulse_m_s=1_0:20:2"], ["must be a number, found"]),
         (["--show", "miss_m p99,fuel p50"], ["--show: there is no quantity fuel"]),
         (["--show", ",".join(f"miss_m p{each}" for each in range(1, 20))], ["--show: at most 8"]),

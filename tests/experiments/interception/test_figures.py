@@ -23,7 +23,7 @@ from experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, 
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, TieRule
 from infoset import ConvexPolygons
-from sim import Record, Results, StepRecord, band_half_width, fly_one, simulate
+from sim import Record, Results, StepRecord, fly_one, simulate
 from tests.experiments.campaigns.figure_room import need_room
 
 UNITS = (", m", ", s", ", m/s", ", mrad", ", µrad/s", "(share of runs)")
@@ -223,7 +223,7 @@ def test_distributions_draw_the_band_of_the_half_width(curves: list[Curve]) -> N
     figure = draw_distributions(curves)
     assert len(figure.axes) == 2
     assert_units(figure)
-    half = band_half_width(RUNS, 0.95)
+    half = np.sqrt(np.log(40.0) / (2.0 * RUNS))  # Dvoretzky-Kiefer-Wolfowitz
     for axes, name in zip(figure.axes, ("miss_m", "impulse_m_s"), strict=True):
         for curve in curves:
             sample = np.sort(getattr(curve.results, name))

@@ -17,7 +17,7 @@ from experiments.common.input_file import to_toml
 from experiments.interception.scenario_file import with_model
 from experiments.interception.study import SetCounts, hit_text, percent, set_counts, set_warnings
 from infoset import Model
-from sim import Body, Scenario, estimate_hits, quantiles, simulate
+from sim import Body, Scenario, estimate_hits, simulate
 
 pytestmark = pytest.mark.usefixtures("unrendered")
 
@@ -41,7 +41,7 @@ def test_a_better_range_sensor_looks_worse_in_the_paper_and_the_study_says_why(i
     def p99(model: Model, error: float) -> tuple[float, int]:
         meter = replace(published.range_sensor, relative_error=error) if published.range_sensor is not None else None
         flown = simulate(with_model(replace(published, range_sensor=meter), model), 20, guarantee=False)
-        return float(quantiles(flown.miss_m, 0.99)), int(flown.set_emptied.sum())
+        return float(np.quantile(flown.miss_m, 0.99)), int(flown.set_emptied.sum())
 
     good, poor = p99(Model.PAPER, 0.01), p99(Model.PAPER, 0.1)
     assert good[0] > 3.0 * poor[0]
