@@ -96,7 +96,7 @@ def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(worst: Wor
             assert abs(step.measured["angle"] - step.true_angle_rad) <= bound * (1.0 + 1e-12)
 
 
-@pytest.mark.parametrize("name", ["ranging", "comet"])
+@pytest.mark.parametrize("name", [pytest.param("ranging", marks=pytest.mark.thorough), "comet"])
 def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.FixtureRequest) -> None:
     given = guaranteed(request.getfixturevalue(name))
     scenario = replace(
@@ -131,6 +131,7 @@ def test_with_all_sensors_in_space(convention: str, shape: str, ranging: Scenari
     assert sizes.max() <= (1.0 + 1e-12 if shape == "disc" else np.sqrt(2.0))
 
 
+@pytest.mark.thorough
 def test_the_worst_in_space_is_worse_than_in_the_plane(coarse: Scenario) -> None:
     spatial = guaranteed(in_space(coarse))
     found = find_worst(spatial, budget=60, seed=3)
@@ -193,16 +194,6 @@ def test_progress_rises_to_one(coarse: Scenario) -> None:
     assert told[-1] == 1.0
 
 
-@pytest.mark.parametrize("bad", [{"budget": 0}, {"threads": 0}, {"seed": -1}])
-def test_what_cannot_be_searched_is_refused(bad: dict[str, int], coarse: Scenario) -> None:
-    with pytest.raises(ValueError, match=f"{next(iter(bad))} must be at least"):
-        find_worst(coarse, **bad)  # type: ignore[arg-type]
-
-
-def test_one_evaluation_is_enough(coarse: Scenario) -> None:
-    assert find_worst(coarse, budget=1).evaluations == 1
-
-
 def test_starts_do_not_come_from_the_dispersion(coarse: Scenario) -> None:
     nowhere = replace(coarse, dispersion=StateBox((0.0, 0.0), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3)))
     found = find_worst(nowhere, budget=10, seed=4)
@@ -210,7 +201,7 @@ def test_starts_do_not_come_from_the_dispersion(coarse: Scenario) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0])
 def test_symmetric_miss_in_the_papers_model_misses_by_85_m_with_its_set_kept(asteroid: Scenario, seed: int) -> None:
     found = find_worst(asteroid, budget=4000, seed=seed, keep_set=True, threads=2)
     assert found.outcome is Outcome.ARRIVED
@@ -220,7 +211,7 @@ def test_symmetric_miss_in_the_papers_model_misses_by_85_m_with_its_set_kept(ast
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0])
 def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenario, seed: int) -> None:
     scenario = guaranteed(asteroid)
     found = find_worst(scenario, budget=2500, seed=seed, threads=2)
@@ -235,7 +226,7 @@ def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenari
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0])
 def test_symmetric_miss_in_space_misses_by_90_m_below_phi(asteroid: Scenario, seed: int) -> None:
     scenario = guaranteed(in_space(asteroid))
     found = find_worst(scenario, budget=1500, seed=seed, threads=2)

@@ -24,6 +24,7 @@ def latest_pair(scenario: Scenario) -> TruthPair:
     return pair_at(scenario, bounds.x_m[1], bounds.vx_m_s[1])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "settings"),
     [

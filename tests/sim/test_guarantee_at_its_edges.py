@@ -132,6 +132,7 @@ def round_scenario(number: int) -> Scenario:
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("first", "number"), [(0, 60), pytest.param(1000, 2000, marks=pytest.mark.thorough)])
 def test_round_numbers_give_no_warning_and_finite_results(first: int, number: int) -> None:
     for case in range(first, first + number):
@@ -303,6 +304,7 @@ def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
     return model, np.array(measured), views[-1]
 
 
+@pytest.mark.thorough
 def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
     """A bound that rises with range and the rectangle at the start: nothing lives for 150 km between them."""
     model, _, information = two_intervals(15)

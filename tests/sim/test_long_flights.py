@@ -62,6 +62,7 @@ def test_a_batch_of_long_flights_is_smaller(asteroid: Scenario, monkeypatch: pyt
     assert batches == [2, 2, 1]
 
 
+@pytest.mark.thorough
 def test_labels_of_a_long_flight_leave_in_groups(asteroid: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
     """The number of replays does not grow with the number of steps. Phi holds, and depends little on the groups."""
     scenario = of_2000_steps(asteroid)

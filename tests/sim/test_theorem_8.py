@@ -118,6 +118,7 @@ def test_the_set_is_within_the_interval_at_each_decision(known: Scenario) -> Non
         assert max(map(np.max, widths)) > 0.5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("noise", NoiseKind)
 def test_no_random_flight_is_worse(known: Scenario, noise: NoiseKind) -> None:
     for tie in TieRule:
@@ -126,6 +127,7 @@ def test_no_random_flight_is_worse(known: Scenario, noise: NoiseKind) -> None:
         assert (results.miss_m <= results.theorem_8_miss_m).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("max_m_s", [7.5, 2.5])
 def test_a_search_finds_no_worse_flight_and_comes_near(known: Scenario, max_m_s: float) -> None:
     scenario = replace(known, thruster=replace(known.thruster, max_impulse_m_s=max_m_s))
