@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from sim.engagement import Engagements, Step
 from sim.results import Results, ending
 from sim.scenario import Scenario, strategy_name, with_strategy
 from sim.target import TargetMotion
+from sim.versions import versions
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,8 @@ class Record:
         Name of the noise that replaced that of the scenario; None if none did.
     inconsistency : Inconsistency or None
         First measurement that contradicts the model; None without one.
+    versions : mapping of str to str
+        Versions of the packages and of Python that simulated it.
     """
 
     scenario: Scenario
@@ -123,6 +126,7 @@ class Record:
     steps: tuple[StepRecord, ...]
     noise: str | None = None
     inconsistency: Inconsistency | None = None
+    versions: Mapping[str, str] = field(default_factory=versions)
 
     @property
     def noise_name(self) -> str:

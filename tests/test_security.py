@@ -16,7 +16,6 @@ import pytest
 
 from experiments.cli import main
 from experiments.common.errors import on_a_screen
-from experiments.interception import record_file
 from experiments.interception.page import interception_page
 from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario
@@ -198,11 +197,11 @@ def test_keys_that_are_shown_cannot_steer_it_either(
 ) -> None:
     """What is wrong is shown, and may be anything: names of files, of keys, of members of an archive."""
     monkeypatch.chdir(tmp_path)
-    content = record_file._to_arrays(record)
-    header = json.dumps({"format": record_file.FORMAT, "schema": record_file.SCHEMA, ESCAPE: 1}).encode()
-    Path(f"{ESCAPE.replace('/', '')}.npz").write_bytes(
-        record_file._pack({"header": np.frombuffer(header, dtype=np.uint8), **content})
-    )
+    write_record(record, "x.npz")
+    with np.load("x.npz") as arrays:
+        changed = dict(arrays) | {"header": np.frombuffer(json.dumps({ESCAPE: 1}).encode(), dtype=np.uint8)}
+    with Path(f"{ESCAPE.replace('/', '')}.npz").open("wb") as file:
+        np.savez(file, **changed)
     Path("mine.toml").write_text('name = "x"\n"a\\u001b[2J" = 1\n["\\u001b]0;owned"]\n')
     assert infoset("replay", f"{ESCAPE}.npz") == 2
     assert infoset("scenarios", "check", "mine.toml") == 2

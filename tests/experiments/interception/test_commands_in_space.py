@@ -125,7 +125,7 @@ def test_compare_in_space(file: Path, infoset: Command) -> None:
     first = [row for row in table if row["strategy"] == "patient" and row["noise"] == "random"]
     for name in ("miss_y_m", "miss_z_m"):
         assert [float(row[name]) for row in first] == flown[name]
-    assert len(json.loads(Path("c.json").read_text())["strategies"]) == 8
+    assert len(json.loads(Path("c.json").read_text())["strategies"]) == 6
 
 
 OWN = """
