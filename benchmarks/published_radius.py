@@ -17,10 +17,9 @@ from scipy.optimize import least_squares
 
 from experiments.common.hill_axes import to_paper
 from experiments.reachability.file import load_rendezvous
-from experiments.reachability.printed_tables import PROBLEM, compare_published, printed_tables
-from experiments.reachability.published import flown_controls, published_motion
+from experiments.reachability.published import PROBLEM, flown_controls, printed_tables, published_motion
 from infoset.arrays import Floats
-from rendezvous.reachability import solve
+from rendezvous.reachability import minimum_energy, solve
 
 ROUNDING = np.array([0.1, 0.1, 0.1, 0.01, 0.01, 0.01])
 """Largest error of a difference of two rounded states, m and m/s."""
@@ -31,9 +30,9 @@ def main() -> None:
     """Fit and print."""
     rendezvous = load_rendezvous(PROBLEM)
     problem = rendezvous.problem
-    controls = flown_controls(problem, compare_published(rendezvous, solve(problem)))
+    controls = flown_controls(rendezvous, minimum_energy(solve(problem).optimal))
     linear = to_paper(problem.run(controls))[:, 1:]
-    printed = np.array([table.nonlinear - table.linear for table in printed_tables().values()])
+    printed = np.array([table.nonlinear - table.linear for table in printed_tables()])
 
     def residuals(curvature_1_mm: Floats) -> Floats:
         motion = published_motion(rendezvous.truth.orbit, 1e6 / float(curvature_1_mm[0]))

@@ -14,11 +14,10 @@ from experiments.common.options import Json, Overwrite, Quiet
 class Reproduce:
     """Compute every number of the five papers, and print it with the published number.
 
-    Each number is printed with its table or equation, the tolerance of its printed digits, and a verdict: agreed,
-    misprint (with the correct number and the reason), explained by another model (with the number of this model), or
-    not explained (with the attempted explanations). The exit code is 1 if a number that should agree does not. Numbers
-    that a paper prints, numbers of another implementation, exact values of closed forms, and one printed run among many
-    of ours are in separate tables. Without --json no file is written.
+    Each number has a verdict: agreed, misprint (with the correct number and the reason), explained by another model
+    (with the number of this model), or not explained (with the attempted explanations). The exit code is 1 if a number
+    that should agree does not. Where a paper prints no numbers, those of another implementation stand in their place.
+    Without --json no file is written.
     """
 
     paper: Annotated[

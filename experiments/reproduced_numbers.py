@@ -2,136 +2,141 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from importlib import import_module
-from itertools import groupby
 
 import typer
 from rich.text import Text
 
 from experiments.common.output import output_of, to_json
-from experiments.common.printed_numbers import Comparison, Origin, PrintedNumber, Progress, Reproduction, Verdict
-from experiments.common.screen import Part, print_parts, progress_bar, table_console
+from experiments.common.printed_numbers import Comparison, Paper, PrintedNumber, Progress, Verdict, read_paper
+from experiments.common.screen import Part, progress_bar, show
+from experiments.multipoint.command import Multipoint
+from experiments.pursuit.command import Pursuit
 from experiments.reproduce import Reproduce
 from sim.versions import versions
 
 PAPERS = ("interception", "pareto", "multipoint", "reachability", "pursuit")
-
-
-def reproduce_paper(name: str, progress: Progress) -> Reproduction:
-    """Compute the numbers of a paper of `PAPERS`; `progress` receives the fraction done."""
-    reproduction = import_module(f"experiments.{name}.published").reproduce(progress)
-    assert isinstance(reproduction, Reproduction)
-    return reproduction
-
-
+COMMANDS: Mapping[str, type] = {"multipoint": Multipoint, "pursuit": Pursuit}
+"""Options of the commands whose results are compared, by paper; the other papers have a module `published`."""
 DISAGREED = 1
 """Exit code if a number that should agree does not."""
 
 
+def reproduce_paper(paper: Paper, progress: Progress) -> tuple[Comparison, ...]:
+    """Compute and compare the numbers of a paper; `progress` receives the fraction done."""
+    if paper.name not in COMMANDS:
+        ours = import_module(f"experiments.{paper.name}.published").compute(progress)
+    else:
+        command, ours = import_module(f"experiments.{paper.name}.run").COMMAND, {}
+        for done, (source, numbers) in enumerate(paper.tables.items(), start=1):
+            results = command.to_json(command.report(COMMANDS[paper.name](**paper.options[source])))
+            ours[source] = [_value(results, number.name) for number in numbers]
+            progress(done / len(paper.tables))
+    progress(1.0)
+    return paper.compare(ours)
+
+
+def _value(results: object, key: str) -> float:
+    """Return the number at a key such as `nodes.0.velocity_m_s.1`; NaN if there is none."""
+    found: object = results
+    for part in key.split("."):
+        if isinstance(found, dict):
+            found = found[part]
+        elif found is not None:
+            found = found[int(part)]  # type: ignore[index]  # an array or a list
+    return math.nan if found is None else float(found)  # type: ignore[arg-type]
+
+
 def run(options: Reproduce) -> None:
     """Compute the numbers, write the file and print the tables."""
-    papers = PAPERS if options.paper is None else (options.paper,)
+    papers = [read_paper(name) for name in PAPERS if options.paper in (None, name)]
     with output_of(options) as written, progress_bar(options.quiet) as begin:
-        reproductions = [reproduce_paper(name, begin(name)) for name in papers]
-        summary = {"versions": versions(), "papers": [_summary(each) for each in reproductions]}
-        written.deliver("--json", to_json(summary))
-    if not options.quiet:
-        console = table_console(written.stdout_taken)
-        print_parts(console, _parts(reproductions, console.width))
-    for each in reproductions:
-        for number, ours in [(it.number, it.ours) for it in each.numbers if it.verdict is Verdict.DISAGREED]:
-            theirs = f"{TITLES[number.origin]}: {number.printed}"
-            typer.echo(
-                f"disagreed: {each.paper.name}, {number.source}, {number.name}: {theirs}, ours {ours.value}", err=True
-            )
-    if any(each.count(Verdict.DISAGREED) for each in reproductions):
+        compared = [reproduce_paper(paper, begin(paper.name)) for paper in papers]
+        summary = [_summary(paper, numbers) for paper, numbers in zip(papers, compared, strict=True)]
+        written.deliver("--json", to_json({"versions": versions(), "papers": summary}))
+    show(_lines(papers, compared), options.quiet, stdout_taken=written.stdout_taken)
+    wrong = [each for numbers in compared for each in numbers if each.verdict is Verdict.DISAGREED]
+    for each in wrong:
+        number = each.number
+        typer.echo(f"disagreed: {number.source}, {number.name}: {number.printed}, ours {each.ours.value}", err=True)
+    if wrong:
         raise typer.Exit(DISAGREED)
 
 
-def _summary(reproduction: Reproduction) -> dict[str, object]:
+def _count(numbers: Sequence[Comparison]) -> dict[str, int]:
+    """Return how many numbers have each verdict."""
+    return {verdict.value: sum(each.verdict is verdict for each in numbers) for verdict in Verdict}
+
+
+def _summary(paper: Paper, numbers: Sequence[Comparison]) -> dict[str, object]:
     return {
-        "paper": reproduction.paper.name,
-        "title": reproduction.paper.title,
-        "problems": [{"name": name, "hash": fingerprint} for name, fingerprint in reproduction.problems],
-        "verdicts": {verdict.value: reproduction.count(verdict) for verdict in Verdict},
-        "remarks": list(reproduction.paper.remarks),
-        "numbers": [_entry(each) for each in reproduction.numbers],
+        "paper": paper.name,
+        "title": paper.title,
+        "verdicts": _count(numbers),
+        "remarks": list(paper.remarks),
+        "numbers": [
+            {
+                "source": each.number.source,
+                "name": each.number.name,
+                "printed": each.number.printed,
+                "corrected": each.number.corrected,
+                "ours": each.ours.value if math.isfinite(each.ours.value) else None,
+                "other_model": each.ours.other,
+                "agrees_from": each.band[0],
+                "agrees_to": each.band[1],
+                "verdict": each.verdict.value,
+                "note": each.number.note,
+            }
+            for each in numbers
+        ],
     }
 
 
-def _entry(each: Comparison) -> dict[str, object]:
-    number, ours = each.number, each.ours
-    finite = ours.value is not None and abs(ours.value) < float("inf")
-    return {
-        "source": number.source,
-        "name": number.name,
-        "origin": number.origin.value,
-        "printed": number.printed,
-        "corrected": number.corrected,
-        "ours": ours.value if finite else None,
-        "other_model": ours.other,
-        "agrees_from": each.band.lowest,
-        "agrees_to": each.band.highest,
-        "agrees_by": "ours" if ours.spread is None else "printed",
-        "verdict": each.verdict.value,
-        "note": number.note,
-    }
-
-
-TITLES = {Origin.PRINTED: "paper prints", Origin.OTHER: "other program", Origin.EXACT: "exact"}
-ONE_RUN = ("paper, one run", "our median", "other model", "5 to 95 % of ours")
-
-
-def _parts(reproductions: Sequence[Reproduction], width: int) -> Iterator[Part]:
-    for reproduction in reproductions:
-        notes = list(dict.fromkeys(each.number.note for each in reproduction.numbers if each.number.note))
-        yield Text(reproduction.paper.title, style="bold")
-        for _, block in groupby(reproduction.numbers, lambda each: (each.number.origin, each.ours.spread is None)):
-            yield from _block([*block], notes, width)
-            yield ""
+def _lines(papers: Sequence[Paper], compared: Sequence[Sequence[Comparison]]) -> Iterator[Part]:
+    """Yield the numbers of each paper, with its notes and remarks, and the numbers of verdicts."""
+    for paper, numbers in zip(papers, compared, strict=True):
+        notes = list(dict.fromkeys(each.number.note for each in numbers if each.number.note))
+        yield Text(paper.title, style="bold")
+        yield from _rows(numbers, notes)
         yield from (f"({i}) {note}." for i, note in enumerate(notes, start=1))
-        yield from (f"* {remark}" for remark in reproduction.paper.remarks)
+        yield from (f"* {remark}" for remark in paper.remarks)
         yield ""
-    for reproduction in reproductions:
-        counts = [(reproduction.count(verdict), verdict.value) for verdict in Verdict]
-        listed = ", ".join(f"{count} {verdict}" for count, verdict in counts if count)
-        yield f"{reproduction.paper.name}: {len(reproduction.numbers)} numbers: {listed}"
+    for paper, numbers in zip(papers, compared, strict=True):
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in _count(numbers).items() if count)
+        yield f"{paper.name}: {len(numbers)} numbers: {counts}"
 
 
-def _block(block: Sequence[Comparison], notes: Sequence[str], width: int) -> Iterator[str]:
-    """Yield the lines of numbers of one origin; if `width` is too small for a line, the name stands above the rest."""
-    first = block[0]
-    titles = (TITLES[first.number.origin], "ours", "other model", "tolerance") if first.ours.spread is None else ONE_RUN
-    rows = [("", *titles, "verdict"), *(_row(each, notes) for each in block)]
-    if all(each.ours.other is None for each in block):
-        rows = [(*row[:3], *row[4:]) for row in rows]
-    sizes = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    above = sum(sizes) + 2 * len(sizes) > width
-    sources = ["", *(each.number.source for each in block)]
-    for before, source, (name, *cells, verdict) in zip(["", *sources], sources, rows, strict=False):
+def _rows(numbers: Sequence[Comparison], notes: Sequence[str]) -> Iterator[str]:
+    """Yield a line for each number, below its source."""
+    rows = [_row(each, notes) for each in numbers]
+    titles = ("", "published", "ours", "other model" if any(row[3] for row in rows) else "")
+    widths = [max(len(row[column]) for row in (titles, *rows)) for column in range(4)]
+    sources = [each.number.source for each in numbers]
+    for source, before, row in zip(["", *sources], ["", "", *sources], [(*titles, "verdict"), *rows], strict=False):
         if source != before:
             yield f"{source}:"
-        if above and name:
-            yield f"  {name}"
-        begin = "  " if above else f"  {name:<{sizes[0]}}"
-        yield "  ".join([begin, *(f"{cell:>{size}}" for cell, size in zip(cells, sizes[1:], strict=False)), verdict])
+        name, *cells = (f"{cell:>{width}}" for cell, width in zip(row, widths, strict=False) if width)
+        yield "  ".join(["", f"{row[0]:<{len(name)}}", *cells, row[4]])
 
 
 def _row(each: Comparison, notes: Sequence[str]) -> tuple[str, ...]:
     number, ours = each.number, each.ours
-    note = f" ({notes.index(number.note) + 1})" if number.note else ""
-    right = f", right: {number.corrected}" if number.corrected not in {None, number.printed} else ""
+    verdict = each.verdict.value
+    if ours.spread is not None:
+        verdict += f", 90 % of ours: {ours.spread[0]:.3g} to {ours.spread[1]:.3g}"
+    if number.corrected not in {None, number.printed}:
+        verdict += f", right: {number.corrected}"
+    if number.note:
+        verdict += f" ({notes.index(number.note) + 1})"
     other = "" if ours.other is None else _digits(number, ours.other)
-    verdict = f"{each.verdict.value}{right}{note}"
-    return number.name, number.printed, _digits(number, ours.value), other, _tolerance(each), verdict
+    return number.name, number.printed, _digits(number, ours.value), other, verdict
 
 
-def _digits(number: PrintedNumber, value: float | None) -> str:
+def _digits(number: PrintedNumber, value: float) -> str:
     """Return a computed number with one or two digits more than the printed one."""
-    if value is None:
-        return "none"
     known = Decimal(number.corrected or number.printed).as_tuple()
     assert isinstance(known.exponent, int)
     if "e" in number.printed and value:
@@ -139,10 +144,3 @@ def _digits(number: PrintedNumber, value: float | None) -> str:
     else:
         text = f"{value:.{max(0, -known.exponent) + 2}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
-
-
-def _tolerance(each: Comparison) -> str:
-    below, above = each.number.value - each.band.lowest, each.band.highest - each.number.value
-    if each.ours.spread is None and abs(above - below) <= 1e-3 * max(above, below):
-        return f"{0.5 * (below + above):.2g}"
-    return f"{each.band.lowest:.3g} .. {each.band.highest:.3g}"

@@ -6,7 +6,6 @@ import contextlib
 import csv
 import io
 import json
-import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
@@ -21,9 +20,7 @@ from experiments.common.errors import InputError, on_a_screen
 from sim.storage.files import replace_file, temporary_beside
 
 if TYPE_CHECKING:
-    import numpy as np
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from sim import HitEstimate, Results
 
@@ -207,28 +204,6 @@ def to_csv(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
     writer.writerow(columns)
     writer.writerows([_cell(value) for value in row] for row in rows)
     return text.getvalue()
-
-
-TRAJECTORIES = "trajectories.csv"
-"""Name of the file of trajectories in the folder of ``--out``."""
-STATE_COLUMNS = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
-CONTROL_COLUMNS = ("ux_m_s2", "uy_m_s2", "uz_m_s2")
-
-
-def trajectories_csv(
-    names: Sequence[str], columns: Sequence[str], tracks: Iterable[tuple[Sequence[Cell], NDArray[np.float64]]]
-) -> str:
-    """Return trajectories as CSV, one line for each craft and time.
-
-    A track has the values of the columns `names`, which identify it, and an array of shape (times, columns) in which a
-    value that does not exist is NaN. `columns` are the headings of the arrays, with their units.
-    """
-    rows = [
-        [*track, *(None if math.isnan(value) else value for value in row)]
-        for track, values in tracks
-        for row in values.tolist()
-    ]
-    return to_csv([*names, *columns], rows)
 
 
 def _cell(value: Cell) -> str:

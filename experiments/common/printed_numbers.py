@@ -2,30 +2,22 @@
 
 A file has the title of a paper, remarks about misprints that are not in its numbers, and tables. Each line of a table
 is a number: its name, and its digits as printed or the fields of `PrintedNumber`. Fields that many numbers share stand
-once, in their table or in ``[defaults]``; a note is a key of ``[notes]``.
+once, in their table or in ``[defaults]``; a note is a key of ``[notes]``. A table may have ``options`` of a command:
+the names of its numbers are then keys of the results of this command.
 """
 
 from __future__ import annotations
 
+import math
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import Enum
 from importlib import resources
+from typing import Any
 
 Progress = Callable[[float], None]
-
-
-class Origin(Enum):
-    """Where the number comes from that ours is compared with."""
-
-    PRINTED = "paper"
-    """The paper prints it."""
-    OTHER = "other implementation"
-    """Another implementation computed it; the paper prints no such number."""
-    EXACT = "closed form"
-    """It is the exact value of a closed form."""
 
 
 class Verdict(Enum):
@@ -44,25 +36,6 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True)
-class Band:
-    """An interval of numbers."""
-
-    lowest: float
-    highest: float
-
-    def __contains__(self, value: float) -> bool:
-        """Whether a number lies in the interval; a number that is not finite does not."""
-        return self.lowest <= value <= self.highest
-
-    @classmethod
-    def of_digits(cls, text: str, units: float, beyond: float = 0.0) -> Band:
-        """Return the numbers that differ from printed digits by some units of the last digit, plus `beyond`."""
-        # A few ulp more, so that a number on the boundary is inside.
-        half_width = (units * last_digit(text) + beyond) * (1.0 + 1e-9)
-        return cls(float(text) - half_width, float(text) + half_width)
-
-
-@dataclass(frozen=True)
 class PrintedNumber:
     """A number of a paper.
 
@@ -71,7 +44,7 @@ class PrintedNumber:
     source : str
         Table, equation or section.
     printed : str
-        Digits as printed, or of the number of another `origin`.
+        Digits as printed.
     corrected : str or None
         The correct number, if the printed one is known to be a misprint.
     unexplained : float
@@ -91,7 +64,6 @@ class PrintedNumber:
     corrected: str | None = None
     unexplained: float = 0.0
     note: str = ""
-    origin: Origin = Origin.PRINTED
     tolerance: float = 0.5
     agrees: tuple[float, float] | None = None
 
@@ -107,21 +79,21 @@ class Ours:
 
     Parameters
     ----------
-    value : float or None
-        None if the computation has no result.
+    value : float
+        NaN if the computation has no result.
     other : float or None
         The number of the other model with which the paper's number was probably computed, if one is known.
     beyond : float
         Added to the tolerance, for the rounding of the inputs of the computation.
-    spread : Band or None
+    spread : (float, float) or None
         Interval of most of our values, if ours is the median of many runs and the printed number is one run. The
         printed number must then lie in this interval.
     """
 
-    value: float | None
+    value: float
     other: float | None = None
     beyond: float = 0.0
-    spread: Band | None = None
+    spread: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -132,59 +104,49 @@ class Comparison:
     ours: Ours
 
     @property
-    def band(self) -> Band:
+    def band(self) -> tuple[float, float]:
         """Return the interval in which the numbers agree."""
         number, ours = self.number, self.ours
-        if ours.spread is not None:
-            return ours.spread
-        return Band(*number.agrees) if number.agrees else Band.of_digits(number.printed, number.tolerance, ours.beyond)
+        return ours.spread or number.agrees or interval(number.printed, number.tolerance, ours.beyond)
 
     @property
     def verdict(self) -> Verdict:
         """Return the result of the comparison."""
-        number, ours, value = self.number, self.ours, self.ours.value
-        if value is None or not abs(value) < float("inf"):
+        number, ours = self.number, self.ours
+        if not math.isfinite(ours.value):
             return Verdict.DISAGREED
         if number.corrected is not None:
-            right = Band.of_digits(number.corrected, number.tolerance, ours.beyond)
-            return Verdict.MISPRINT if (value if ours.other is None else ours.other) in right else Verdict.DISAGREED
-        if (value if ours.spread is None else number.value) in self.band:
+            right = interval(number.corrected, number.tolerance, ours.beyond)
+            return (
+                Verdict.MISPRINT
+                if _within(ours.value if ours.other is None else ours.other, right)
+                else Verdict.DISAGREED
+            )
+        if _within(ours.value if ours.spread is None else number.value, self.band):
             return Verdict.AGREED
-        if ours.other is not None and ours.other in self.band:
+        if ours.other is not None and _within(ours.other, self.band):
             return Verdict.EXPLAINED
-        known = value in Band.of_digits(number.printed, number.unexplained)
+        known = _within(ours.value, interval(number.printed, number.unexplained))
         return Verdict.NOT_EXPLAINED if known else Verdict.DISAGREED
 
 
 @dataclass(frozen=True)
 class Paper:
-    """The numbers of a paper by source, and remarks about other misprints."""
+    """The numbers of a paper by source, options of commands by source, and remarks about other misprints."""
 
     name: str
     title: str
     remarks: tuple[str, ...]
     tables: Mapping[str, tuple[PrintedNumber, ...]]
+    options: Mapping[str, Mapping[str, Any]]
 
-    def compare(self, ours: Mapping[str, Iterable[Ours | float | None]]) -> tuple[Comparison, ...]:
+    def compare(self, ours: Mapping[str, Sequence[Ours | float]]) -> tuple[Comparison, ...]:
         """Compare every number of the paper; ours are by source too, in the same order."""
         return tuple(
-            Comparison(number, value if isinstance(value, Ours) else Ours(None if value is None else float(value)))
+            Comparison(number, value if isinstance(value, Ours) else Ours(float(value)))
             for source, numbers in self.tables.items()
             for number, value in zip(numbers, ours[source], strict=True)
         )
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """A paper compared with our numbers, and the name and hash of each problem or scenario."""
-
-    paper: Paper
-    problems: tuple[tuple[str, str], ...]
-    numbers: tuple[Comparison, ...]
-
-    def count(self, verdict: Verdict) -> int:
-        """Return how many numbers have a verdict."""
-        return sum(each.verdict is verdict for each in self.numbers)
 
 
 def read_paper(name: str) -> Paper:
@@ -192,21 +154,31 @@ def read_paper(name: str) -> Paper:
     text = resources.files("experiments").joinpath("printed", f"{name}.toml").read_text(encoding="utf-8")
     data = tomllib.loads(text)
     tables: dict[str, tuple[PrintedNumber, ...]] = {}
+    options: dict[str, Mapping[str, Any]] = {}
     for table in data["tables"]:
         shared = data.get("defaults", {}) | table
-        numbers = shared.pop("numbers")
-        for number_name, digits in numbers.items():
+        options.setdefault(table["source"], shared.pop("options", {}))
+        for number_name, digits in shared.pop("numbers").items():
             known = shared | ({"printed": digits} if isinstance(digits, str) else digits)
             known |= {"note": data["notes"][known["note"]]} if "note" in known else {}
-            known["origin"] = Origin(known.get("origin", Origin.PRINTED))
             number = PrintedNumber(name=number_name, **known)
             tables[number.source] = (*tables.get(number.source, ()), number)
-    return Paper(name, data["title"], tuple(data["remarks"]), tables)
+    return Paper(name, data["title"], tuple(data["remarks"]), tables, options)
 
 
-def last_digit(text: str) -> float:
+def interval(digits: str, units: float, beyond: float = 0.0) -> tuple[float, float]:
+    """Return the interval of numbers that differ from digits by some units of the last one, plus `beyond`."""
+    # A few ulp more, so that a number on the boundary is inside.
+    half_width = (units * last_digit(digits) + beyond) * (1.0 + 1e-9)
+    return float(digits) - half_width, float(digits) + half_width
+
+
+def last_digit(digits: str) -> float:
     """Return one unit of the last digit of a number: 0.0001 for ``0.0690``."""
-    exponent = Decimal(text).as_tuple().exponent
-    if not isinstance(exponent, int):
-        raise ValueError(f"{text} is not a finite number")
+    exponent = Decimal(digits).as_tuple().exponent
+    assert isinstance(exponent, int)  # a finite number
     return float(Decimal(1).scaleb(exponent))
+
+
+def _within(value: float, ends: tuple[float, float]) -> bool:
+    return ends[0] <= value <= ends[1]

@@ -1,21 +1,11 @@
-"""What problems of all kinds share: the head of their results, and checks of their orbits, times and names.
-
-A problem is a frozen dataclass that `experiments.common.input_file` reads from a file. Its class variable ``kind`` is
-the kind of the file, and its fields ``name`` and ``description`` are those of the results.
-"""
+"""Rules that problems of several kinds share: checks of their orbits and times."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.common.errors import InputError
 from rendezvous.two_body import OrbitalElements, orbit_fault, semi_major_axis_m
-from sim.storage.codec import fingerprint
-from sim.versions import versions
 
 MAX_RADIANS, MIN_RADIANS = 1000.0, 1e-9
 """Angles of the orbit during a problem, within which linear motion is meaningful."""
@@ -24,37 +14,6 @@ _MAX_RADII = 1000.0
 """Maximum semi-major axis in radii of the planet: that of an orbit in metres, read as kilometres, is greater."""
 _STAR_M3_S2 = 1e19
 """Gravitational parameter between that of Jupiter, 1.27e17, and that of the Sun, 1.33e20."""
-
-
-class Problem(Protocol):
-    """A problem of any kind."""
-
-    @property
-    def name(self) -> str:
-        """Name of the results."""
-
-    @property
-    def description(self) -> str:
-        """A line about the problem."""
-
-
-def head(problem: Problem) -> dict[str, object]:
-    """Return the first keys of the JSON of a command."""
-    return {"versions": versions(), "problem": problem.name, "problem_hash": fingerprint(problem)}
-
-
-def need_finite(problem: Problem, *results: ArrayLike) -> None:
-    """Raise `InputError` if a result is not finite."""
-    if not all(np.isfinite(values).all() for values in results):
-        raise InputError(f"{problem.name}: the numbers are so large that results are not finite; check the units")
-
-
-def check_names(table: str, names: Sequence[str]) -> None:
-    """Raise ValueError if two tables of an array have the same name."""
-    for index, name in enumerate(names):
-        first = names.index(name)
-        if first < index:
-            raise ValueError(f"{table}.{index + 1}.name: {name!r} is also the name of {table} {first + 1}")
 
 
 def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:

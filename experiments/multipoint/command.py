@@ -9,8 +9,6 @@ import typer
 
 from experiments.common.options import FileOptions, Html, ProblemName, Settings, TrajectoryCsv
 
-GIVEN, BEST = "given", "best"
-
 
 @dataclass(frozen=True)
 class Multipoint(FileOptions):

@@ -25,7 +25,7 @@ from experiments.common.figure_style import (
     style,
 )
 from experiments.multipoint.file import Axes as FrameAxes
-from experiments.multipoint.report import CostCurve, Report, Scene
+from experiments.multipoint.report import CostCurve, Report, Scene, cost_curves
 from infoset.arrays import Floats
 
 _TRACK_POINTS = 241
@@ -40,12 +40,12 @@ _NODE: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize":
 _DOTTED: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (2, 2))}
 
 
-def draw_all(report: Report, curves: list[CostCurve]) -> Iterator[Figure]:
-    """Draw the figures of a report, one after the other; `curves` are those of `draw_times`."""
+def draw_all(report: Report) -> Iterator[Figure]:
+    """Draw the figures of a report, one after the other."""
     yield draw_path(report.scene)
     yield draw_control(report.scene, report.problem.max_control_m_s2)
     yield draw_costates(report.scene)
-    yield draw_times(report.scene, curves)
+    yield draw_times(report.scene, cost_curves(report.scene))
 
 
 @style()

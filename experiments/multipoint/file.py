@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -172,12 +173,6 @@ class MultipointProblem:
         return Tour(motion, DriftingTargets(targets, motion, states), start)
 
 
-def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) -> MultipointProblem:
-    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem, or it is not sound.
-    """
+def load_multipoint(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> MultipointProblem:
+    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
     return read_file(MultipointProblem, name_or_path, settings)

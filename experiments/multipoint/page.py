@@ -7,13 +7,14 @@ import numpy as np
 from experiments.common.display_units import length_unit
 from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
 from experiments.multipoint.file import Axes
-from experiments.multipoint.report import Scene
+from experiments.multipoint.report import Report
 
 MOMENTS = 401
 
 
-def multipoint_page(name: str, scene: Scene, bound_m_s2: float | None = None) -> str:
+def multipoint_page(report: Report) -> str:
     """Return the page of a path that visits targets as HTML."""
+    scene, bound_m_s2 = report.scene, report.problem.max_control_m_s2
     path, nodes = scene.path, scene.path.nodes
     time_s = np.unique(np.concatenate([np.linspace(scene.tour.start_s, scene.end_s, MOMENTS), nodes.arrive_s]))
     positions, control = path.state(time_s)[:, :3], path.control(time_s)
@@ -45,4 +46,4 @@ def multipoint_page(name: str, scene: Scene, bound_m_s2: float | None = None) ->
         f"{target} at {time * per_s:.6g} {clock}" for target, time in zip(scene.names, nodes.arrive_s, strict=True)
     )
     about = [f"cost I = {path.cost:.8g} m²/s³", f"order: {visits}", f"axes: {scene.axes_text}"]
-    return motion_page(f"Visits {name}", about, time_s, views, graphs)
+    return motion_page(f"Visits {report.problem.name}", about, time_s, views, graphs)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from experiments.common.display_units import Unit, time_unit
 from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
-from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, trajectories_csv
-from experiments.common.problems import head
+from experiments.common.problem_command import trajectories_csv
 from experiments.common.screen import Part, number_table
-from experiments.multipoint.command import BEST, GIVEN
 from experiments.multipoint.file import Axes, MultipointProblem
 from infoset.arrays import Floats
 from rendezvous.multipoint import BestOrder, Path, Tour, Visits
@@ -81,17 +80,12 @@ class CostCurve:
     cost: Floats
 
 
-def cost_curves(scene: Scene, progress: Callable[[float], None] = lambda _done: None) -> list[CostCurve]:
+def cost_curves(scene: Scene) -> list[CostCurve]:
     """Compute the cost against the time of each of the first nine visits, between its neighbours.
 
     A curve ends where no path exists, or where the path jumps to another local minimum.
     """
-    count = min(len(scene.order), _MAX_CURVES)
-    curves = []
-    for visit in range(count):
-        curves.append(_cost_curve(scene, visit))
-        progress((visit + 1) / count)
-    return curves
+    return [_cost_curve(scene, visit) for visit in range(min(len(scene.order), _MAX_CURVES))]
 
 
 def _cost_curve(scene: Scene, visit: int) -> CostCurve:
@@ -124,27 +118,13 @@ def _cost_curve(scene: Scene, visit: int) -> CostCurve:
     return CostCurve(known, np.array([costs[time] for time in known]))
 
 
-@dataclass(frozen=True)
-class Search:
-    """Choice of order and times, each "given" or "best"."""
-
-    order: str
-    times: str
-
-    @property
-    def title(self) -> str:
-        """Return the title of the progress bar."""
-        if self.order == GIVEN:
-            return "times"
-        return "orders and times" if self.times == BEST else "orders"
-
-
 @dataclass(frozen=True, eq=False)
 class Report:
     """Results of one command; `peak_m_s2` is the largest control."""
 
     problem: MultipointProblem
-    search: Search
+    order_chosen: Literal["given", "best"]
+    times_chosen: Literal["given", "best"]
     scene: Scene
     best: BestOrder
     peak_m_s2: float
@@ -153,23 +133,22 @@ class Report:
     def notes(self) -> list[str]:
         """Return what is known of the best order and of the best times."""
         notes = []
-        if self.search.order == BEST:
+        if self.order_chosen == "best":
             linear = isinstance(self.problem.tour, Tour)
-            proved = linear and self.search.times == GIVEN and not self.best.lost
+            proved = linear and self.times_chosen == "given" and not self.best.lost
             notes.append("no order that fits the times costs less" if proved else "the order is the best one found")
-        return [*notes, "the times are a local minimum"] if self.search.times == BEST else notes
+        return [*notes, "the times are a local minimum"] if self.times_chosen == "best" else notes
 
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
-    problem, path = report.problem, report.scene.path
+    path = report.scene.path
     return {
-        **head(problem),
         "units": f"m, s; axes: {report.scene.axes_text}",
-        "order_chosen": report.search.order,
-        "times_chosen": report.search.times,
+        "order_chosen": report.order_chosen,
+        "times_chosen": report.times_chosen,
         "cost_m2_s3": path.cost,
-        **({"cost_with_price_m2_s3": report.best.objective} if problem.price_per_s > 0.0 else {}),
+        **({"cost_with_price_m2_s3": report.best.objective} if report.problem.price_per_s > 0.0 else {}),
         "order": report.scene.names,
         "times_s": path.nodes.arrive_s,
         "time_gradient_m2_s4": path.time_gradient,
@@ -199,19 +178,20 @@ def _node_json(scene: Scene, index: int) -> dict[str, object]:
     }
 
 
-def trajectories(scene: Scene) -> str:
+def trajectories(report: Report) -> str:
     """Return the trajectories of the chaser and of the targets, as CSV; only the chaser has a control."""
-    times, count = scene.times, len(scene.tour.targets.targets)
-    chaser = np.column_stack([times, scene.path.state(times), scene.path.control(times)])
-    tracks: list[tuple[list[Cell], Floats]] = [(["chaser"], chaser)]
-    for target in range(count):
-        states = scene.tour.targets.states(np.full(len(times), target), times)
-        name = scene.tour.targets.targets[target].name
-        tracks.append(([name], np.column_stack([times, states, np.full((len(times), 3), np.nan)])))
-    return trajectories_csv(["craft"], ["time_s", *STATE_COLUMNS, *CONTROL_COLUMNS], tracks)
+    scene = report.scene
+    times, none = scene.times, np.full((len(scene.times), 3), np.nan)
+    tracks: list[tuple[list[str], list[Floats]]] = [
+        (["chaser"], [times, scene.path.state(times), scene.path.control(times)])
+    ]
+    for index, target in enumerate(scene.tour.targets.targets):
+        states = scene.tour.targets.states(np.full(len(times), index), times)
+        tracks.append(([target.name], [times, states, none]))
+    return trajectories_csv(["craft"], tracks)
 
 
-def report_parts(report: Report) -> Iterator[Part]:
+def report_lines(report: Report) -> Iterator[Part]:
     """Yield the cost, the visits and the extent of the search, for the screen."""
     path, nodes = report.scene.path, report.scene.path.nodes
     yield f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"
@@ -234,10 +214,10 @@ def report_parts(report: Report) -> Iterator[Part]:
             f"{np.linalg.norm(path.jumps[index, :3]):.4g}",
         )
     yield table
-    if BEST not in (report.search.order, report.search.times):
+    if "best" not in (report.order_chosen, report.times_chosen):
         return
     text = f"{report.best.evaluations} paths computed"
-    if report.search.order == BEST:
+    if report.order_chosen == "best":
         text += f", {report.best.nodes} partial orders examined"
         text += f", {len(report.best.lost)} left out because no trajectory was found" if report.best.lost else ""
         text += f"; {report.best.unfit} orders do not fit the times" if report.best.unfit else ""

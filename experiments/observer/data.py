@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
-import re
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from experiments.common.errors import InputError, shown
+from experiments.common.file_kinds import read_input
 from experiments.observer.command import MAX_STEPS, Errors
 from experiments.observer.file import ObserverProblem
 from infoset import Zonotope
@@ -23,7 +21,6 @@ from infoset.observer_sets import Set, polytope_of
 MAX_CSV_BYTES = 10_000_000
 MAX_STATE = 1e40
 """Maximum state of which sets are computed."""
-_STEP = re.compile(r"[0-9]{1,15}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,70 +99,33 @@ def _padded(inputs: Floats | None, steps: int, size: int) -> Floats:
 
 
 def read_csv(file: Path, outputs: int, inputs: int) -> Data:
-    """Read measurements and inputs from a CSV file.
+    """Read measurements and inputs from a CSV file with a row for each step.
 
-    Raise `InputError` if the file cannot be read, a column is missing or unknown, or a cell is not a number.
+    Raise `InputError` if the file cannot be read, its header is another one, or a cell is not a number.
     """
+    names = [f"y{number}" for number in range(1, outputs + 1)] + [f"u{number}" for number in range(1, inputs + 1)]
+    form = f"the header must be {','.join(names)}, and each row has their numbers; an empty cell of y is missing"
+    content = read_input(file, "data file", MAX_CSV_BYTES, form)
     try:
-        with file.open("rb") as opened:
-            content = opened.read(MAX_CSV_BYTES + 1)
-        if len(content) > MAX_CSV_BYTES:
-            raise InputError(f"--data: {file}: is larger than {MAX_CSV_BYTES} bytes; divide it")
-        rows = list(csv.reader(io.StringIO(content.decode("utf-8-sig"), newline="")))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "is not a CSV file in UTF-8"
-        raise InputError(f"--data: {file}: {reason}; give a CSV file with a header") from None
-    wanted = [f"y{number}" for number in range(1, outputs + 1)] + [f"u{number}" for number in range(1, inputs + 1)]
-    header = [cell.strip() for cell in rows[0]] if rows else []
-    unknown = [name for name in header if name not in (*wanted, "k")]
-    missing = [name for name in wanted if name not in header]
-    if unknown or missing or len(set(header)) < len(header):
-        repeated = [name for name in header if header.count(name) > 1]
-        problem = f"column {missing[0]} is missing" if missing else f"wrong column {shown((unknown or repeated)[0])}"
-        raise InputError(
-            f"--data: {file}: {problem}; the header must be {','.join(wanted)} (and k, optionally), found "
-            f"{shown(','.join(header))}"
-        )
-    while rows and not rows[-1]:
-        rows.pop()
-    # In a file of one column an empty line is an empty cell.
-    body = [(line, row or [""]) for line, row in enumerate(rows[1:], start=2) if row or len(header) == 1]
-    if not 1 <= len(body) <= MAX_STEPS:
-        raise InputError(f"--data: {file}: has {len(body)} steps; 1 to {MAX_STEPS} are possible")
-    if "k" in header:
-        _need_successive(file, body, header.index("k"))
-    values = np.array([_numbers(file, line, row, header, wanted) for line, row in body])
-    return Data(values[:, :outputs], values[:, outputs:], None, f"measurements of {file.name}")
-
-
-def _need_successive(file: Path, body: list[tuple[int, list[str]]], column: int) -> None:
-    """Check that the steps in column k are successive whole numbers."""
-    texts = [(line, row[column].strip()) for line, row in body if column < len(row)]
-    for (_, before), (line, text) in pairwise([(0, ""), *texts]):
-        if not _STEP.fullmatch(text) or (before and int(text) != int(before) + 1):
-            raise InputError(
-                f"--data: {file}: line {line}, k: steps must be successive whole numbers, found {shown(text)}; "
-                "write a row for each step, with empty cells of y where there is no measurement"
-            )
-
-
-def _numbers(file: Path, line: int, row: list[str], header: list[str], wanted: list[str]) -> list[float]:
-    """Return the numbers of a row in the order of the columns that are wanted."""
-    if len(row) != len(header):
-        raise InputError(f"--data: {file}: line {line} has {len(row)} cells, and the header has {len(header)}")
-    cells = dict(zip(header, row, strict=True))
-    numbers = []
-    for name in wanted:
-        text = cells[name].strip()
+        table = list(csv.reader(content.decode("utf-8-sig").rstrip().splitlines()))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"--data: {file}: is not a CSV file in UTF-8: {error}") from None
+    if not table or [cell.strip() for cell in table[0]] != names:
+        raise InputError(f"--data: {file}: {form}; found the header {shown(','.join(table[0]) if table else '')}")
+    if not 2 <= len(table) <= MAX_STEPS + 1:
+        raise InputError(f"--data: {file}: has {len(table) - 1} steps; 1 to {MAX_STEPS} are possible")
+    rows = []
+    for line, cells in enumerate(table[1:], start=2):
         try:
-            number = float(text) if text else math.nan
+            row = [float(cell.strip() or "nan") for cell in cells or [""]]  # a file of one column has empty lines
         except ValueError:
-            number = math.inf
-        is_missing = not text and name.startswith("y")
-        if not is_missing and not abs(number) <= MAXIMUM:
+            row = []
+        too_large = any(abs(value) > MAXIMUM for value in row)
+        if len(row) != len(names) or too_large or any(map(math.isnan, row[outputs:])):
             raise InputError(
-                f"--data: {file}: line {line}, {name}: must be a number of at most {MAXIMUM:g} in size, found "
-                f"{shown(text)}; an empty cell of y is a missing measurement; an input of zero is written 0"
+                f"--data: {file}: line {line}: must have {len(names)} numbers of at most {MAXIMUM:g} in size, found "
+                f"{shown(','.join(cells))}; only a cell of y may be empty"
             )
-        numbers.append(number)
-    return numbers
+        rows.append(row)
+    values = np.array(rows)
+    return Data(values[:, :outputs], values[:, outputs:], None, f"measurements of {file.name}")

@@ -19,11 +19,10 @@ from infoset.arrays import Floats
 _MAX_OUTLINES = 60
 
 
-def draw_all(report: Report) -> Iterator[Figure]:
-    """Draw the figures of a report, one after the other."""
+def draw_all(report: Report) -> Iterator[Figure | None]:
+    """Draw the figures of a report, one after the other; None for the sets of more than two states."""
     yield draw_bounds(report)
-    if len(report.problem.names) == 2:
-        yield draw_sets(report)
+    yield draw_sets(report) if len(report.problem.names) == 2 else None
 
 
 @style()

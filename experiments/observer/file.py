@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -172,12 +173,6 @@ def _series(key: str, rows: Sequence[Row], size: int) -> Floats | None:
     return values if rows else None
 
 
-def load_observer(name_or_path: str, settings: Sequence[str] | None = None) -> ObserverProblem:
-    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem, or it is not sound.
-    """
+def load_observer(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> ObserverProblem:
+    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
     return read_file(ObserverProblem, name_or_path, settings)

@@ -9,7 +9,6 @@ import numpy as np
 from rich.table import Table
 
 from experiments.common.output import Cell, to_csv
-from experiments.common.problems import head
 from experiments.common.screen import Part, number_table
 from experiments.observer.data import Data
 from experiments.observer.file import ObserverProblem
@@ -49,21 +48,25 @@ def contains(estimate: Estimate, state: Floats) -> bool:
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
-    problem, where = report.problem, report.inconsistency
-    steps = [_step_json(estimate) for estimate in report.estimates]
-    for step, estimate in zip(steps, report.smoothed or (), strict=False):
-        step["smoothed"] = _bounds(estimate)
-    for step, state in zip(steps, () if report.data.states is None else report.data.states, strict=False):
-        step["state"] = state
+    where = report.inconsistency
+    steps: list[dict[str, object]] = [
+        {"k": estimate.step, **_bounds(estimate), "empty": bool(estimate.is_empty)} for estimate in report.estimates
+    ]
+    for index, step in enumerate(steps):
+        if report.estimates[index].states == 2:
+            step["vertices"] = report.estimates[index].polygons.polygon()
+        if report.smoothed is not None:
+            step["smoothed"] = _bounds(report.smoothed[index])
+        if report.data.states is not None:
+            step["state"] = report.data.states[index]
     return {
-        **head(problem),
         "data": report.data.origin,
-        "states": problem.names,
+        "states": report.problem.names,
         "steps": steps,
         "final": _bounds(report.estimates[-1]),
-        "inconsistency": None
-        if not report.contradicted
-        else {"k": int(where.step), "output": int(where.output) + 1, "excess": float(where.excess)},
+        "inconsistency": {"k": int(where.step), "output": int(where.output) + 1, "excess": float(where.excess)}
+        if report.contradicted
+        else None,
     }
 
 
@@ -74,29 +77,20 @@ def _bounds(estimate: Estimate) -> dict[str, object]:
     return {"lower": estimate.lower, "upper": estimate.upper}
 
 
-def _step_json(estimate: Estimate) -> dict[str, object]:
-    step: dict[str, object] = {"k": estimate.step, **_bounds(estimate), "empty": bool(estimate.is_empty)}
-    if estimate.states == 2:
-        step["vertices"] = estimate.polygons.polygon()
-    return step
-
-
 def report_csv(report: Report) -> str:
-    """Return the bounds of each step as CSV."""
+    """Return the bounds of each step as CSV; those of an empty set are empty cells."""
     states = range(1, len(report.problem.names) + 1)
-    kinds = ["", "smoothed_"] if report.smoothed is not None else [""]
-    ends = [f"x{state}_{kind}{end}" for kind in kinds for state in states for end in ("lower", "upper")]
-    true = [] if report.data.states is None else [f"x{state}" for state in states]
-    rows: list[list[Cell]] = []
-    for index, estimate in enumerate(report.estimates):
-        row: list[Cell] = [estimate.step, bool(estimate.is_empty)]
-        for sets in (report.estimates, *([report.smoothed] if report.smoothed is not None else [])):
-            pairs = np.column_stack([sets[index].lower, sets[index].upper]).ravel()
-            row += [None if np.isnan(value) else float(value) for value in pairs]
-        if report.data.states is not None:
-            row += report.data.states[index].tolist()
-        rows.append(row)
-    return to_csv(["k", "empty", *ends, *true], rows)
+    sets = {"": report.estimates, **({} if report.smoothed is None else {"smoothed_": report.smoothed})}
+    columns = [f"x{state}_{kind}{end}" for kind in sets for state in states for end in ("lower", "upper")]
+    blocks = [np.array([np.column_stack([each.lower, each.upper]).ravel() for each in sets[kind]]) for kind in sets]
+    if report.data.states is not None:
+        columns += [f"x{state}" for state in states]
+        blocks.append(report.data.states)
+    rows: list[list[Cell]] = [
+        [estimate.step, bool(estimate.is_empty), *(None if np.isnan(value) else value for value in row)]
+        for estimate, row in zip(report.estimates, np.hstack(blocks).tolist(), strict=True)
+    ]
+    return to_csv(["k", "empty", *columns], rows)
 
 
 def times(report: Report) -> tuple[Floats, str]:
@@ -124,7 +118,7 @@ def _bounds_table(names: Sequence[str], estimates: Sequence[Estimate]) -> Table:
     return table
 
 
-def report_parts(report: Report) -> Iterator[Part]:
+def report_lines(report: Report) -> Iterator[Part]:
     """Yield the bounds of the last steps and a contradiction, for the screen."""
     problem, count = report.problem, len(report.estimates)
     missing = int(np.isnan(report.data.measured).any(axis=1).sum())

@@ -32,11 +32,5 @@ class Pareto(FileOptions):
             help="Preferred meeting, for example x_m=0,z_m=50. The nearest Pareto-optimal meeting is also evaluated.",
         ),
     ] = None
-    samples: Annotated[
-        int,
-        typer.Option(
-            metavar="N", min=2, max=10_001, help="Number of times in each trajectory of the JSON and the CSV file."
-        ),
-    ] = 31
     csv: TrajectoryCsv = None
     html: Html = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
@@ -102,12 +103,6 @@ class ParetoProblem:
         return Encounter(craft, self.duration_s, free, fixed, self.meet)
 
 
-def load_pareto(name_or_path: str, settings: Sequence[str] | None = None) -> ParetoProblem:
-    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem, or it is not sound.
-    """
+def load_pareto(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> ParetoProblem:
+    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
     return read_file(ParetoProblem, name_or_path, settings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from importlib import resources
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from experiments.common.display_units import length_unit
 from experiments.common.hill_axes import AXES, AXIS_TITLES
 from experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
+from experiments.pareto.report import Report
 from infoset.arrays import Floats
 from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
@@ -17,9 +17,9 @@ MOMENTS = 121
 _SET_POINTS = 600
 
 
-def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str, Floats]) -> str:
-    """Return the page of an encounter as HTML, with Pareto-optimal meetings by the rule of their choice."""
-    encounter = solution.encounter
+def pareto_page(report: Report) -> str:
+    """Return the page of an encounter as HTML."""
+    solution, encounter = report.solution, report.solution.encounter
     free = [component.name.lower() for component in encounter.free]
     time_s = np.linspace(min(craft.start_s for craft in encounter.craft), encounter.meeting_s, MOMENTS)
     paths = [_affine(solution, index, time_s) for index in range(len(solution.costs))]
@@ -57,13 +57,13 @@ def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str,
         ],
         "meeting_base_m": encounter.base[:3],
         "opening": encounter.opening[:3],
-        "selections": [{"name": rule.replace("_", " "), "point": point} for rule, point in selections.items()],
+        "selections": [{"name": rule.replace("_", " "), "point": point} for rule, point in report.selections.items()],
         # If all craft have the same M, the Pareto set is the convex hull of the ideals; else it is shown as points.
         "pareto_hull": faces_of(solution.ideals)[0] if hull else None,
         "pareto_points": [] if hull else pareto_set(solution, simplex_weights(len(tracks), _SET_POINTS)).points,
     }
     script = (resources.files("experiments.pareto") / "page.js").read_text(encoding="utf-8")
-    return motion_page(f"Encounter {name}", about, time_s, views, own_script=script, own_data=data)
+    return motion_page(f"Encounter {report.problem.name}", about, time_s, views, own_script=script, own_data=data)
 
 
 def _affine(solution: EncounterSolution, index: int, time_s: Floats) -> tuple[Floats, Floats]:

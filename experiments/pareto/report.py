@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from experiments.common.hill_axes import AXES
-from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, trajectories_csv
-from experiments.common.problems import head
+from experiments.common.problem_command import trajectories_csv
 from experiments.common.screen import Part, number, number_table
 from experiments.pareto.file import TERMINAL, ParetoProblem
 from infoset.arrays import Floats
 from rendezvous.pareto import BoundCheck, Coalitions, DurationSweep, EncounterSolution, Feasibility, distances
 
+SAMPLES = 31
+"""Number of times in a trajectory of the CSV file."""
 _ZERO = 1e-9
 """Components of a meeting smaller than this part of the largest one are printed as zero."""
 
@@ -37,12 +36,10 @@ class Report:
     sweep: DurationSweep
 
 
-def report_json(report: Report, samples: int) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`, with trajectories at ``samples`` times."""
-    problem, solution = report.problem, report.solution
-    encounter = problem.encounter
+def report_json(report: Report) -> dict[str, object]:
+    """Return the results for `experiments.common.output.to_json`."""
+    solution, encounter = report.solution, report.problem.encounter
     return {
-        **head(problem),
         "units": {
             "axes": AXES,
             "costate_at_meeting": "m/s^3 of the position's three, m/s^2 of the velocity's",
@@ -73,7 +70,6 @@ def report_json(report: Report, samples: int) -> dict[str, object]:
             "cost_squared_m2_s3": report.sweep.cost_squared,
             "ideal_cost_squared_m2_s3": report.sweep.ideal_cost_squared,
         },
-        "samples": [_trajectory_json(solution, index, samples) for index in range(len(solution.costs))],
     }
 
 
@@ -85,15 +81,7 @@ def _named_state(solution: EncounterSolution, point: Floats) -> dict[str, float]
 def _craft_json(report: Report, index: int) -> dict[str, object]:
     solution = report.solution
     cost = solution.costs[index]
-    bound: dict[str, object] = {}
-    if report.bounds:
-        check = report.bounds[index]
-        bound = {
-            "max_control_m_s2": report.problem.max_control_m_s2,
-            "min_peak_control_m_s2": check.min_peak_m_s2,
-            "feasibility": check.feasibility,
-        }
-    return {
+    values: dict[str, object] = {
         "name": cost.craft.name,
         "weight": cost.craft.weight,
         "ideal": _named_state(solution, cost.ideal),
@@ -103,13 +91,16 @@ def _craft_json(report: Report, index: int) -> dict[str, object]:
         "impulse_m_s": report.impulses_m_s[index],
         "peak_control_m_s2": report.peaks_m_s2[index],
         "costate_at_meeting": solution.plan(index).costate,
-        **bound,
     }
+    if report.bounds:
+        check = report.bounds[index]
+        values |= {"min_peak_control_m_s2": check.min_peak_m_s2, "feasibility": check.feasibility}
+    return values
 
 
 def _coalitions_json(coalitions: Coalitions | None, names: list[str]) -> dict[str, object]:
     if coalitions is None:
-        return {"coalitions": {}, "shapley_m2_s3": [], "transfers_m2_s3": [], "core": None}
+        return {"coalitions": {}}
     return {
         "coalitions": {
             "+".join(names[member] for member in coalition.members): {
@@ -124,28 +115,17 @@ def _coalitions_json(coalitions: Coalitions | None, names: list[str]) -> dict[st
     }
 
 
-def _trajectory_json(solution: EncounterSolution, index: int, samples: int) -> dict[str, object]:
-    trajectory = solution.plan(index).sample(samples)
-    return {
-        "name": solution.costs[index].craft.name,
-        "time_s": trajectory.time_s,
-        "position_m": trajectory.state[:, :3],
-        "velocity_m_s": trajectory.state[:, 3:],
-        "control_m_s2": trajectory.control_m_s2,
-    }
+def trajectories(report: Report) -> str:
+    """Return the trajectories as CSV."""
+    plans = [report.solution.plan(index).sample(SAMPLES) for index in range(len(report.solution.costs))]
+    tracks = [
+        ([cost.craft.name], [plan.time_s, plan.state, plan.control_m_s2])
+        for cost, plan in zip(report.solution.costs, plans, strict=True)
+    ]
+    return trajectories_csv(["craft"], tracks)
 
 
-def trajectories(report: Report, samples: int) -> str:
-    """Return the trajectories at ``samples`` times, as CSV."""
-    solution = report.solution
-    tracks = []
-    for index, cost in enumerate(solution.costs):
-        sampled = solution.plan(index).sample(samples)
-        tracks.append(([cost.craft.name], np.column_stack([sampled.time_s, sampled.state, sampled.control_m_s2])))
-    return trajectories_csv(["craft"], ["time_s", *STATE_COLUMNS, *CONTROL_COLUMNS], tracks)
-
-
-def report_parts(report: Report) -> Iterator[Part]:
+def report_lines(report: Report) -> Iterator[Part]:
     """Yield the meeting, the costs, the choices and the coalitions, for the screen."""
     solution, encounter = report.solution, report.problem.encounter
     names = [cost.craft.name for cost in solution.costs]
@@ -160,17 +140,22 @@ def report_parts(report: Report) -> Iterator[Part]:
     for name, *row in zip(names, *columns, strict=True):
         table.add_row(name, *(number(float(value)) for value in row))
     yield table
-    yield f"group loss {float(solution.group_loss()):.6g} m^2/s^3"
-    yield from _exceeded(report)
-    yield ""
+    bound = report.problem.max_control_m_s2 or 0.0
+    for name, check in zip(names, report.bounds, strict=False):
+        if check.feasibility is Feasibility.ANOTHER_CONTROL:
+            yield (
+                f"{name}: the minimum-energy control exceeds the bound {bound:g} m/s^2 by "
+                f"{check.peak_m_s2 / bound - 1.0:.2%}; another control satisfies the bound (the smallest possible peak "
+                f"is {check.min_peak_m_s2:.6g} m/s^2)"
+            )
     free = [component.name.lower() for component in encounter.free]
     titles = [f"{name}, {'m' if len(name) == 1 else 'm/s'}" for name in free]
     chosen = number_table("choice", *titles, "group loss\nm^2/s^3")
     scale = max(float(abs(point).max()) for point in report.selections.values())
-    for name, point in report.selections.items():
+    for rule, point in report.selections.items():
         values = (f"{value if abs(value) > _ZERO * scale else 0.0:.6g}" for value in point)
-        chosen.add_row(name.replace("_", " "), *values, number(float(solution.group_loss(point))))
-    yield chosen
+        chosen.add_row(rule.replace("_", " "), *values, number(float(solution.group_loss(point))))
+    yield from ("", chosen)
     if report.coalitions is None:
         yield "the coalitions are not computed: there are too many craft"
         return
@@ -178,15 +163,3 @@ def report_parts(report: Report) -> Iterator[Part]:
     shares = ", ".join(f"{name} {number(float(value))}" for name, value in pairs)
     yield f"Shapley value of the excess, m^2/s^3: {shares}"
     yield report.coalitions.core.reason
-
-
-def _exceeded(report: Report) -> list[str]:
-    """Return a line for each craft whose minimum-energy control exceeds the bound."""
-    bound = report.problem.max_control_m_s2 or 0.0
-    return [
-        f"{cost.craft.name}: the minimum-energy control exceeds the bound {bound:g} m/s^2 by "
-        f"{check.peak_m_s2 / bound - 1.0:.2%}; another control satisfies the bound (the smallest possible peak is "
-        f"{check.min_peak_m_s2:.6g} m/s^2)"
-        for cost, check in zip(report.solution.costs, report.bounds, strict=False)
-        if check.feasibility is Feasibility.ANOTHER_CONTROL
-    ]

@@ -9,8 +9,6 @@ import typer
 
 from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings, TrajectoryCsv
 
-ROWS = "thrust_ratio=0:0.8:17"
-
 
 @dataclass(frozen=True)
 class Pursuit(FileOptions):
@@ -73,17 +71,16 @@ class PursuitMap(FileOptions):
 
     problem: ProblemName = "geo-pursuit"
     columns: Annotated[
-        str | None,
+        str,
         typer.Option(
             "--x",
             metavar="KEY=FROM:TO:N",
-            help="Parameter of the columns: first value, last value, number of values. Default: phase_deg in a range "
-            "that depends on the pursuer's thrust.",
+            help="Parameter of the columns: first value, last value, number of values.",
         ),
-    ] = None
+    ] = "phase_deg=-30:30:61"
     rows: Annotated[
         str, typer.Option("--y", metavar="KEY=FROM:TO:N", help="Parameter of the rows, in the same form.")
-    ] = ROWS
+    ] = "thrust_ratio=0:0.8:17"
     settings: Settings = None
     certify: Annotated[
         bool,

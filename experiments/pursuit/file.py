@@ -107,11 +107,5 @@ class PursuitProblem:
 
 
 def load_pursuit(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> PursuitProblem:
-    """Read a built-in problem or a problem file; the parameters are those of `read_file`.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem or file, or it is invalid.
-    """
+    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
     return read_file(PursuitProblem, name_or_path, settings)

@@ -1,39 +1,36 @@
-"""`infoset pursuit-map`: computation, files and tables."""
+"""`infoset pursuit-map`: computation, files and summary."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.errors import InputError, shown
-from experiments.common.input_file import changed, keys_of, numeric_key, similar_key, to_toml
-from experiments.common.output import Cell, output_of, to_csv, to_json
-from experiments.common.problems import head
-from experiments.common.screen import figure_files, progress_bar, show
-from experiments.pursuit.command import ROWS, PursuitMap
-from experiments.pursuit.file import PursuitProblem, load_pursuit
-from experiments.pursuit.report import STATUS_WORDS, counted
+from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
+from experiments.common.output import Cell, to_csv
+from experiments.common.problem_command import ProblemCommand
+from experiments.common.screen import BeginProgress
+from experiments.pursuit.command import PursuitMap
+from experiments.pursuit.file import PursuitProblem
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, Game, PointStatus, capture_map
 from rendezvous.two_body import OrbitalElements
 
-FIGURE = "figure-map"
-MAX_VALUES, MAX_POINTS = 2000, 100_000
+MAX_POINTS = 100_000
 RATIOS = ("phase_deg", "thrust_ratio", "mass_ratio")
 """Parameters besides the keys of a file: lead of the evader in true longitude, its thrust and mass by the pursuer's."""
-COLUMNS = "phase_deg=-30:30:61"
-COLUMNS_OF_STATES = "mass_ratio=0.5:1.5:21"
-PHASE_BY_THRUST = 12.0
-"""Half the span of the columns in radians, per thrust acceleration over gravity: about the change of phase in one
-revolution."""
-
-
-_COMPUTED = (PointStatus.FOLLOWED, PointStatus.NEIGHBOUR)
+STATUS_WORDS = {
+    PointStatus.FOLLOWED: "solved from scratch",
+    PointStatus.NEIGHBOUR: "continued from a neighbour",
+    PointStatus.NOT_CERTIFIED: "not certified",
+    PointStatus.ESCAPES: "escape",
+    PointStatus.PROPELLANT_EXHAUSTED: "propellant exhausted",
+    PointStatus.NO_GAME: "no game",
+}
 
 
 @dataclass(frozen=True)
@@ -44,47 +41,31 @@ class Axis:
     values: NDArray[np.float64]
 
 
-def run(options: PursuitMap) -> None:
-    """Solve the games of the grid, write the files and print a summary."""
-    problem = load_pursuit(options.problem, options.settings)
-    x = read_axis("--x", _columns(problem) if options.columns is None else options.columns)
-    y = read_axis("--y", options.rows)
-    if x.parameter == y.parameter:
-        raise InputError(f"--y: {y.parameter} is also the parameter of --x; choose another, for example --y {ROWS}")
-    points = len(x.values) * len(y.values)
-    if points > MAX_POINTS:
-        raise InputError(f"--x and --y: {points} points are over {MAX_POINTS}; choose fewer")
-    with output_of(options, ("problem.toml", "results.json", "map.csv", *figure_files(FIGURE))) as written:
-        began_s = perf_counter()
-        with progress_bar(options.quiet) as begin:
-            solved = capture_map(
-                lambda column, row: game_at(problem, {x.parameter: column, y.parameter: row}),
-                x.values,
-                y.values,
-                follow_all=options.certify,
-                progress=begin("map"),
-            )
-        elapsed_s = perf_counter() - began_s
-        written.save("problem.toml", to_toml(problem))
-        written.save("results.json", to_json(_summary(problem, x, y, solved, elapsed_s)), "--json")
-        written.save("map.csv", to_csv(*_table(x, y, solved)), "--csv")
-        if options.out is not None:
-            from experiments.pursuit.map_figure import draw_map
+@dataclass(frozen=True)
+class MapReport:
+    """Results of one command."""
 
-            written.figure(FIGURE, draw_map(solved, x.parameter, y.parameter))
-    lines = [f"{problem.name}: {points} points in {elapsed_s:.1f} s: {counted(solved)}"]
-    if solved.capture_s.count():
-        minimum, maximum = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))
-        lines.append(f"capture times from {minimum:.4f} to {maximum:.4f} h")
-    if written.wants("--json") or written.wants("--csv"):
-        words = (f'"{status.value}" is {STATUS_WORDS[status]}' for status in _COMPUTED)
-        lines.append(f"status in the files: {', '.join(words)}")
-    if solved.count(PointStatus.NEIGHBOUR):
-        lines.append(
-            "points continued from a neighbour are local saddle points: earlier captures are not excluded there; "
-            "--certify solves every point from scratch"
-        )
-    show(lines, options.quiet, stdout_taken=written.stdout_taken)
+    problem: PursuitProblem
+    x: Axis
+    y: Axis
+    solved: CaptureMap
+
+
+def solve_map(problem: PursuitProblem, options: PursuitMap, begin: BeginProgress) -> MapReport:
+    """Return the solutions of the games of the grid."""
+    x, y = read_axis("--x", options.columns), read_axis("--y", options.rows)
+    if x.parameter == y.parameter:
+        raise InputError(f"--y: {y.parameter} is also the parameter of --x; choose another")
+    if len(x.values) * len(y.values) > MAX_POINTS:
+        raise InputError(f"--x and --y: there are more than {MAX_POINTS} points; choose fewer")
+    solved = capture_map(
+        lambda column, row: game_at(problem, {x.parameter: column, y.parameter: row}),
+        x.values,
+        y.values,
+        follow_all=options.certify,
+        progress=begin("map"),
+    )
+    return MapReport(problem, x, y, solved)
 
 
 def game_at(problem: PursuitProblem, values: Mapping[str, float]) -> Game:
@@ -120,62 +101,81 @@ def _true_longitude_rad(orbit: OrbitalElements) -> float:
     return orbit.raan_rad + orbit.argument_of_perigee_rad + orbit.true_anomaly_rad
 
 
-def _columns(problem: PursuitProblem) -> str:
-    """Return the default columns."""
-    if problem.pursuer.orbit is None or problem.evader.orbit is None:
-        return COLUMNS_OF_STATES
-    game = problem.game
-    gravity_m_s2 = game.gravity.parameter_m3_s2 / math.hypot(*game.pursuer.position_m) ** 2
-    half = math.degrees(PHASE_BY_THRUST * game.pursuer.acceleration_m_s2 / gravity_m_s2)
-    # One digit, for round ticks.
-    half = float(f"{min(90.0, max(1e-6, half)):.0e}")
-    return f"phase_deg={-half!r}:{half!r}:61"
-
-
 def read_axis(option: str, text: str) -> Axis:
     """Read KEY=FROM:TO:N; raise `InputError` if it has another form, an unknown parameter, or a value out of range."""
-    example = f"for example {option} {COLUMNS if option == '--x' else ROWS}"
     key, _, span = text.partition("=")
     if key not in RATIOS and numeric_key(PursuitProblem, key) is None:
         guess = similar_key(key, [*RATIOS, *keys_of(PursuitProblem)])
         hint = f"did you mean {guess}?" if guess else f"choose {', '.join(RATIOS)} or a key of the file"
         raise InputError(f"{option}: there is no parameter {shown(key)}; {hint}")
-    parts = span.split(":")
     try:
-        if len(parts) != 3:
-            raise ValueError
-        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+        low_text, high_text, count_text = span.split(":")
+        low, high, count = float(low_text), float(high_text), int(count_text)
     except ValueError:
-        raise InputError(f"{option}: must be KEY=FROM:TO:N, found {shown(text)}; {example}") from None
-    if not (math.isfinite(low) and math.isfinite(high) and low < high and max(abs(low), abs(high)) <= 1e15):
-        raise InputError(f"{option}: must go from a number to a larger one, found {shown(span)}; {example}")
-    if not 2 <= count <= MAX_VALUES:
-        raise InputError(f"{option}: must have from 2 to {MAX_VALUES} values, found {shown(parts[2])}; {example}")
+        low, high, count = 0.0, 0.0, 0
+    if not (-1e15 <= low < high <= 1e15 and 2 <= count <= MAX_POINTS):
+        raise InputError(
+            f"{option}: must be KEY=FROM:TO:N with FROM less than TO and at least 2 values, found {shown(text)}; for "
+            f"example {option} thrust_ratio=0:0.8:17"
+        )
     return Axis(key, np.linspace(low, high, count))
 
 
-def _summary(problem: PursuitProblem, x: Axis, y: Axis, solved: CaptureMap, elapsed_s: float) -> dict[str, object]:
+def report_json(report: MapReport) -> dict[str, object]:
+    """Return the results for `experiments.common.output.to_json`."""
+    solved = report.solved
     return {
-        **head(problem),
-        "elapsed_s": elapsed_s,
-        "x": x,
-        "y": y,
+        "x": report.x,
+        "y": report.y,
         "points": solved.status.size,
         "counts": {status.value: solved.count(status) for status in PointStatus},
         "solved_from_nothing": solved.solved_from_nothing,
         "capture_time_s": solved.capture_s,
         "closing_speed_km_s": solved.closing_speed_m_s / M_PER_KM,
-        "status_words": {status.value: words for status, words in STATUS_WORDS.items()},
         "status": [[STATUSES[status] for status in row] for row in solved.status],
     }
 
 
-def _table(x: Axis, y: Axis, solved: CaptureMap) -> tuple[list[str], list[list[Cell]]]:
-    times, hours = solved.capture_s.tolist(), (solved.capture_s / S_PER_HOUR).tolist()
-    speeds = (solved.closing_speed_m_s / M_PER_KM).tolist()
+def report_csv(report: MapReport) -> str:
+    """Return a line for each point as CSV."""
+    x, y, solved = report.x, report.y, report.solved
+    times, speeds = solved.capture_s.tolist(), (solved.closing_speed_m_s / M_PER_KM).tolist()
     rows: list[list[Cell]] = [
-        [float(column), float(row), times[j][i], hours[j][i], speeds[j][i], STATUSES[solved.status[j, i]].value]
+        [float(column), float(row), times[j][i], speeds[j][i], STATUSES[solved.status[j, i]].value]
         for j, row in enumerate(y.values)
         for i, column in enumerate(x.values)
     ]
-    return [x.parameter, y.parameter, "capture_time_s", "capture_time_h", "closing_speed_km_s", "status"], rows
+    return to_csv([x.parameter, y.parameter, "capture_time_s", "closing_speed_km_s", "status"], rows)
+
+
+def counted(solved: CaptureMap) -> str:
+    """Return the number of points of each status, for the terminal and the figure."""
+    counts = {words: solved.count(status) for status, words in STATUS_WORDS.items()}
+    return ", ".join(f"{count} {words}" for words, count in counts.items() if count)
+
+
+def report_lines(report: MapReport) -> Iterator[str]:
+    """Yield the numbers of points by status and the range of capture times, for the screen."""
+    solved = report.solved
+    yield f"{report.problem.name}: {solved.status.size} points: {counted(solved)}"
+    if solved.capture_s.count():
+        low, high = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))
+        yield f"capture times from {low:.4f} to {high:.4f} h"
+    if solved.count(PointStatus.NEIGHBOUR):
+        yield (
+            "points continued from a neighbour are local saddle points: earlier captures are not excluded there; "
+            "--certify solves every point from scratch"
+        )
+
+
+COMMAND = ProblemCommand(
+    owner=PursuitProblem,
+    solve=solve_map,
+    to_json=report_json,
+    to_csv=report_csv,
+    lines=report_lines,
+    csv_name="map.csv",
+    figures="experiments.pursuit.map_figure",
+    figure_names=("figure-map",),
+)
+run = COMMAND.run

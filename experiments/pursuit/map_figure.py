@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from experiments.common.display_units import S_PER_HOUR, split_unit
 from experiments.common.figure_style import INK, LIMIT, new_figure, style
-from experiments.pursuit.report import STATUS_WORDS, counted
+from experiments.pursuit.map import STATUS_WORDS, MapReport, counted
 from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
 
@@ -32,6 +33,11 @@ _RATIOS = {
     "thrust_ratio": "thrust of the evader / thrust of the pursuer",
     "mass_ratio": "mass of the evader / mass of the pursuer",
 }
+
+
+def draw_all(report: MapReport) -> Iterator[Figure]:
+    """Draw the figure of a report."""
+    yield draw_map(report.solved, report.x.parameter, report.y.parameter)
 
 
 @style()

@@ -5,20 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.common.display_units import length_unit
+from experiments.common.errors import InputError
 from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
 from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
-from experiments.pursuit.report import INERTIAL_AXES, thrust_angles
-from rendezvous.pursuit_evasion import Solution, history, orbital_axes
+from experiments.pursuit.report import INERTIAL_AXES, Report, saddle_point, thrust_angles
+from rendezvous.pursuit_evasion import history, orbital_axes
 
 MOMENTS = 301
 _DEGREES = ("deg", 180.0 / np.pi)
 
 
-def pursuit_page(name: str, description: str, solution: Solution, claim: str = "") -> str:
+def pursuit_page(report: Report) -> str:
     """Return the page of a game as HTML, with what its certificate claims.
 
-    Raise `ValueError` if the solution has no capture.
+    Raise `InputError` if the solution has no capture.
     """
+    problem, solution, capture = report.problem, report.solution, report.solution.capture
+    if capture is None:
+        raise InputError(f"--html: there is no trajectory to show, the result is {solution.verdict.value}; omit --html")
     sampled = history(solution, MOMENTS)
     pursuer, evader = sampled.pursuer, sampled.evader
     players = (("pursuer", 0, pursuer), ("evader", 1, evader))
@@ -49,13 +53,7 @@ def pursuit_page(name: str, description: str, solution: Solution, claim: str = "
         Graph("Thrust out of the orbital plane", "out of plane", _DEGREES, out_of_plane),
         Graph("Mass", "mass", ("kg", 1.0), masses),
     ]
+    verdict = f"captured after {capture.time_s:.6g} s, closing speed {capture.closing_speed_m_s:.6g} m/s"
     axes = f"axes: {INERTIAL_AXES}; relative to the evader, {AXES}"
-    about = [line for line in (description, _verdict(solution), claim, axes) if line]
-    return motion_page(f"Pursuit {name}", about, sampled.time_s, views, graphs)
-
-
-def _verdict(solution: Solution) -> str:
-    capture = solution.capture
-    if capture is None:
-        return f"{solution.verdict.value}: the page shows an extremal without a certificate"
-    return f"{solution.verdict.value} after {capture.time_s:.6g} s, closing speed {capture.closing_speed_m_s:.6g} m/s"
+    about = [line for line in (problem.description, verdict, saddle_point(report.certificate), axes) if line]
+    return motion_page(f"Pursuit {problem.name}", about, sampled.time_s, views, graphs)

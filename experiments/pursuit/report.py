@@ -8,45 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.common.display_units import M_PER_KM, S_PER_HOUR
-from experiments.common.output import STATE_COLUMNS, Cell, trajectories_csv
-from experiments.common.problems import head
+from experiments.common.problem_command import trajectories_csv
 from experiments.common.screen import Part, number, number_table
 from experiments.pursuit.file import PursuitProblem
 from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import (
     Capture,
-    CaptureMap,
     Certificate,
     Ended,
     Flight,
     Observation,
     PlayerEnd,
     PlayerHistory,
-    PointStatus,
-    Route,
     Solution,
     Verdict,
-    capture_quantiles_s,
     history,
     orbital_axes,
 )
 
 INERTIAL_AXES = "inertial, z along the planet's axis"
-_LEVELS = ("minimum", "10%", "50%", "90%", "maximum")
-_FEWEST = 10
-"""Number of simulations from which quantiles are printed."""
-_METHODS = {
-    Route.CONTINUATION: "extremals for increasing durations, from zero to the capture",
-    Route.SWITCHED: "extremals for increasing durations, with a change to those that keep the evader farther away",
-}
-STATUS_WORDS = {
-    PointStatus.FOLLOWED: "solved from scratch",
-    PointStatus.NEIGHBOUR: "continued from a neighbour",
-    PointStatus.NOT_CERTIFIED: "not certified",
-    PointStatus.ESCAPES: "escape",
-    PointStatus.PROPELLANT_EXHAUSTED: "propellant exhausted",
-    PointStatus.NO_GAME: "no game",
-}
 
 
 @dataclass(frozen=True)
@@ -59,11 +39,6 @@ class Feedback:
     seed: int
     flights: tuple[Flight, ...]
 
-    @property
-    def captures_s(self) -> list[float]:
-        """Return the times of the captures."""
-        return [flight.time_s for flight in self.flights if flight.ended is Ended.CAPTURED]
-
 
 @dataclass(frozen=True)
 class Report:
@@ -73,15 +48,12 @@ class Report:
     solution: Solution
     certificate: Certificate | None
     feedback: Feedback | None
-    elapsed_s: float
 
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
-    problem, solution, certificate = report.problem, report.solution, report.certificate
+    solution, certificate = report.solution, report.certificate
     return {
-        **head(problem),
-        "elapsed_s": report.elapsed_s,
         "verdict": solution.verdict,
         **_capture_json(solution.capture),
         "route": solution.route,
@@ -149,9 +121,6 @@ def _certificate_json(certificate: Certificate) -> dict[str, object]:
 
 
 def _feedback_json(feedback: Feedback) -> dict[str, object]:
-    quantiles: dict[str, float | None] = dict(zip(_LEVELS, capture_quantiles_s(feedback.flights), strict=False))
-    if len(feedback.captures_s) < _FEWEST:
-        quantiles |= {name: None for name in quantiles if name in ("10%", "90%")}
     return {
         "policy": feedback.policy,
         "replan_s": feedback.replan_s,
@@ -159,9 +128,6 @@ def _feedback_json(feedback: Feedback) -> dict[str, object]:
         "position_noise_m": feedback.observation.position_error_m,
         "velocity_noise_m_s": feedback.observation.velocity_error_m_s,
         "seed": feedback.seed,
-        "runs": len(feedback.flights),
-        "captured": len(feedback.captures_s),
-        "capture_time_quantiles_s": quantiles,
         "flights": [
             {
                 "ended": flight.ended,
@@ -174,20 +140,17 @@ def _feedback_json(feedback: Feedback) -> dict[str, object]:
     }
 
 
-def trajectories(solution: Solution) -> str:
-    """Return both trajectories as CSV; the direction of the thrust is zero for a player without thrust."""
-    sampled = history(solution)
-    tracks: list[tuple[list[Cell], np.ndarray]] = [
-        (
-            [name],
-            np.column_stack(
-                [sampled.time_s, player.position_m, player.velocity_m_s, player.mass_kg, player.thrust_direction]
-            ),
-        )
-        for name, player in (("pursuer", sampled.pursuer), ("evader", sampled.evader))
-    ]
-    directions = (f"thrust_direction_{axis}" for axis in "xyz")
-    return trajectories_csv(["player"], ["time_s", *STATE_COLUMNS, "mass_kg", *directions], tracks)
+def trajectories(report: Report) -> str:
+    """Return both trajectories as CSV, no line without a capture; without thrust the direction of thrust is zero."""
+    columns = ["mass_kg", *(f"thrust_direction_{axis}" for axis in "xyz")]
+    if report.solution.capture is None:
+        return trajectories_csv(["player"], [], columns)
+    sampled = history(report.solution)
+    tracks = []
+    for name, player in (("pursuer", sampled.pursuer), ("evader", sampled.evader)):
+        state = np.hstack([player.position_m, player.velocity_m_s])
+        tracks.append(([name], [sampled.time_s, state, player.mass_kg, player.thrust_direction]))
+    return trajectories_csv(["player"], tracks, columns)
 
 
 def thrust_angles(player: PlayerHistory) -> Floats:
@@ -196,13 +159,7 @@ def thrust_angles(player: PlayerHistory) -> Floats:
     return np.stack([np.unwrap(np.arctan2(u[:, 0], u[:, 1])), np.arcsin(np.clip(u[:, 2], -1.0, 1.0))], axis=1)
 
 
-def counted(solved: CaptureMap) -> str:
-    """Return the number of points of each status, for the terminal and the figure."""
-    counts = {words: solved.count(status) for status, words in STATUS_WORDS.items()}
-    return ", ".join(f"{count} {words}" for words, count in counts.items() if count)
-
-
-def report_parts(report: Report) -> Iterator[Part]:
+def report_lines(report: Report) -> Iterator[Part]:
     """Yield the verdict, the players, the certificate and the simulations, for the screen."""
     solution = report.solution
     yield f"{report.problem.name}: {_verdict(solution)}"
@@ -237,7 +194,7 @@ def _capture_parts(capture: Capture, solution: Solution) -> Iterator[Part]:
         f"curvatures of the distance over the direction: {curvatures} times "
         f"{solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)"
     )
-    yield f"method: {_METHODS[solution.route]}"
+    yield f"method: {solution.route.value}"
 
 
 def _verdict(solution: Solution) -> str:
@@ -296,7 +253,7 @@ def saddle_point(certificate: Certificate | None) -> str:
 
 
 def _feedback_lines(feedback: Feedback) -> Iterator[str]:
-    flights = feedback.flights
+    flights, captured = feedback.flights, [each for each in feedback.flights if each.ended is Ended.CAPTURED]
     heading = f"feedback, a plan every {feedback.replan_s:g} s, evader {feedback.policy}: "
     if len(flights) == 1:
         (flight,) = flights
@@ -305,16 +262,11 @@ def _feedback_lines(feedback: Feedback) -> Iterator[str]:
             f"last predicted capture {flight.predicted_s[-1]:.1f} s"
         )
         return
-    yield f"{heading}{len(feedback.captures_s)} of {len(flights)} captured"
-    if feedback.captures_s:
-        yield f"  capture time, s: {_distribution(feedback.captures_s)}"
+    yield f"{heading}{len(captured)} of {len(flights)} captured"
+    if captured:
+        yield f"  capture time, s: {_distribution([flight.time_s for flight in captured])}"
     yield f"  distance at the end, m: {_distribution([flight.distance_m for flight in flights])}"
 
 
 def _distribution(values: Sequence[float]) -> str:
-    """Return the ends and the median of values; from ten values on also two quantiles."""
-    levels = {"smallest": 0.0, "10 %": 0.1, "median": 0.5, "90 %": 0.9, "largest": 1.0}
-    if len(values) < _FEWEST:
-        levels = {name: level for name, level in levels.items() if "%" not in name}
-    numbers = np.quantile(values, list(levels.values())).tolist()
-    return ", ".join(f"{name} {number(value)}" for name, value in zip(levels, numbers, strict=True))
+    return f"smallest {number(min(values))}, median {number(float(np.median(values)))}, largest {number(max(values))}"

@@ -39,18 +39,11 @@ class Reach(FileOptions):
     replan: Annotated[
         bool,
         typer.Option(
-            "--replan", help="Also simulate in closed loop on the nonlinear model, with a new plan every period."
+            "--replan",
+            help="Also simulate in closed loop on the nonlinear model, with a new plan every period; if the problem "
+            "has navigation errors, also 10 times with them.",
         ),
     ] = False
-    noisy_flights: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            min=0,
-            max=1000,
-            help="Number of simulations of --replan with navigation errors, if the problem has them.",
-        ),
-    ] = 10
     seed: Seed = 0
     csv: TrajectoryCsv = None
     html: Html = None

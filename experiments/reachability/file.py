@@ -269,11 +269,5 @@ class Rendezvous:
 
 
 def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Rendezvous:
-    """Read a built-in problem or a problem file; the parameters are those of `read_file`.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem or file, or it is invalid.
-    """
+    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
     return read_file(Rendezvous, name_or_path, settings)

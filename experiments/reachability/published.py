@@ -1,62 +1,104 @@
-"""Numbers of Shorikov and Goranov (2021): rendezvous through reachable sets, tables 1 to 3."""
+"""Numbers of Shorikov and Goranov (2021): rendezvous through reachable sets, tables 1 to 3.
+
+A table has u(t), t = 0..3, the linear and nonlinear x(t), t = 1..4, and the nonlinear norm of x(4). All are in the
+paper's axes; problems, controls and states are in Hill's.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 
 from experiments.common.hill_axes import from_paper, to_paper
-from experiments.common.printed_numbers import Ours, Progress, Reproduction, read_paper
-from experiments.reachability.file import load_rendezvous
-from experiments.reachability.printed_tables import (
-    PAPER,
-    PROBLEM,
-    PrintedTable,
-    TableComparison,
-    compare_published,
-    numbers_of,
-)
-from experiments.reachability.report import fly_members
+from experiments.common.printed_numbers import Ours, PrintedNumber, Progress, read_paper
+from experiments.reachability.file import Rendezvous, load_rendezvous
+from experiments.reachability.report import Member
+from experiments.reachability.run import fly_members
 from infoset.arrays import Floats
-from rendezvous.reachability import NonlinearMotion, ReachabilityProblem, solve
+from rendezvous.reachability import NonlinearMotion, ReachabilityProblem, minimum_energy, nearest, solve
 from rendezvous.relative_motion import EllipticOrbit
-from sim.storage.codec import fingerprint
 
+PROBLEM = "rendezvous-2021"
 PUBLISHED_RADIUS_M = 90e3
 """Radius of the orbit of the nonlinear columns: 9000 km, the radius at perigee, with two digits lost."""
+_U, _LINEAR, _NONLINEAR = slice(0, 12), slice(12, 36), slice(36, 60)
 _CONTROL_ROUNDING = 0.5e-4
 _STATE_ROUNDING = np.array([0.05, 0.05, 0.05, 0.005, 0.005, 0.005])
 
 
-def reproduce(progress: Progress) -> Reproduction:
-    """Compute the numbers."""
+@dataclass(frozen=True)
+class PrintedTable:
+    """A table of the paper."""
+
+    numbers: tuple[PrintedNumber, ...]
+
+    @property
+    def contradicted(self) -> np.ndarray:
+        """Return which controls the states contradict, of which the correct ones are not known: shape (4, 3)."""
+        found = [number.corrected is not None and float(number.corrected) == 0.0 for number in self.numbers[_U]]
+        return np.reshape(found, (4, 3))
+
+    @property
+    def controls(self) -> Floats:
+        """Return the controls, shape (4, 3), with misprints corrected except for contradicted ones."""
+        printed = np.reshape([number.value for number in self.numbers[_U]], (4, 3))
+        return np.where(self.contradicted, printed, self._corrected(_U, 3))
+
+    @property
+    def linear(self) -> Floats:
+        """Return the linear states, shape (4, 6), with misprints corrected."""
+        return self._corrected(_LINEAR, 6)
+
+    @property
+    def nonlinear(self) -> Floats:
+        """Return the nonlinear states, shape (4, 6), as printed."""
+        return np.reshape([number.value for number in self.numbers[_NONLINEAR]], (4, 6))
+
+    def _corrected(self, part: slice, columns: int) -> Floats:
+        numbers = [float(number.corrected or number.printed) for number in self.numbers[part]]
+        return np.reshape(numbers, (4, columns))
+
+
+@cache
+def printed_tables() -> tuple[PrintedTable, ...]:
+    """Return tables 1 to 3."""
+    return tuple(map(PrintedTable, read_paper("reachability").tables.values()))
+
+
+def compute(progress: Progress) -> dict[str, Sequence[Ours]]:
+    """Compute the numbers by source."""
     rendezvous = load_rendezvous(PROBLEM)
-    problem, paper = rendezvous.problem, read_paper(PAPER)
-    solution = solve(problem)
+    problem, tables = rendezvous.problem, printed_tables()
+    optimal = solve(problem).optimal
     progress(0.5)
-    comparisons = compare_published(rendezvous, solution)
-    first, second, third = comparisons
-    shown = (first.ours.controls, _implied(problem, second.table), third.ours.controls)
-    flown, names = flown_controls(problem, comparisons), [each.name for each in comparisons]
-    own = fly_members(rendezvous, names, flown)
-    other = fly_members(rendezvous, names, flown, published_motion(rendezvous.ellipse))
-    states = np.tile(_state_rounding(problem).ravel(), 2)
-    implied = _implied_rounding(problem).ravel()
-    # Controls, linear and nonlinear states, and the norm.
+    energy, implied = minimum_energy(optimal), _implied(problem, tables[1])
+    shown = (energy, implied, nearest(optimal, from_paper(tables[2].controls)))
+    flown = flown_controls(rendezvous, energy)
+    own = fly_members(rendezvous, list(read_paper("reachability").tables), flown)
+    other = fly_members(rendezvous, [each.name for each in own], flown, published_motion(rendezvous.ellipse))
+    # Added to the tolerance: the rounding of the printed numbers from which ours follow.
     beyond = np.zeros((3, 61))
-    beyond[1, :12], beyond[1:, 12:60] = implied, states
-    ours = {}
-    for name, controls, one, two, rounding in zip(names, shown, own, other, beyond, strict=True):
-        pairs = zip(numbers_of(replace(one, controls=controls)), numbers_of(two), rounding, strict=True)
-        ours[name] = [
-            Ours(value, other=published if place >= 36 else None, beyond=float(added))
-            for place, (value, published, added) in enumerate(pairs)
+    beyond[1, _U] = _implied_rounding(problem).ravel()
+    beyond[1:, 12:60] = np.tile(_state_rounding(problem).ravel(), 2)
+    return {
+        one.name: [
+            Ours(value, other=published if place >= _NONLINEAR.start else None, beyond=float(added))
+            for place, (value, published, added) in enumerate(
+                zip(_numbers(one, controls), _numbers(two, controls), rounding, strict=True)
+            )
         ]
-    progress(1.0)
-    return Reproduction(paper, ((rendezvous.name, fingerprint(rendezvous)),), paper.compare(ours))
+        for controls, one, two, rounding in zip(shown, own, other, beyond, strict=True)
+    }
+
+
+def _numbers(member: Member, controls: Floats) -> list[float]:
+    """Return controls and the states of a member in the order of a table."""
+    parts = (controls, member.linear[1:], member.nonlinear[1:])
+    return [*np.concatenate([to_paper(part).ravel() for part in parts]).tolist(), member.nonlinear_miss]
 
 
 def published_motion(orbit: EllipticOrbit, radius_m: float = PUBLISHED_RADIUS_M) -> NonlinearMotion:
@@ -68,16 +110,16 @@ def published_motion(orbit: EllipticOrbit, radius_m: float = PUBLISHED_RADIUS_M)
     return NonlinearMotion(EllipticOrbit(float(rate_rad_s)), radius_m)
 
 
-def flown_controls(problem: ReachabilityProblem, comparisons: Sequence[TableComparison]) -> Floats:
+def flown_controls(rendezvous: Rendezvous, energy: Floats) -> Floats:
     """Return the controls to which the states of tables 1 to 3 belong, in Hill's axes, shape (3, 4, 3).
 
-    Table 1: the control of minimum energy, which is an independent computation. Tables 2 and 3: the printed controls
-    with corrections; controls of table 2 that its states contradict are those that the states imply.
+    Table 1: the control of minimum energy, `energy`, which is an independent computation. Tables 2 and 3: the printed
+    controls with corrections; controls of table 2 that its states contradict are those that the states imply.
     """
-    first, second, third = comparisons
-    implied = to_paper(_implied(problem, second.table))
-    controls = np.where(second.table.contradicted, implied, second.table.controls)
-    return np.array([first.ours.controls, from_paper(controls), third.printed.controls])
+    _, second, third = printed_tables()
+    implied = to_paper(_implied(rendezvous.problem, second))
+    controls = np.where(second.contradicted, implied, second.controls)
+    return np.array([energy, from_paper(controls), from_paper(third.controls)])
 
 
 def _implied(problem: ReachabilityProblem, table: PrintedTable) -> Floats:

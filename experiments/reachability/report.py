@@ -1,82 +1,27 @@
-"""Results of `infoset reach`: their computation, and their JSON."""
+"""Results of `infoset reach`, as JSON, CSV and tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from time import perf_counter
 
 import numpy as np
+from rich.table import Table
 
 from experiments.common.display_units import Unit, length_unit
-from experiments.common.errors import InputError
 from experiments.common.hill_axes import AXES
-from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, trajectories_csv
-from experiments.common.problems import head
+from experiments.common.problem_command import trajectories_csv
+from experiments.common.screen import Part, number, number_table
 from experiments.reachability.file import Rendezvous
 from infoset.arrays import Floats
-from infoset.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
-from rendezvous.reachability import (
-    EmptyTubeError,
-    FeedbackPlan,
-    Flight,
-    NonlinearMotion,
-    NoRobustPlanError,
-    Route,
-    SetKind,
-    Solution,
-    ThrustShape,
-    TooLargeError,
-    TooManyVerticesError,
-    analytic_centre,
-    chebyshev_centre,
-    effort,
-    feedback_plan,
-    min_periods,
-    minimum_energy,
-    minimum_l1,
-    minimum_norms,
-    minimum_peak,
-    replan,
-    samples,
-    solve,
-    tightened,
-    vertices,
-)
+from rendezvous.reachability import FeedbackPlan, Flight, SetKind, Solution, ThrustShape, effort
 
-Progress = Callable[[float], None]
-
-SINGLE = {
-    "energy": minimum_energy,
-    "l1": minimum_l1,
-    "norms": minimum_norms,
-    "peak": minimum_peak,
-    "chebyshev": chebyshev_centre,
-    "analytic": analytic_centre,
-}
-"""Selections of one control each: minimum sum of squares, of absolute values, of Euclidean norms, and so on."""
-VERTICES, SAMPLES = "vertices", "samples"
-MAX_SAMPLES = 1000
 POINTS = 24
 """Points of a displayed trajectory per period."""
+NORM = "(m, m/s)"
+"""Unit of a norm of states."""
 _MAX_SHOWN, _ALIKE = 5, 1e-4
-
-
-@dataclass(frozen=True)
-class Request:
-    """What is computed for a problem.
-
-    `selection` contains names of `SINGLE`, "vertices" or "samples". No `route` lets `solve` choose it. `noisy_flights`
-    is the number of simulations in closed loop with navigation errors, if the problem has them.
-    """
-
-    selection: Sequence[str]
-    samples: int = 0
-    seed: int = 0
-    route: Route | None = None
-    closed_loop: bool = False
-    noisy_flights: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +78,6 @@ class Report:
     flight: Flight | None
     noisy: tuple[Flight, ...]
     robustness: Robustness | None
-    elapsed_s: float
 
     @property
     def length_unit(self) -> Unit:
@@ -155,134 +99,6 @@ class Report:
         return np.asarray(rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, POINTS)[0])
 
 
-def make_report(rendezvous: Rendezvous, request: Request, progress: Progress = lambda _done: None) -> Report:
-    """Solve a problem, select optimal controls and simulate them; ``progress`` receives the fraction done.
-
-    Raise `InputError` if the constraints conflict, or a request is impossible.
-    """
-    try:
-        return _report(rendezvous, request, progress)
-    except EmptyTubeError as error:
-        raise InputError(_conflict(rendezvous, error)) from None
-    except (TooLargeError, UncertainHullError) as error:
-        raise InputError(f"--route exact: {error}; choose --route lifted") from None
-    except (ArithmeticError, np.linalg.LinAlgError, EmptyPolytopeError, UnboundedPolytopeError) as error:
-        raise InputError(
-            f"{rendezvous.name}: could not be solved to its tolerance: {error}; check the units of the numbers, and "
-            "relax constraints that are within 1e-9 of being impossible"
-        ) from None
-
-
-def _report(rendezvous: Rendezvous, request: Request, progress: Progress) -> Report:
-    began_s = perf_counter()
-    solution = solve(rendezvous.problem, request.route)
-    progress(0.2)
-    searched = rendezvous.problem if solution.optimal.miss == 0.0 else rendezvous.longer
-    minimum = min_periods(searched)
-    progress(0.3)
-    forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))
-    progress(0.5)
-    ranges = solution.optimal.ranges()
-    members = _members(rendezvous, solution, request)
-    progress(0.7)
-    flight, noisy = None, []
-    if request.closed_loop:
-        flight = _fly(rendezvous, None)
-        for run in range(request.noisy_flights if rendezvous.navigation_error is not None else 0):
-            sequence = np.random.SeedSequence(entropy=request.seed, spawn_key=(run,))
-            noisy.append(_fly(rendezvous, np.random.default_rng(sequence)))
-            progress(0.7 + 0.2 * (run + 1) / request.noisy_flights)
-    effect = rendezvous.disturbance_effect
-    robustness = None if effect is None else _robustness(rendezvous, effect)
-    progress(1.0)
-    return Report(
-        rendezvous,
-        solution,
-        minimum,
-        searched.periods,
-        forward,
-        tube,
-        ranges,
-        members,
-        flight,
-        tuple(noisy),
-        robustness,
-        elapsed_s=perf_counter() - began_s,
-    )
-
-
-def _members(rendezvous: Rendezvous, solution: Solution, request: Request) -> tuple[Member, ...]:
-    controls: dict[str, Floats] = {}
-    for name in request.selection:
-        if name in SINGLE:
-            controls[name] = SINGLE[name](solution.optimal)
-        elif name == VERTICES:
-            try:
-                several = vertices(solution.optimal)
-            except (TooManyVerticesError, UncertainHullError) as error:
-                raise InputError(f"--select vertices: {error}; choose for example --select samples:20") from None
-            controls |= {f"vertex {number}": control for number, control in enumerate(several, start=1)}
-        else:
-            several = samples(solution.optimal, request.samples, np.random.default_rng(request.seed))
-            controls |= {f"sample {number}": control for number, control in enumerate(several, start=1)}
-    return fly_members(rendezvous, [*controls], np.array([*controls.values()])) if controls else ()
-
-
-def fly_members(
-    rendezvous: Rendezvous, names: Sequence[str], controls: Floats, truth: NonlinearMotion | None = None
-) -> tuple[Member, ...]:
-    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model; `truth` replaces the latter."""
-    problem = rendezvous.problem
-    linear = problem.run(controls)
-    pushes = rendezvous.acceleration_m_s2 * controls
-    nonlinear = (truth or rendezvous.truth).fly(problem.initial, pushes, rendezvous.period_s)
-    between = replace(problem, between=rendezvous.instants).excess(controls)
-    rows = zip(names, controls, linear, nonlinear, between.tolist(), strict=True)
-    return tuple(Member(*row) for row in rows)
-
-
-def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Flight:
-    def truth(period: int, state: Floats, control: Floats) -> Floats:
-        start_s = rendezvous.period_s * period
-        push = rendezvous.acceleration_m_s2 * control
-        return np.asarray(rendezvous.truth.paths(start_s, state, push, [start_s + rendezvous.period_s])[0, 0])
-
-    def observe(_period: int, state: Floats) -> Floats:
-        assert generator is not None
-        assert rendezvous.navigation_error is not None
-        return state + rendezvous.navigation_error * generator.uniform(-1.0, 1.0, 6)
-
-    try:
-        return replan(rendezvous.problem, truth, None if generator is None else observe)
-    except ArithmeticError as error:
-        raise InputError(f"--replan: {error}; reduce the navigation errors, or omit --replan") from None
-
-
-def _robustness(rendezvous: Rendezvous, disturbance: Floats) -> Robustness:
-    problem = rendezvous.problem
-    fixed, conflict, plan, refusal = None, None, None, None
-    try:
-        fixed = solve(tightened(problem, disturbance), Route.LIFTED).optimal.miss
-    except EmptyTubeError as error:
-        conflict = str(error)
-    try:
-        plan = feedback_plan(problem, disturbance)
-    except (NoRobustPlanError, ValueError) as error:
-        refusal = str(error)
-    return Robustness(fixed, conflict, plan, refusal)
-
-
-def _conflict(rendezvous: Rendezvous, error: EmptyTubeError) -> str:
-    bounds = rendezvous.problem.state_bounds
-    position, velocity = error.relaxation * bounds[:3].max(), error.relaxation * bounds[3:].max()
-    return (
-        f"{rendezvous.name}: no control keeps the constraints: they conflict at t = {error.time} "
-        f"({', '.join(error.names)}); relax all constraints on states by {100.0 * error.relaxation:.4g} % of their "
-        f"bounds, that is bounds.position_m by {position:.6g} and bounds.velocity_m_s by {velocity:.6g}, or change the "
-        "initial state"
-    )
-
-
 def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
     """Return the Delta-v of controls, shape (T, 3), in m/s: the sum, and that along each axis.
 
@@ -298,22 +114,21 @@ def delta_v(rendezvous: Rendezvous, controls: Floats) -> dict[str, float]:
 def trajectories(report: Report) -> str:
     """Return the trajectories of the selected controls on both models, as CSV; a control is held over its period."""
     rendezvous = report.rendezvous
-    periods = np.arange(rendezvous.problem.periods + 1)
-    tracks: list[tuple[list[Cell], Floats]] = []
+    times_s = rendezvous.period_s * np.arange(rendezvous.problem.periods + 1)
+    tracks = []
     for member in report.members:
         controls = np.vstack([rendezvous.acceleration_m_s2 * member.controls, np.full(3, np.nan)])
-        for model, states in (("linear", member.linear), ("nonlinear", member.nonlinear)):
-            values = np.column_stack([periods * rendezvous.period_s, states, controls])
-            tracks.append(([member.name, model], values))
-    return trajectories_csv(["control", "model"], ["time_s", *STATE_COLUMNS, *CONTROL_COLUMNS], tracks)
+        tracks += [
+            ([member.name, model], [times_s, states, controls])
+            for model, states in (("linear", member.linear), ("nonlinear", member.nonlinear))
+        ]
+    return trajectories_csv(["control", "model"], tracks)
 
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`; key ``units`` has the units of the states."""
     solution, rendezvous = report.solution, report.rendezvous
     return {
-        **head(rendezvous),
-        "kind": rendezvous.kind,
         "units": {
             "period_s": rendezvous.period_s,
             "axes": AXES,
@@ -322,7 +137,6 @@ def report_json(report: Report) -> dict[str, object]:
             "controls": "parts of acceleration_m_s2, along x, y, z",
             "acceleration_m_s2": rendezvous.acceleration_m_s2,
         },
-        "elapsed_s": report.elapsed_s,
         "route": solution.route,
         "route_reason": solution.reason,
         "optimal_miss": solution.optimal.miss,
@@ -337,9 +151,9 @@ def report_json(report: Report) -> dict[str, object]:
             }
             for t in range(1, solution.problem.periods + 1)
         ],
-        "controls": [_member_json(report.rendezvous, member) for member in report.members],
+        "controls": [_member_json(rendezvous, member) for member in report.members],
         "control_ranges": report.ranges,
-        "replan": None if report.flight is None else _flight_json(report.rendezvous, report.flight, report.noisy),
+        "replan": None if report.flight is None else _flight_json(rendezvous, report.flight, report.noisy),
         "robust": None if report.robustness is None else _robust_json(report.robustness),
     }
 
@@ -388,3 +202,80 @@ def _robust_json(robustness: Robustness) -> dict[str, object]:
             "max": None if plan is None else plan.upper,
         },
     }
+
+
+def report_lines(report: Report) -> Iterator[Part]:
+    """Yield the summary, the tables, and the simulations in closed loop, for the screen."""
+    yield from _summary(report)
+    yield from _tables(report)
+    yield from _feedback(report)
+
+
+def _summary(report: Report) -> Iterator[str]:
+    solution, minimum = report.solution, report.min_periods
+    dimension = solution.optimal.dimension
+    reached = f"norm 0 not reached in {report.searched_periods} periods"
+    if minimum is not None:
+        reached = f"norm 0 needs at least {minimum} period{'s' if minimum > 1 else ''}"
+    yield f"{report.rendezvous.name}: minimum terminal norm {solution.optimal.miss:.9g} {NORM}; {reached}"
+    yield f"route: {solution.route.value} ({solution.reason})"
+    yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
+    yield f"axes: {AXES}"
+    ball = report.rendezvous.problem.thrust is ThrustShape.BALL
+    engines = "the periods, of one engine that turns" if ball else "the three axes"
+    yield (
+        f"units: {NORM} is the norm of a state whose components are in m and m/s; controls u are in units of "
+        f"{report.rendezvous.acceleration_m_s2:g} m/s^2; Delta-v is the sum over {engines}"
+    )
+
+
+def _feedback(report: Report) -> Iterator[str]:
+    if report.flight is not None:
+        used = delta_v(report.rendezvous, report.flight.controls)["sum"]
+        yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)} {NORM}, Delta-v {used:.4f} m/s"
+    if report.noisy:
+        misses = [flight.miss for flight in report.noisy]
+        relaxed = max(float(flight.relaxations.max()) for flight in report.noisy)
+        yield (
+            f"with navigation errors, {len(misses)} simulations: median {number(float(np.median(misses)))}, "
+            f"largest {number(max(misses))} {NORM}; constraints relaxed by at most {relaxed:.2%}"
+        )
+    if report.robustness is not None:
+        conflict, plan = report.robustness.conflict, report.robustness.plan
+        yield f"\nwith disturbances, without feedback: {conflict or 'controls that keep the constraints exist'}"
+        bound = report.robustness.refusal if plan is None else f"terminal norm at most {number(plan.worst_miss)} {NORM}"
+        yield f"with disturbances, with feedback: {bound}"
+
+
+def _tables(report: Report) -> Iterator[Part]:
+    sets, periods = report.solution.sets, range(1, report.solution.problem.periods + 1)
+    axes = (f"{axis} of the tube\nm" for axis in "xyz")
+    counted = ("forward\nvertices", "forward\nfacets", "tube\nvertices", "tube\nfacets")
+    counts = [[sets.counts(kind, t) for kind in (SetKind.FORWARD, SetKind.TUBE)] for t in periods]
+    known = any(count is not None for row in counts for count in row)
+    table = number_table("period", *axes, *(counted if known else ()))
+    for t, row in zip(periods, counts, strict=True):
+        cells = [f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0]
+        for count in row if known else ():
+            cells += ["-", "-"] if count is None else [str(count.vertices), str(count.facets)]
+        table.add_row(str(t), *cells)
+    yield from ("", table)
+    if report.members:
+        yield from ("", _members_table(report))
+
+
+def _members_table(report: Report) -> Table:
+    titles = (
+        *(f"{name}\n{unit}" for name, unit in (("energy", "u^2"), ("L1", "u"), ("norms", "u"), ("peak", "u"))),
+        "Delta-v\nm/s",
+        *(f"along {axis}\nm/s" for axis in "xyz"),
+        f"nonlinear miss\n{NORM}",
+        "violation between\nperiods",
+    )
+    table = number_table("control", *titles)
+    for member in report.members:
+        costs = (f"{value:.6f}" for value in vars(effort(member.controls)).values())
+        used = (f"{value:.4f}" for value in delta_v(report.rendezvous, member.controls).values())
+        violation = f"{max(member.between, 0.0):.2%}"
+        table.add_row(member.name, *costs, *used, f"{member.nonlinear_miss:.4g}", violation)
+    return table

@@ -1,81 +1,103 @@
-"""`infoset reach`: computation, files and tables."""
+"""`infoset reach`: computation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import chain
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from rich.table import Table
 
 from experiments.common.errors import InputError
-from experiments.common.hill_axes import AXES
-from experiments.common.input_file import to_toml
 from experiments.common.options import choice, read_number
-from experiments.common.output import TRAJECTORIES, output_of, to_csv, to_json
-from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, show
+from experiments.common.problem_command import ProblemCommand
+from experiments.common.screen import BeginProgress
 from experiments.reachability.command import Reach
-from experiments.reachability.file import load_rendezvous
+from experiments.reachability.file import Rendezvous
 from experiments.reachability.page import reachability_page
-from experiments.reachability.printed_tables import (
-    CHOICES,
-    COLUMNS,
-    TableComparison,
-    compare_published,
-    is_published,
+from experiments.reachability.report import Member, Report, Robustness, report_json, report_lines, trajectories
+from infoset.arrays import Floats
+from infoset.polytope import UncertainHullError
+from rendezvous.reachability import (
+    EmptyTubeError,
+    Flight,
+    NonlinearMotion,
+    NoRobustPlanError,
+    Route,
+    SetKind,
+    Solution,
+    TooLargeError,
+    TooManyVerticesError,
+    analytic_centre,
+    chebyshev_centre,
+    feedback_plan,
+    min_periods,
+    minimum_energy,
+    minimum_l1,
+    minimum_norms,
+    minimum_peak,
+    replan,
+    samples,
+    solve,
+    tightened,
+    vertices,
 )
-from experiments.reachability.report import (
-    MAX_SAMPLES,
-    SAMPLES,
-    SINGLE,
-    VERTICES,
-    Report,
-    Request,
-    delta_v,
-    make_report,
-    report_json,
-    trajectories,
-)
-from rendezvous.reachability import Route, SetKind, ThrustShape, effort
 
-TABLES = "published-tables.csv"
-FIGURES = ("figure-positions", "figure-velocities", "figure-planes", "figure-controls")
-_COUNTED = ("vertices", "facets")
-_NORM = "(m, m/s)"
-"""Unit of a norm of states."""
+SINGLE = {
+    "energy": minimum_energy,
+    "l1": minimum_l1,
+    "norms": minimum_norms,
+    "peak": minimum_peak,
+    "chebyshev": chebyshev_centre,
+    "analytic": analytic_centre,
+}
+"""Selections of one control each: minimum sum of squares, of absolute values, of Euclidean norms, and so on."""
+VERTICES, SAMPLES = "vertices", "samples"
+MAX_SAMPLES = 1000
+NOISY_FLIGHTS = 10
+"""Number of simulations in closed loop with navigation errors."""
 
 
-def run(options: Reach) -> None:
-    """Solve the problem, write the files and print the tables."""
-    names, samples = _selection(options.select)
-    route = None if options.route == "auto" else Route(options.route)
-    request = Request(names, samples, options.seed, route, options.replan, options.noisy_flights)
-    rendezvous = load_rendezvous(options.problem, options.settings)
-    published = is_published(rendezvous)
-    files = ("problem.toml", "results.json", TRAJECTORIES, *((TABLES,) if published else ()), *figure_files(*FIGURES))
-    with output_of(options, files) as written, progress_bar(options.quiet) as begin:
-        report = make_report(rendezvous, request, begin(rendezvous.name))
-        comparisons = compare_published(rendezvous, report.solution) if published else ()
-        results = report_json(report)
-        tracks = trajectories(report) if written.wants("--csv") else ""
-        written.save("problem.toml", to_toml(rendezvous))
-        written.save("results.json", to_json(results), "--json")
-        if comparisons:
-            written.save(TABLES, to_csv(COLUMNS, [row for comparison in comparisons for row in comparison.rows]))
-        written.save(TRAJECTORIES, tracks, "--csv")
-        try:
-            if options.html is not None:
-                written.deliver("--html", reachability_page(report))
-            if options.out is not None:
-                from experiments.reachability.figures import draw_all
-
-                written.draw(FIGURES, draw_all(report), begin("figures"))
-        except ArithmeticError as error:
-            raise InputError(
-                f"cannot draw the tube: {error}; the numbers are in results.json, or use --json alone"
-            ) from None
-    parts = chain(_summary(report), _tables(report, comparisons), _feedback(report))
-    show(parts, options.quiet, stdout_taken=written.stdout_taken)
+def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgress) -> Report:
+    """Return the sets, the selected optimal controls with their trajectories, and the simulations in closed loop."""
+    names, count = _selection(options.select)
+    progress = begin(rendezvous.name)
+    try:
+        solution = solve(rendezvous.problem, None if options.route == "auto" else Route(options.route))
+    except (TooLargeError, UncertainHullError) as error:
+        raise InputError(f"--route exact: {error}; choose --route lifted") from None
+    progress(0.2)
+    searched = rendezvous.problem if solution.optimal.miss == 0.0 else rendezvous.longer
+    minimum = min_periods(searched)
+    progress(0.3)
+    forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))
+    progress(0.5)
+    ranges = solution.optimal.ranges()
+    controls = _controls(solution, names, count, options.seed)
+    members = fly_members(rendezvous, [*controls], np.array([*controls.values()]))
+    progress(0.7)
+    flight, noisy = None, []
+    if options.replan:
+        flight = _fly(rendezvous, None)
+        for run in range(NOISY_FLIGHTS if rendezvous.navigation_error is not None else 0):
+            sequence = np.random.SeedSequence(entropy=options.seed, spawn_key=(run,))
+            noisy.append(_fly(rendezvous, np.random.default_rng(sequence)))
+            progress(0.7 + 0.2 * (run + 1) / NOISY_FLIGHTS)
+    effect = rendezvous.disturbance_effect
+    robustness = None if effect is None else _robustness(rendezvous, effect)
+    progress(1.0)
+    return Report(
+        rendezvous,
+        solution,
+        minimum,
+        searched.periods,
+        forward,
+        tube,
+        ranges,
+        members,
+        flight,
+        tuple(noisy),
+        robustness,
+    )
 
 
 def _selection(text: str) -> tuple[list[str], int]:
@@ -84,104 +106,86 @@ def _selection(text: str) -> tuple[list[str], int]:
     for part in text.split(","):
         name, _, digits = part.strip().partition(":")
         name = choice("--select", name, [*SINGLE, VERTICES, SAMPLES])
-        if name in names:
-            raise InputError(f"--select: {name} is named twice; name each choice once")
         if name == SAMPLES:
             count = read_number(
                 f"--select {SAMPLES}", int, digits, minimum=1, maximum=MAX_SAMPLES, example="--select samples:20"
             )
-        elif digits:
-            raise InputError(f"--select {name}: takes no number, found {digits[:20]!r}; write --select {name}")
         names.append(name)
     return names, count
 
 
-def _summary(report: Report) -> Iterator[str]:
-    solution, minimum = report.solution, report.min_periods
-    dimension = solution.optimal.dimension
-    reached = f"norm 0 not reached in {report.searched_periods} periods"
-    if minimum is not None:
-        reached = f"norm 0 needs at least {minimum} period{'s' if minimum > 1 else ''}"
-    yield f"{report.rendezvous.name}: minimum terminal norm {solution.optimal.miss:.9g} {_NORM}; {reached}"
-    yield f"route: {solution.route.value} ({solution.reason})"
-    yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
-    yield f"axes: {AXES}"
-    ball = report.rendezvous.problem.thrust is ThrustShape.BALL
-    engines = "the periods, of one engine that turns" if ball else "the three axes"
-    yield (
-        f"units: {_NORM} is the norm of a state whose components are in m and m/s; controls u are in units of "
-        f"{report.rendezvous.acceleration_m_s2:g} m/s^2; Delta-v is the sum over {engines}"
-    )
+def _controls(solution: Solution, names: Sequence[str], count: int, seed: int) -> dict[str, Floats]:
+    """Return the selected optimal controls, each of shape (T, 3), by name."""
+    controls: dict[str, Floats] = {}
+    for name in names:
+        if name in SINGLE:
+            controls[name] = SINGLE[name](solution.optimal)
+        elif name == VERTICES:
+            try:
+                several = vertices(solution.optimal)
+            except (TooManyVerticesError, UncertainHullError) as error:
+                raise InputError(f"--select vertices: {error}; choose for example --select samples:20") from None
+            controls |= {f"vertex {number}": control for number, control in enumerate(several, start=1)}
+        else:
+            several = samples(solution.optimal, count, np.random.default_rng(seed))
+            controls |= {f"sample {number}": control for number, control in enumerate(several, start=1)}
+    return controls
 
 
-def _feedback(report: Report) -> Iterator[str]:
-    if report.flight is not None:
-        used = delta_v(report.rendezvous, report.flight.controls)["sum"]
-        yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)} {_NORM}, Delta-v {used:.4f} m/s"
-    if report.noisy:
-        misses = [flight.miss for flight in report.noisy]
-        relaxed = max(float(flight.relaxations.max()) for flight in report.noisy)
-        yield (
-            f"with navigation errors, {len(misses)} simulations: median {number(float(np.median(misses)))}, "
-            f"largest {number(max(misses))} {_NORM}; constraints relaxed by at most {relaxed:.2%}"
-        )
-    if report.robustness is not None:
-        conflict, plan = report.robustness.conflict, report.robustness.plan
-        yield f"\nwith disturbances, without feedback: {conflict or 'controls that keep the constraints exist'}"
-        bound = (
-            report.robustness.refusal if plan is None else f"terminal norm at most {number(plan.worst_miss)} {_NORM}"
-        )
-        yield f"with disturbances, with feedback: {bound}"
+def fly_members(
+    rendezvous: Rendezvous, names: Sequence[str], controls: Floats, truth: NonlinearMotion | None = None
+) -> tuple[Member, ...]:
+    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model; `truth` replaces the latter."""
+    problem = rendezvous.problem
+    linear = problem.run(controls)
+    pushes = rendezvous.acceleration_m_s2 * controls
+    nonlinear = (truth or rendezvous.truth).fly(problem.initial, pushes, rendezvous.period_s)
+    between = replace(problem, between=rendezvous.instants).excess(controls)
+    rows = zip(names, controls, linear, nonlinear, between.tolist(), strict=True)
+    return tuple(Member(*row) for row in rows)
 
 
-def _tables(report: Report, comparisons: Sequence[TableComparison]) -> Iterator[Part]:
-    sets, periods = report.solution.sets, range(1, report.solution.problem.periods + 1)
-    counts = [[sets.counts(kind, t) for kind in (SetKind.FORWARD, SetKind.TUBE)] for t in periods]
-    if any(count is not None for row in counts for count in row):
-        table = number_table("period", *(f"{name}\n{what}" for name in ("forward", "tube") for what in _COUNTED))
-        for t, row in zip(periods, counts, strict=True):
-            cells = (("-", "-") if count is None else (count.vertices, count.facets) for count in row)
-            table.add_row(str(t), *(str(cell) for pair in cells for cell in pair))
-        yield from ("", table)
-    table = number_table("period", *(f"{axis} of the tube\nm" for axis in "xyz"))
-    for t in periods:
-        table.add_row(str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0))
-    yield from ("", table)
-    if report.members:
-        yield from ("", _members_table(report))
-    if comparisons:
-        yield from ("", _published_table(comparisons))
-        yield "the misses printed in the paper do not follow from the equations of motion; see docs/reachability.md"
+def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Flight:
+    """Simulate in closed loop, with navigation errors if there is a generator."""
+
+    def truth(period: int, state: Floats, control: Floats) -> Floats:
+        start_s = rendezvous.period_s * period
+        push = rendezvous.acceleration_m_s2 * control
+        return np.asarray(rendezvous.truth.paths(start_s, state, push, [start_s + rendezvous.period_s])[0, 0])
+
+    def observe(_period: int, state: Floats) -> Floats:
+        assert generator is not None
+        assert rendezvous.navigation_error is not None
+        return state + rendezvous.navigation_error * generator.uniform(-1.0, 1.0, 6)
+
+    try:
+        return replan(rendezvous.problem, truth, None if generator is None else observe)
+    except ArithmeticError as error:
+        raise InputError(f"--replan: {error}; reduce the navigation errors, or omit --replan") from None
 
 
-def _members_table(report: Report) -> Table:
-    titles = (
-        *(f"{name}\n{unit}" for name, unit in (("energy", "u^2"), ("L1", "u"), ("norms", "u"), ("peak", "u"))),
-        "Delta-v\nm/s",
-        *(f"along {axis}\nm/s" for axis in "xyz"),
-        f"nonlinear miss\n{_NORM}",
-        "violation between\nperiods",
-    )
-    table = number_table("control", *titles)
-    for member in report.members:
-        costs = (f"{value:.6f}" for value in vars(effort(member.controls)).values())
-        used = (f"{value:.4f}" for value in delta_v(report.rendezvous, member.controls).values())
-        violation = f"{max(member.between, 0.0):.2%}"
-        table.add_row(member.name, *costs, *used, f"{member.nonlinear_miss:.4g}", violation)
-    return table
+def _robustness(rendezvous: Rendezvous, disturbance: Floats) -> Robustness:
+    problem = rendezvous.problem
+    fixed, conflict, plan, refusal = None, None, None, None
+    try:
+        fixed = solve(tightened(problem, disturbance), Route.LIFTED).optimal.miss
+    except EmptyTubeError as error:
+        conflict = str(error)
+    try:
+        plan = feedback_plan(problem, disturbance)
+    except (NoRobustPlanError, ValueError) as error:
+        refusal = str(error)
+    return Robustness(fixed, conflict, plan, refusal)
 
 
-def _published_table(comparisons: Sequence[TableComparison]) -> Table:
-    titles = (
-        "largest difference\nof a control, u",
-        f"nonlinear miss\nas printed, {_NORM}",
-        f"with the\nprinted u, {_NORM}",
-        f"with our\ncontrol, {_NORM}",
-    )
-    table = number_table("paper", "our control", *titles, left=2)
-    for comparison in comparisons:
-        printed = comparison.table.numbers[-1].value
-        misses = (printed, comparison.printed.nonlinear_miss, comparison.ours.nonlinear_miss)
-        row = [f"{comparison.max_difference:.5f}", *(f"{miss:.4g}" for miss in misses)]
-        table.add_row(comparison.name, CHOICES[comparison.name], *row)
-    return table
+COMMAND = ProblemCommand(
+    owner=Rendezvous,
+    solve=solve_rendezvous,
+    to_json=report_json,
+    to_csv=trajectories,
+    lines=report_lines,
+    to_html=reachability_page,
+    figures="experiments.reachability.figures",
+    figure_names=("figure-positions", "figure-velocities", "figure-planes", "figure-controls"),
+)
+run = COMMAND.run

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -55,7 +56,7 @@ class Script:
     def __post_init__(self) -> None:
         if not self.begin_s or len(self.begin_s) != len(self.policies):
             raise ValueError("a script must have one time for each policy, and at least one policy")
-        if self.begin_s[0] != 0.0 or any(b <= a for a, b in zip(self.begin_s, self.begin_s[1:], strict=False)):
+        if self.begin_s[0] != 0.0 or not all(a < b for a, b in pairwise(self.begin_s)):
             raise ValueError("the times of a script must increase from 0")
 
     def __call__(self, time_s: float, state: Floats) -> Floats:

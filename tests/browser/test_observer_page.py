@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.observer.command import Errors
-from experiments.observer.data import data_of
-from experiments.observer.file import load_observer
+from experiments.observer.command import Errors, Observe
 from experiments.observer.page import observer_page
 from experiments.observer.report import Report
+from experiments.observer.run import COMMAND
 from tests.browser.conftest import Opened
 
 Open = Callable[..., Opened]
@@ -19,11 +18,7 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 
 
 def observed(name: str, *settings: str) -> Report:
-    problem = load_observer(name, settings)
-    data = data_of(problem, None, Errors.UNIFORM, 0)
-    observer = problem.observer()
-    estimates = observer.run(data.measured, data.inputs)
-    return Report(problem, data, estimates, observer.smooth(estimates, data.inputs), observer.inconsistency)
+    return COMMAND.report(Observe(problem=name, settings=[*settings], errors=Errors.UNIFORM, smooth=True))
 
 
 @pytest.mark.parametrize("name", ["vehicle", "observer-2005"])

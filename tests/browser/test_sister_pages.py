@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from experiments.multipoint.file import load_multipoint
+from experiments.multipoint import run as multipoint
+from experiments.multipoint.command import Multipoint
 from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.report import Scene
-from experiments.pareto.file import load_pareto
+from experiments.pareto import run as pareto
+from experiments.pareto.command import Pareto
 from experiments.pareto.page import pareto_page
-from experiments.pursuit.file import load_pursuit
+from experiments.pursuit import run as pursuit
+from experiments.pursuit.command import Pursuit
 from experiments.pursuit.page import pursuit_page
-from experiments.reachability.file import load_rendezvous
+from experiments.reachability import run as reachability
+from experiments.reachability.command import Reach
 from experiments.reachability.page import reachability_page
-from experiments.reachability.report import Report, Request, make_report
-from rendezvous.multipoint import Path as FlightPath
-from rendezvous.pareto import EncounterSolution, min_sum_of_costs, minimax_excess, solve_encounter
-from rendezvous.pursuit_evasion import History, Solution, history, orbital_axes, solve
+from rendezvous.pareto import min_sum_of_costs
+from rendezvous.pursuit_evasion import history, orbital_axes
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]
@@ -31,52 +32,28 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 CLOSING = "</script><script>alert(2)</script>"
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """One problem of each kind, solved."""
-
-    encounter: EncounterSolution
-    tour: Any  # Visits of either motion: dataclasses both, which their protocol does not say
-    path: FlightPath
-    report: Report
-    game: Solution
-    sampled: History
-
-    def pages(self, name: str = "a name", description: str = "a line about it") -> dict[str, str]:
-        """All four pages."""
-        selections = {
-            "min_group_loss": self.encounter.point,
-            "min_sum_of_costs": min_sum_of_costs(self.encounter),
-            "minimax_excess": minimax_excess(self.encounter),
-        }
-        rendezvous = replace(self.report.rendezvous, name=name, description=description)
-        axes = load_multipoint("service-3").axes
-        return {
-            "pareto": pareto_page(name, self.encounter, selections),
-            "multipoint": multipoint_page(name, Scene(axes, self.tour, (0, 1, 2), self.path), 0.02),
-            "reach": reachability_page(replace(self.report, rendezvous=rendezvous)),
-            "pursuit": pursuit_page(name, description, self.game),
-        }
+PAGES: dict[str, Callable[[Any], str]] = {
+    "pareto": pareto_page,
+    "multipoint": multipoint_page,
+    "reach": reachability_page,
+    "pursuit": pursuit_page,
+}
 
 
 @pytest.fixture(scope="module")
-def solved() -> Solved:
-    visits = load_multipoint("service-3")
-    assert visits.times_s is not None
-    game = solve(load_pursuit("leo-pursuit").game)
-    return Solved(
-        solve_encounter(load_pareto("pareto-2008").encounter),
-        visits.tour,
-        visits.tour.fly((0, 1, 2), visits.times_s),
-        make_report(load_rendezvous("rendezvous-2021"), Request(["energy", "l1", "peak"])),
-        game,
-        history(game, 301),
-    )
+def reports() -> dict[str, Any]:
+    """Reports of one problem of each kind."""
+    return {
+        "pareto": pareto.COMMAND.report(Pareto()),
+        "multipoint": multipoint.COMMAND.report(Multipoint(settings=["max_control_m_s2=0.02"])),
+        "reach": reachability.COMMAND.report(Reach(select="energy,l1,peak")),
+        "pursuit": pursuit.COMMAND.report(Pursuit(problem="leo-pursuit")),
+    }
 
 
 @pytest.fixture(scope="module")
-def pages(solved: Solved) -> dict[str, str]:
-    return solved.pages()
+def pages(reports: dict[str, Any]) -> dict[str, str]:
+    return {name: PAGES[name](report) for name, report in reports.items()}
 
 
 def rows(opened: Opened, table: int) -> dict[str, str]:
@@ -85,7 +62,7 @@ def rows(opened: Opened, table: int) -> dict[str, str]:
     return dict(zip(*[iter(cells)] * 2, strict=True))
 
 
-@pytest.mark.parametrize("name", ["pareto", "multipoint", "reach", "pursuit"])
+@pytest.mark.parametrize("name", PAGES)
 def test_slider_and_keys_move_the_time_wide_and_narrow(
     open_page: Open, pages: dict[str, str], screenshots: Path, name: str
 ) -> None:
@@ -108,18 +85,22 @@ def test_slider_and_keys_move_the_time_wide_and_narrow(
         page.screenshot(path=screenshots / f"{name}-{width}-{scheme}.png", full_page=True)
 
 
-@pytest.mark.parametrize("name", ["pareto", "multipoint", "reach", "pursuit"])
-def test_html_in_names_is_text(open_page: Open, solved: Solved, name: str) -> None:
-    visits = solved.tour.targets
-    first = replace(visits.targets[0], name=f"{HOSTILE}{CLOSING}")
-    cost = solved.encounter.costs[0]
-    craft = replace(cost.craft, name=HOSTILE)
-    worse = replace(
-        solved,
-        tour=replace(solved.tour, targets=replace(visits, targets=(first, *visits.targets[1:]))),
-        encounter=replace(solved.encounter, costs=(replace(cost, craft=craft), *solved.encounter.costs[1:])),
-    )
-    html = worse.pages(f"{HOSTILE}{CLOSING}", CLOSING)[name]
+@pytest.mark.parametrize("name", PAGES)
+def test_html_in_names_is_text(open_page: Open, reports: dict[str, Any], name: str) -> None:
+    report, owner = reports[name], "rendezvous" if name == "reach" else "problem"
+    problem = replace(getattr(report, owner), description=CLOSING)
+    object.__setattr__(problem, "name", f"{HOSTILE}{CLOSING}")  # a file may not have this name
+    worse = replace(report, **{owner: problem})
+    if name == "pareto":
+        first, *others = report.solution.costs
+        costs = (replace(first, craft=replace(first.craft, name=HOSTILE)), *others)
+        worse = replace(worse, solution=replace(report.solution, costs=costs))
+    if name == "multipoint":
+        tour = report.scene.tour
+        first, *others = tour.targets.targets
+        targets = replace(tour.targets, targets=(replace(first, name=f"{HOSTILE}{CLOSING}"), *others))
+        worse = replace(worse, scene=replace(report.scene, tour=replace(tour, targets=targets)))
+    html = PAGES[name](worse)
     assert HOSTILE not in html
     assert CLOSING not in html
     opened = open_page(html)
@@ -127,9 +108,9 @@ def test_html_in_names_is_text(open_page: Open, solved: Solved, name: str) -> No
     assert opened.page.evaluate("document.images.length") == 0
 
 
-def test_the_meetings_live_numbers_are_the_librarys(open_page: Open, pages: dict[str, str], solved: Solved) -> None:
+def test_live_numbers_of_a_meeting(open_page: Open, pages: dict[str, str], reports: dict[str, Any]) -> None:
     opened = open_page(pages["pareto"])
-    page, solution = opened.page, solved.encounter
+    page, solution = opened.page, reports["pareto"].solution
 
     def check() -> None:
         point = np.array(page.evaluate("point"))
@@ -165,10 +146,10 @@ def test_the_meetings_live_numbers_are_the_librarys(open_page: Open, pages: dict
     check()
 
 
-def test_hover_in_a_pursuit_shows_the_historys_numbers(open_page: Open, pages: dict[str, str], solved: Solved) -> None:
+def test_hover_in_a_pursuit_shows_its_numbers(open_page: Open, pages: dict[str, str], reports: dict[str, Any]) -> None:
     opened = open_page(pages["pursuit"])
     opened.page.evaluate("player.show(120)")
-    sampled = solved.sampled
+    sampled = history(reports["pursuit"].solution, 301)
     apart = np.linalg.norm(sampled.pursuer.position_m - sampled.evader.position_m, axis=1)
     opened.point_at("panels[4].panel", "[panels[4].panel.across(panels[4].times[120]), 60]")
     time, distance_km = numbers(opened.tip())
@@ -183,9 +164,10 @@ def test_hover_in_a_pursuit_shows_the_historys_numbers(open_page: Open, pages: d
     assert np.array(seen_km) * 1e3 == pytest.approx([outward, along, normal], rel=SIX_DIGITS)
 
 
-def test_visits_end_at_their_targets(open_page: Open, pages: dict[str, str], solved: Solved) -> None:
+def test_visits_end_at_their_targets(open_page: Open, pages: dict[str, str], reports: dict[str, Any]) -> None:
     opened = open_page(pages["multipoint"])
-    for time_s, state in zip(solved.path.nodes.arrive_s.tolist(), solved.path.arrival_states, strict=True):
+    path = reports["multipoint"].scene.path
+    for time_s, state in zip(path.nodes.arrive_s.tolist(), path.arrival_states, strict=True):
         opened.page.evaluate(f"player.show(nearest(DATA.time_s, {time_s!r}))")
         assert opened.shown_at() == f"t = {time_s:g}\xa0s"
         at = opened.page.evaluate("DATA.views[0].tracks[0].points[player.frame]")
@@ -193,15 +175,15 @@ def test_visits_end_at_their_targets(open_page: Open, pages: dict[str, str], sol
     frame = 100
     opened.page.evaluate(f"player.show({frame})")
     moment = opened.page.evaluate(f"DATA.time_s[{frame}]")
-    size = np.linalg.norm(solved.path.control(np.array([moment])))
+    size = np.linalg.norm(path.control(np.array([moment])))
     assert numbers(rows(opened, 0)["|u|"]) == pytest.approx([size * 1e3], rel=SIX_DIGITS)
 
 
 def test_the_tube_holds_the_flights_and_a_control_can_be_chosen(
-    open_page: Open, pages: dict[str, str], solved: Solved
+    open_page: Open, pages: dict[str, str], reports: dict[str, Any]
 ) -> None:
     opened = open_page(pages["reach"])
-    page, report = opened.page, solved.report
+    page, report = opened.page, reports["reach"]
     periods = report.rendezvous.problem.periods
     for t in range(1, periods):
         page.evaluate(f"player.show({24 * t})")

@@ -21,14 +21,14 @@ from experiments.common.errors import InputError
 from experiments.common.page_document import asset, embedded_json, page
 from experiments.interception.page import STEPS_OF_A_BOX, TOLERANCE, interception_page, packed_outlines, replayed
 from experiments.interception.scenario_file import load_scenario
-from experiments.multipoint.file import load_multipoint
+from experiments.multipoint import run as multipoint
+from experiments.multipoint.command import Multipoint
 from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.report import Scene
-from experiments.pursuit.file import load_pursuit
+from experiments.pursuit import run as pursuit
+from experiments.pursuit.command import Pursuit
 from experiments.pursuit.page import pursuit_page
 from guidance import NoiseKind
 from infoset import Convention, InitialSet, Model, RateSensor, Recovery
-from rendezvous.pursuit_evasion import solve
 from sim import Outcome, Record, fly_one
 from sim.scenario import of_model
 
@@ -208,13 +208,11 @@ def test_colours_that_stand_together_can_be_told_apart_by_the_colour_blind(theme
 
 
 def _visits() -> str:
-    problem = load_multipoint("service-5")
-    path = problem.tour.fly((0, 2, 1, 3, 4), np.array([1800.0, 3600.0, 6000.0, 8700.0, 11000.0]))
-    return multipoint_page("visits", Scene(problem.axes, problem.tour, (0, 2, 1, 3, 4), path))
+    return multipoint_page(multipoint.COMMAND.report(Multipoint(problem="service-5")))
 
 
 def _pursuit() -> str:
-    return pursuit_page("pursuit", "", solve(load_pursuit("geo-pursuit").game))
+    return pursuit_page(pursuit.COMMAND.report(Pursuit()))
 
 
 @pytest.mark.parametrize("draw", [_visits, _pursuit])

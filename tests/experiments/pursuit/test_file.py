@@ -5,7 +5,7 @@ import re
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.common.input_file import read_text, to_toml
+from experiments.common.input_file import read_text
 from experiments.pursuit.file import PursuitProblem, load_pursuit
 from experiments.pursuit.map import game_at
 from sim.storage.codec import fingerprint
@@ -18,12 +18,6 @@ STATE = "[evader.state]\nposition_km = {}\nvelocity_km_s = {}\n"
 def with_state(position: str = "[42000.0, 100.0, 0.0]", velocity: str = "[0.0, 3.08, 0.01]") -> str:
     """The slides' case with the evader given by a state."""
     return TEXT.partition("[evader.orbit]")[0] + STATE.format(position, velocity)
-
-
-@pytest.mark.parametrize("name", ["geo-pursuit", "leo-pursuit"])
-def test_built_in_problems_read_back_as_they_are_written(name: str) -> None:
-    problem = load_pursuit(name)
-    assert read_text(PursuitProblem, to_toml(problem), "again") == problem
 
 
 def test_the_slides_case_is_what_the_slides_say() -> None:

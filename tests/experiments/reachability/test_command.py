@@ -1,78 +1,28 @@
 from __future__ import annotations
 
-import csv
-import json
 import re
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.common.file_kinds import built_in_names
-from experiments.common.input_file import read_text, to_toml
+from experiments.common.input_file import read_text
+from experiments.reachability.command import Reach
 from experiments.reachability.figures import draw_all, shown_times
 from experiments.reachability.file import Rendezvous, load_rendezvous
-from experiments.reachability.printed_tables import compare_published, is_published, printed_tables
-from experiments.reachability.report import Request, make_report
-from rendezvous.reachability import solve
+from experiments.reachability.run import COMMAND
 from sim.storage.codec import fingerprint
-from sim.versions import versions
 from tests.built_in import problem_text
+from tests.experiments.command_line import Command
 
-FIGURES = ["figure-controls", "figure-planes", "figure-positions", "figure-velocities"]
-KEYS = [
-    *("versions", "problem", "problem_hash", "kind", "units", "elapsed_s", "route", "route_reason"),
-    *(
-        "optimal_miss",
-        "optimal_dimension",
-        "min_periods",
-        "min_periods_searched",
-        "sets",
-        "controls",
-        "control_ranges",
-    ),
-    *("replan", "robust"),
-]
-
-Infoset = Callable[..., tuple[int, str, str]]
+CASES = Path(__file__).parents[2] / "rendezvous" / "reachability" / "cases"
 
 
-@pytest.fixture
-def infoset(infoset: Infoset) -> Infoset:
-    """Run the command in an empty folder: exit code, stdout and stderr."""
-    return partial(infoset, "reach")
-
-
-def edited(problem: str, **changes: str) -> str:
-    """A built-in problem with values of keys replaced, by the key's name."""
-    lines = problem_text(problem).splitlines()
-    for key, value in changes.items():
-        places = [place for place, line in enumerate(lines) if line.split("=")[0].strip() == key]
-        assert places, key
-        lines[places[0]] = f"{key} = {value}"
-    return "\n".join(lines) + "\n"
-
-
-def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
-    folder = tmp_path / "results"
-    code, out, _ = infoset("--select", "energy,l1,vertices,samples:3", "--replan", "--out", folder)
-    assert code == 0
-    files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
-    assert sorted(each.name for each in folder.iterdir()) == sorted(
-        [*files, "problem.toml", "published-tables.csv", "results.json", "trajectories.csv"]
-    )
-    found = json.loads((folder / "results.json").read_text())
-    assert list(found) == KEYS
-    assert found["versions"] == versions()
-    assert (found["kind"], found["problem"], found["route"]) == ("reachable-rendezvous", "rendezvous-2021", "exact")
-    assert found["problem_hash"] == fingerprint(load_rendezvous("rendezvous-2021"))
+def test_the_published_problem(infoset: Command) -> None:
+    found = infoset.json("reach", "--select", "energy,l1,vertices,samples:3", "--replan")
     assert (found["optimal_miss"], found["min_periods"], found["optimal_dimension"]) == (0.0, 3, 6)
     second = found["sets"][1]
-    assert second["period"] == 2
     assert [second["forward"][key] for key in ("vertices", "facets", "dimension")] == [130, 15, 6]
     assert [second["tube"][key] for key in ("vertices", "facets", "dimension")] == [27, 9, 6]
     assert second["tube"]["min"][1] == pytest.approx(-2032.6346647262549, rel=1e-9)
@@ -83,63 +33,108 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     assert energy["energy"] == pytest.approx(0.14323052820, abs=1e-11)
     assert energy["nonlinear_miss"] == pytest.approx(1.668028, abs=1e-6)
     assert np.abs(energy["linear_end"]).max() < 1e-9
-    assert np.shape(found["control_ranges"]) == (4, 3, 2)
     for each in found["controls"]:
         within = np.array(each["u"])[..., None] - found["control_ranges"]
         assert (within[..., 0] >= -1e-9).all()
         assert (within[..., 1] <= 1e-9).all()
     assert found["replan"]["miss"] < 1.3
-    assert found["robust"] is None
-    with (folder / "published-tables.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    misses = [row for row in rows if "norm" in row["quantity"]]
-    assert [row["printed"] for row in misses] == ["73.19", "75.37", "74.85"]
-    assert all(float(row["computed"]) < 2.0 for row in misses)
-    first = [
-        abs(float(row["printed"]) - float(row["computed"]))
-        for row in rows
-        if row["table"] == "table 1" and row["quantity"][0] == "u"
+
+
+@pytest.mark.parametrize("thrust", ["box", "ball"])
+def test_what_is_printed_and_delta_v(infoset: Command, thrust: str) -> None:
+    settings = ("--set", f'thrust="{thrust}"', "--select", "energy", "--replan")
+    found = infoset.json("reach", *settings)
+    _, out, _ = infoset("reach", *settings)
+    for result in (found["controls"][0], found["replan"]):
+        control = 0.15 * np.array(result["u"])
+        used = result["delta_v_m_s"]
+        assert [used[axis] for axis in "xyz"] == pytest.approx((180.0 * np.abs(control).sum(axis=0)).tolist())
+        engines = np.abs(control).sum() if thrust == "box" else np.sqrt((control**2).sum(axis=1)).sum()
+        assert used["sum"] == pytest.approx(180.0 * float(engines))
+    printed = [f" {found['controls'][0]['delta_v_m_s'][axis]:.4f}" for axis in ("sum", *"xyz")]
+    printed += [f"Delta-v {found['replan']['delta_v_m_s']['sum']:.4f} m/s"]
+    printed += [
+        "minimum terminal norm 0",
+        "norm 0 needs at least 3 periods",
+        f"route: {found['route']}",
+        "axes: x radial",
     ]
-    assert len(first) == 12
-    assert max(first) <= 0.5e-4
-    for piece in ("minimum terminal norm 0", "norm 0 needs at least 3 periods", "route: exact", "table 3", "replanned"):
-        assert piece in out
+    assert [text for text in printed if text not in out] == []
 
 
-def test_json_alone_and_nothing_written(infoset: Infoset, tmp_path: Path) -> None:
-    code, out, err = infoset("--select", "energy", "--json", "-", "--route", "lifted")
-    assert code == 0
-    found: Any = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-    assert (found["route"], found["route_reason"]) == ("lifted", "as asked")
-    assert found["sets"][1]["tube"]["vertices"] is None
-    assert "minimum terminal norm" in err
-    assert list(tmp_path.iterdir()) == []
-    assert infoset("--select", "energy", "-q") == (0, "", "")
+def test_samples_follow_the_seed() -> None:
+    one, same, other = (COMMAND.report(Reach(select="samples:2", seed=seed)).members for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one[1].controls, same[1].controls)
+    assert (one[1].controls != other[1].controls).any()
 
 
-def test_samples_follow_the_seed(infoset: Infoset) -> None:
-    drawn = [
-        json.loads(infoset("--select", "samples:2", "--json", "-", "-q", "--seed", seed)[1])["controls"]
-        for seed in (1, 1, 2)
+def test_constraints_between_the_periods_bind() -> None:
+    # Short of the bound at whole periods only, a control may break it between them.
+    settings = ["model=time-varying", "initial.position_m=[-2540, -2990, 2120]", "initial.velocity_m_s=[2, -1, 3]"]
+    loose, kept = (
+        COMMAND.report(Reach(settings=[*settings, f"checks_between_periods={checks}"], select="energy")).members[0]
+        for checks in (0, 5)
+    )
+    assert loose.between > 1e-3
+    assert kept.between < 0.2 * loose.between
+
+
+def test_zero_out_of_reach_is_looked_for_further_on(infoset: Command) -> None:
+    found = infoset.json("reach", "--set", "periods=2", "--select", "energy")
+    assert found["optimal_miss"] == pytest.approx(611.79357068, abs=1e-8)
+    assert (found["min_periods"], found["min_periods_searched"]) == (3, 8)
+    assert found["optimal_dimension"] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--select", "enrgy"], "did you mean energy?"),
+        (["--select", ""], "--select: "),
+        (["--select", "samples"], "--select samples: must be a whole number"),
+        (["--select", "samples:0"], "must be from 1 to 1000"),
+        (["--route", "exakt"], "--route: "),
+        (["rendezvous-16-periods", "--route", "exact"], "--route exact: for thrust in a ball"),
+        (["approach-cone", "--select", "vertices"], "choose for example --select samples:20"),
+        ([CASES / "s4_1_59.toml", "--select", "vertices"], "the optimal controls have 22875 vertices, more than the"),
+        (
+            [
+                *("--set", "orbit.eccentricity=0.9", "--set", "orbit.semi_major_axis_km=65000"),
+                *("--set", "periods=40", "--set", "period_s=1000"),
+            ],
+            "the linear model multiplies deviations by over 1e+10",
+        ),
+    ],
+)
+def test_what_is_wrong_is_refused(arguments: list[str], told: str, infoset: Command) -> None:
+    assert told in infoset.refused("reach", *arguments)
+
+
+def test_a_conflict_says_when_and_by_how_much(infoset: Command) -> None:
+    settings = ["--set", "bounds.control=0.01", "--set", "initial.velocity_m_s=[2.0, -7.0, 3.0]"]
+    err = infoset.refused("reach", *settings)
+    assert "they conflict at t = 1 (the bound on y at t = 1" in err
+    by = float(err.split("relaxed by ")[1].split(" %")[0]) / 100.0
+    # Relaxed by so much and a little more, it can be kept.
+    relaxed = [
+        f"bounds.{key}={value * (1.0 + by * 1.01)}" for key, value in (("position_m", 3e3), ("velocity_m_s", 7.5))
     ]
-    assert drawn[0] == drawn[1]
-    assert drawn[0] != drawn[2]
+    assert infoset("reach", *settings, "--set", relaxed[0], "--set", relaxed[1], "--select", "energy")[0] == 0
 
 
-def test_help_has_an_example(infoset: Infoset) -> None:
-    code, out, _ = infoset("--help")
-    assert code == 0
-    assert "Example: infoset reach" in out
+@pytest.mark.parametrize("name", ["s2_1_76", "s2_1_193", "s2_2_68", "near_0.1726"])
+def test_problems_that_ended_in_a_traceback_or_a_refusal(infoset: Command, name: str) -> None:
+    found = infoset.json("reach", CASES / f"{name}.toml")
+    assert [each["name"] for each in found["controls"]] == ["energy", "l1", "norms", "peak", "chebyshev", "analytic"]
+    if name == "s2_2_68":
+        assert found["optimal_miss"] == pytest.approx(679.084, abs=5e-4)
 
 
-def test_every_built_in_problem_is_sound() -> None:
-    names = built_in_names([Rendezvous.kind])
-    assert names == ["approach-cone", "rendezvous-16-periods", "rendezvous-2021"]
-    for name in names:
-        loaded = load_rendezvous(name)
-        assert loaded.name == name
-        assert read_text(Rendezvous, to_toml(loaded), "written") == loaded
-        assert solve(loaded.problem).optimal.miss == 0.0
+@pytest.mark.parametrize("route", ["auto", "exact", "lifted"])
+def test_the_published_problem_with_less_thrust(infoset: Command, route: str) -> None:
+    found = infoset.json("reach", "--set", "bounds.control=0.15", "--route", route)
+    assert found["optimal_miss"] == pytest.approx(1.62757318, abs=1e-8)
+    assert (found["sets"][1]["tube"]["vertices"] is None) == (route == "lifted")
 
 
 def test_the_cone_is_inside_its_angle_and_kept() -> None:
@@ -154,89 +149,13 @@ def test_the_cone_is_inside_its_angle_and_kept() -> None:
     away = points[inside] - [0.0, 15.0, 0.0]
     angles = np.degrees(np.arctan2(np.linalg.norm(away[:, ::2], axis=1), -away[:, 1]))
     assert 19.0 < angles.max() <= 20.0 + 1e-9
-    report = make_report(given, Request(["energy", "analytic"]))
+    report = COMMAND.report(Reach(problem="approach-cone", select="energy,analytic"))
     for each in report.members:
         gaps = each.linear @ problem.normals.T - problem.offsets
         assert gaps.max() < 1e-6
     assert report.robustness is not None
     assert report.robustness.plan is not None
     assert report.min_periods == 9
-
-
-def test_constraints_between_the_periods_bind(tmp_path: Path) -> None:
-    # Short of the bound at whole periods only, a control may break it between them.
-    text = edited(
-        "rendezvous-2021",
-        model='"time-varying"',
-        position_m="[-2540.0, -2990.0, 2120.0]",
-        velocity_m_s="[2.0, -1.0, 3.0]",
-    )
-    free, bound = tmp_path / "free.toml", tmp_path / "bound.toml"
-    free.write_text(text)
-    bound.write_text(text.replace("model =", "checks_between_periods = 5\nmodel ="))
-    loose = make_report(load_rendezvous(free), Request(["energy"])).members[0]
-    kept = make_report(load_rendezvous(bound), Request(["energy"])).members[0]
-    assert loose.between > 1e-3
-    assert kept.between < 0.2 * loose.between
-
-
-def test_other_values_are_not_compared_with_the_paper(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text(edited("rendezvous-2021", name='"other"'))
-    assert is_published(load_rendezvous(file))  # a name changes nothing
-    file.write_text(edited("rendezvous-2021", period_s="181.0"))
-    assert not is_published(load_rendezvous(file))
-
-
-def test_tables_of_the_paper() -> None:
-    given = load_rendezvous("rendezvous-2021")
-    first, second, third = compare_published(given, solve(given.problem))
-    assert first.max_difference <= 0.5e-4
-    assert third.max_difference <= 0.5e-4
-    assert 1e-3 < second.max_difference < 1e-2
-    assert all(np.linalg.norm(each.ours.nonlinear[-1]) < 2.0 for each in (first, second, third))
-    assert printed_tables()["table 2"].controls[0].tolist() == [-0.1254, 0.0373, -0.2612]
-
-
-def test_zero_out_of_reach_is_looked_for_further_on(infoset: Infoset, tmp_path: Path) -> None:
-    file = tmp_path / "short.toml"
-    file.write_text(edited("rendezvous-2021", periods="2"))
-    code, out, _ = infoset(file, "--json", "-", "--select", "energy", "-q")
-    assert code == 0
-    found = json.loads(out)
-    assert found["optimal_miss"] == pytest.approx(611.79357068, abs=1e-8)
-    assert (found["min_periods"], found["min_periods_searched"]) == (3, 8)
-    assert found["optimal_dimension"] == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["rendezvous-2020"], ["rendezvous-2020", "did you mean"]),
-        (["--select", "enrgy"], ["--select", "did you mean energy?"]),
-        (["--select", "energy,energy"], ["named twice"]),
-        (["--select", ""], ["--select", "choose one of"]),
-        (["--select", "samples"], ['must be a whole number, found ""', "--select samples:20"]),
-        (["--select", "samples:0"], ["must be from 1 to 1000"]),
-        (["--select", "samples:-5"], ["must be from 1 to 1000, found -5"]),
-        (["--select", "energy:4"], ["takes no number"]),
-        (["--route", "exakt"], ['--route: there is no "exakt"; did you mean exact?']),
-        (["--noisy-flights", "-1"], ["--noisy-flights: must be from 0 to 1000, found -1;"]),
-        (["--json", "missing/x.json"], ["there is no folder missing"]),
-        (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
-    ],
-)
-def test_what_is_wrong_is_said_before_the_work(
-    arguments: list[str], parts: list[str], infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr("experiments.reachability.run.make_report", lambda *_, **__: pytest.fail("began to work"))
-    code, out, err = infoset(*arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("error: ")
-    assert err.count("error: ") == 1
-    for part in parts:
-        assert part in err
-    assert list(tmp_path.iterdir()) == []
 
 
 POSITION = "[-2540.0, -2650.0, 2120.0]"
@@ -272,53 +191,8 @@ def test_a_bound_is_one_number_or_one_for_each_axis() -> None:
     assert fingerprint(one) == fingerprint(three)
 
 
-def test_a_conflict_says_when_and_by_how_much(infoset: Infoset, tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text(edited("rendezvous-2021", control="0.01", velocity_m_s="[2.0, -7.0, 3.0]"))
-    code, _, err = infoset(file)
-    assert code == 2
-    assert "they conflict at t = 1 (the bound on y at t = 1" in err
-    assert "relax all constraints on states by" in err
-    by = float(err.split("relax all constraints on states by ")[1].split(" %")[0]) / 100.0
-    lines = file.read_text().splitlines()
-    # Relaxed by so much and a little more, it can be kept.
-    text = "\n".join(lines).replace("position_m = 3000.0", f"position_m = {3000.0 * (1.0 + by * 1.001):.9f}")
-    file.write_text(text.replace("velocity_m_s = 7.5", f"velocity_m_s = {7.5 * (1.0 + by * 1.001):.9f}"))
-    assert infoset(file, "--select", "energy")[0] == 0
-
-
-def test_what_the_exact_route_and_vertices_cannot_do_is_said(infoset: Infoset) -> None:
-    code, _, err = infoset("rendezvous-16-periods", "--route", "exact")
-    assert code == 2
-    assert "--route exact: for thrust in a ball" in err
-    code, _, err = infoset("approach-cone", "--select", "vertices")
-    assert code == 2
-    assert "choose for example --select samples:20" in err
-
-
-def test_a_tube_that_cannot_be_drawn_ends_in_a_message(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> str:
-        raise ArithmeticError("a convex program was not solved")
-
-    monkeypatch.setattr("experiments.reachability.run.reachability_page", fail)
-    code, _, err = infoset("--select", "energy", "--html", "page.html", "-q")
-    assert code == 2
-    assert "cannot draw the tube: a convex program was not solved; the numbers are in" in err
-
-
-def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> None:
-    precious = tmp_path / "x.json"
-    precious.write_text("precious")
-    code, _, err = infoset("--json", precious, "--select", "energy")
-    assert code == 2
-    assert "--overwrite" in err
-    assert precious.read_text() == "precious"
-    assert infoset("--select", "energy", "--json", precious, "--overwrite", "-q")[0] == 0
-    assert json.loads(precious.read_text())["problem"] == "rendezvous-2021"
-
-
 def test_figures_show_sets_members_and_ranges() -> None:
-    report = make_report(load_rendezvous("rendezvous-2021"), Request(["energy", "l1", "norms"]))
+    report = COMMAND.report(Reach(select="energy,l1,norms"))
     positions, velocities, planes, controls = draw_all(report)
     assert "nonlinear" in positions.legends[0].get_texts()[0].get_text()
     assert velocities.axes[0].get_xlabel() == "$v_x$ (radial), m/s"

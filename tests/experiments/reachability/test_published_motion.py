@@ -15,15 +15,15 @@ from scipy.optimize import linprog
 
 from benchmarks import published_radius
 from experiments.common.hill_axes import from_paper, to_paper
-from experiments.common.printed_numbers import Comparison, Verdict
+from experiments.common.printed_numbers import Comparison, Verdict, read_paper
 from experiments.reachability.file import load_rendezvous
-from experiments.reachability.printed_tables import PROBLEM, printed_tables
-from experiments.reachability.published import published_motion, reproduce
+from experiments.reachability.published import PROBLEM, printed_tables, published_motion
+from experiments.reproduced_numbers import reproduce_paper
 from infoset.arrays import Floats
 from rendezvous.reachability import minimum_energy, solve
 
 RENDEZVOUS = load_rendezvous(PROBLEM)
-TABLES = list(printed_tables().values())
+TABLES = printed_tables()
 START = np.array([2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0])
 PERIOD_S, PUSH_M_S2, RADIUS_M = 180.0, 0.15, 90e3
 RATE_RAD_S = float(np.sqrt(3.986004418e14 / (1e7 * (1.0 - 0.1**2)) ** 3) * 1.1**2)
@@ -70,7 +70,7 @@ def states(number: int) -> tuple[Floats, Floats]:
 @pytest.fixture(scope="module")
 def numbers() -> dict[tuple[int, str], Comparison]:
     """Verdicts by table and name without unit."""
-    found = reproduce(lambda _done: None).numbers
+    found = reproduce_paper(read_paper("reachability"), lambda _done: None)
     return {(int(each.number.source[-1]), each.number.name.partition(" (")[0]): each for each in found}
 
 
