@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset._compile import ZERO, allocation_free, inlined, prefetch, record_of
+from infoset._compile import ZERO, allocation_free, inlined, record_of
 from infoset.arrays import Floats
-from infoset.chains import CAPACITY, MAX_ADDED, Chain, count_of, number_vertices, offset_of, read, write
+from infoset.chains import CAPACITY, MAX_ADDED, Chain, count_of, number_vertices, read, write
 
 ROOM_AT_START = 64
 """Initial room of a chain, in vertices, a power of two."""
@@ -102,15 +102,6 @@ def room_for(vertices: int, room: int) -> int:
 def floats_of(room: int) -> int:
     """Floats of a ring. One cache line more than its vertices: rings must not all start in the same cache lines."""
     return 2 * room + LINE
-
-
-@inlined
-def expect(right: Chain, left: Chain, rings: Floats) -> None:
-    """Prefetch the vertices of a section that the next step reads."""
-    for chain in (right, left):
-        prefetch(rings, offset_of(chain, chain.begin))
-        prefetch(rings, offset_of(chain, chain.end - 1))
-        prefetch(rings, offset_of(chain, chain.peak))
 
 
 @allocation_free

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset import chains
-from infoset._compile import ZERO, allocation_free, by_reference, entry
+from infoset._compile import ZERO, allocation_free, entry
 from infoset.arrays import Flags, Floats, Integers
 from infoset.chain_storage import chains_of
 from infoset.concave_bounds import bound_between
@@ -55,7 +55,6 @@ def extremes_along(points: Floats, count: int, tau: float) -> tuple[float, float
     return minimum, maximum
 
 
-@by_reference
 class Outlines(NamedTuple):
     """Working arrays for the labels replayed for one step.
 

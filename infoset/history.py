@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import allocation_free, by_reference
+from infoset._compile import allocation_free
 from infoset.arrays import Flags, Floats, Integers
 
 ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
@@ -73,7 +73,6 @@ class LastSight(NamedTuple):
 NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
 
 
-@by_reference
 class Tapes(NamedTuple):
     """Histories of a batch for the kernels: `Tape` with values of shape (events, C, B) and applies (events, B)."""
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from infoset import chain_storage, chains
-from infoset._compile import ZERO, allocation_free, by_reference, constants, entry
+from infoset._compile import ZERO, allocation_free, constants, entry
 from infoset.arrays import Flags, Floats, Integers
 from infoset.chain_storage import chains_of, copy_section, empty_sections, working_room
 from infoset.history import (
@@ -59,7 +59,6 @@ WINDOW = np.dtype([("near", np.float64), ("far", np.float64), *OUTCOME])
 """A window of labels, m, with the latest outcome that a label of it reached."""
 
 
-@by_reference
 class ReplayRoom(NamedTuple):
     """Working arrays for replays of E events.
 
@@ -83,7 +82,6 @@ class ReplayRoom(NamedTuple):
     points: Floats
 
 
-@by_reference
 class Workspace(NamedTuple):
     """Working arrays for replays and for a search over K labels.
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chain_storage, chains
-from infoset._compile import ZERO, allocation_free, by_reference, entry, inlined, record_of
+from infoset._compile import ZERO, allocation_free, entry, inlined, record_of
 from infoset.arrays import Flags, Floats, Integers
 from infoset.chain_storage import chains_of
 from infoset.history import LastSight, Tapes
@@ -63,7 +63,6 @@ class Slot(Protocol):
     emptied: int
 
 
-@by_reference
 class Sections(NamedTuple):
     """B engagements x S slots for one section each, in the plane of each of C lateral axes.
 
@@ -193,9 +192,6 @@ def step_all(
             b, s = rows[k, 1], rows[k, 2]
             slot = slots[b, s]
             right, left = chains_of(records, rows[k, 0])
-            if k + 1 < count:
-                next_right, next_left = chains_of(records, rows[k + 1, 0])
-                chain_storage.expect(next_right, next_left, rings)
             if behind[b]:
                 predict_section(right, left, rings, slot.label, elapsed, law)
             if measured[b]:
