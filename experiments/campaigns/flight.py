@@ -22,8 +22,7 @@ from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
 from experiments.common.screen import LINE_EVERY_S, NOT_FINITE, number, say
-from experiments.interception.choices import study_scenario
-from experiments.interception.scenario_file import scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings, study_scenario
 from sim import Campaign, CampaignNoise, CampaignResult, Scenario
 from sim.campaign import Progress
 from sim.flights import fly_on_threads

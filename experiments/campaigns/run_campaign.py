@@ -8,7 +8,7 @@ from experiments.campaigns.samples import heading, sample_json, sample_parts, sa
 from experiments.common.errors import input_errors
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import show, some_runs
-from experiments.interception.own_strategy import own_strategy
+from experiments.interception.strategies import own_strategy
 from experiments.interception.study import study_title
 from sim import Campaign, CampaignNoise, StoppingRule
 from sim.storage import need_arrow

@@ -14,7 +14,7 @@ from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import say, show
-from experiments.interception.own_strategy import own_strategy
+from experiments.interception.strategies import own_strategy
 from sim import CampaignNoise, Sweep
 from sim.storage import need_arrow, need_free
 

@@ -1,16 +1,18 @@
-"""Scenario files, and warnings about values that are allowed but probably not intended."""
+"""Scenarios of commands: files, the options that replace their values, and warnings about these values."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
-from experiments.common.errors import input_errors
+from experiments.common.errors import InputError, input_errors
 from experiments.common.input_file import read_file
 from experiments.common.options import choice
-from guidance import strategy_names
-from infoset.model import Model, SetModel
+from experiments.interception.strategies import is_own_strategy
+from guidance import TieRule, strategy_names
+from infoset.model import MAX_SECTIONS, Model, SetModel
 from sim.gravity import on_board_model
 from sim.scenario import Scenario, Target
 
@@ -33,6 +35,74 @@ def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] 
     with input_errors(os.fspath(name_or_path)):
         on_board_model(scenario)
     return scenario
+
+
+def with_model(scenario: Scenario, model: Model) -> Scenario:
+    """Return a scenario with a set model; another model than the scenario's starts from its default initial set."""
+    settings = scenario.information_set
+    if model is settings.model:
+        return scenario
+    with input_errors(f"{scenario.name} with --model {model.value}"):
+        changed = replace(scenario, information_set=replace(settings, model=model, initial_set=None))
+        on_board_model(changed)
+    return changed
+
+
+def scenario_with(options: Any) -> Scenario:
+    """Read the scenario of a command and replace what its options set; None keeps the value of the scenario.
+
+    The command may have the options `strategy`, `model`, `tie`, `sections` and `range_sensor`. ``--strategy
+    FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it. Raise `InputError` if the scenario
+    is unsound, or an option does not fit it.
+    """
+    strategy, model, tie, sections, range_sensor = (
+        getattr(options, name, None) for name in ("strategy", "model", "tie", "sections", "range_sensor")
+    )
+    scenario = load_scenario(options.scenario, options.settings)
+    if strategy is not None and not is_own_strategy(strategy):
+        scenario = replace(scenario, strategy=choice("--strategy", strategy, strategy_names()))
+    if tie is not None:
+        scenario = replace(scenario, tie=TieRule(tie))
+    if range_sensor and scenario.range_sensor is None:
+        raise InputError(
+            f"--range-sensor: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
+            "example period_s = 2.0 and relative_error = 0.05, or omit --range-sensor"
+        )
+    if range_sensor is False:
+        scenario = replace(scenario, range_sensor=None)
+    if model is not None:
+        scenario = with_model(scenario, Model(model))
+    settings = scenario.information_set
+    if sections is not None:
+        fewest = settings.fewest_sections
+        if not fewest <= sections <= MAX_SECTIONS:
+            raise InputError(
+                f"--sections: must be from {fewest}, the scenario's information_set.fewest_sections, to "
+                f"{MAX_SECTIONS}, found {sections}; for example --sections {max(29, fewest)}"
+            )
+        settings = replace(settings, sections=sections)
+    return replace(scenario, information_set=settings)
+
+
+def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario, list[str]]:
+    """Return the scenario of a study, whose default model is the guaranteed one, whatever the scenario file says.
+
+    With the model `paper`, quantiles can include runs whose set lost the true state. The list contains a line for the
+    screen if the default replaces the model of the file. ``--model`` and ``--set`` may choose the model; if a folder is
+    resumed, its model is the default.
+    """
+    scenario = scenario_with(options)
+    chosen = any(text.partition("=")[0].strip() == "information_set.model" for text in options.settings or ())
+    of_file, default = scenario.information_set.model.value, resumed or Model.GUARANTEED
+    if chosen or options.model is not None or default.value == of_file:
+        return scenario, []
+    try:
+        changed = with_model(scenario, default)
+    except InputError as error:
+        raise InputError(f"{error}; or choose the model of the file with --model {of_file}") from None
+    if resumed:
+        return changed, [f"model: {default.value}, the model of the resumed folder; the scenario file has {of_file}"]
+    return changed, [f"model: {default.value}, the default of studies; to use that of the file, add --model {of_file}"]
 
 
 def scenario_warnings(scenario: Scenario) -> list[str]:
@@ -146,14 +216,3 @@ def _along(axis: str, owner: Target | SetModel | None, name: str) -> tuple[str, 
     own = f"{name}_y_m_s2"
     key = own if axis == "y" and getattr(owner, own) is not None else f"{name}_m_s2"
     return key, getattr(owner, key)
-
-
-def with_model(scenario: Scenario, model: Model) -> Scenario:
-    """Return a scenario with a set model; another model than the scenario's starts from its default initial set."""
-    settings = scenario.information_set
-    if model is settings.model:
-        return scenario
-    with input_errors(f"{scenario.name} with --model {model.value}"):
-        changed = replace(scenario, information_set=replace(settings, model=model, initial_set=None))
-        on_board_model(changed)
-    return changed

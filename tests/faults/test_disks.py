@@ -136,7 +136,7 @@ def test_what_nobody_has_made_a_message_of(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("experiments.interception.choices.load_scenario", fail)
+    monkeypatch.setattr("experiments.interception.scenario_file.load_scenario", fail)
     message = refused(infoset("engage"))
     for part in parts:
         assert part in message

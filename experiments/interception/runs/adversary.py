@@ -13,14 +13,13 @@ from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, say_warnings, show
-from experiments.interception.choices import study_scenario
 from experiments.interception.command import Adversary
-from experiments.interception.own_strategy import own_strategy
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import steps_csv
 from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, need_times, read_times
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, summary_head
-from experiments.interception.scenario_file import scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings, study_scenario
+from experiments.interception.strategies import own_strategy
 from experiments.interception.study import scenario_title
 from sim import Scenario
 from sim.adversary import Objective, WorstEngagement

@@ -23,11 +23,11 @@ from experiments.common.screen import (
     say_warnings,
     show,
 )
-from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Bound
 from experiments.interception.runs.game_value import GameValue, WorstOfStrategy, value_of
 from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, summary_head
-from experiments.interception.scenario_file import scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings, study_scenario
+from experiments.interception.strategies import chosen_strategies
 from guidance import Strategy
 from sim import BoundError, Scenario
 from sim.bound import LowerBound, lower_bound, pair_at

@@ -19,11 +19,11 @@ from experiments.common.screen import (
     show,
     some_runs,
 )
-from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Compare
 from experiments.interception.comparison import Comparison, Flight, flights, gather, summary
 from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_in_threads, summary_head
-from experiments.interception.scenario_file import scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings, study_scenario
+from experiments.interception.strategies import chosen_strategies
 from experiments.interception.study import (
     QUANTILES,
     SetCounts,

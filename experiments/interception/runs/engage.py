@@ -9,9 +9,7 @@ from time import perf_counter
 from experiments.common.input_file import to_toml
 from experiments.common.output import Cell, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, show
-from experiments.interception.choices import scenario_with
 from experiments.interception.command import Engage
-from experiments.interception.own_strategy import own_strategy
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engagement_table import (
     FIGURES,
@@ -21,7 +19,8 @@ from experiments.interception.runs.engagement_table import (
     read_times,
 )
 from experiments.interception.runs.shared import need_finite, summary_head
-from experiments.interception.scenario_file import scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings, scenario_with
+from experiments.interception.strategies import own_strategy
 from guidance import NoiseKind
 from infoset import AngleSensor, Convention
 from infoset.sensors import SENSORS

@@ -21,11 +21,9 @@ from experiments.common.screen import (
     show,
     some_runs,
 )
-from experiments.interception.choices import scenario_with
 from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
 from experiments.interception.curves import Curve, curve_scenarios
-from experiments.interception.own_strategy import own_strategy
 from experiments.interception.published import MANY, SINGLE, printed_single_runs
 from experiments.interception.runs.shared import (
     THEOREM_8_NAME,
@@ -36,7 +34,8 @@ from experiments.interception.runs.shared import (
     simulate_in_threads,
     summary_head,
 )
-from experiments.interception.scenario_file import scenario_warnings
+from experiments.interception.scenario_file import scenario_warnings, scenario_with
+from experiments.interception.strategies import own_strategy
 from experiments.interception.study import QUANTILES, SetCounts, game_note, hit_text, set_counts, set_warnings
 from infoset import Recovery
 from sim import Outcome, Results, Scenario

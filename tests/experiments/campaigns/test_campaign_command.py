@@ -23,8 +23,8 @@ from experiments.campaigns.flight import duration, size
 from experiments.campaigns.samples import replay_line
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
-from experiments.interception.own_strategy import load_strategy
 from experiments.interception.scenario_file import load_scenario, with_model
+from experiments.interception.strategies import load_strategy
 from guidance import NoiseKind
 from infoset import Model
 from sim import Campaign, CampaignNoise, Scenario, fly_one
