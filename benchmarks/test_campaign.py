@@ -15,7 +15,7 @@ import pytest
 
 from guidance import NoiseKind
 from sim import Campaign, Scenario, simulate
-from sim.flights import worker_processes
+from sim.parallel import worker_processes
 
 Check = Callable[[str, float, float, str], None]
 Work = Callable[[Path], object]
@@ -42,7 +42,7 @@ short = replace(whole, set_model=model, dispersion=start, range_sensor=None)
 
 runs, folder = int(sys.argv[1]), Path(sys.argv[2])
 result = Campaign(short, runs, folder, noise=CampaignNoise.MIXED).run(workers=2)
-assert sum(sample.runs for sample in samples(result.folder)) == runs
+assert sum(sample.runs for sample in samples(result)) == runs
 """
 
 

@@ -78,10 +78,9 @@ nitpick_ignore = [
         "rendezvous.reachability.admissible": ("Lifted",),
         "rendezvous.reachability.optimum": ("BlockOptimum",),
         "sim.truth_pair": ("TruthPair",),
-        "sim.chunk": ("Chunk",),
-        "sim.storage.campaign_folder": ("CampaignFolder", "Damage"),
+        "sim.parallel": ("Task",),
+        "sim.storage.campaign_folder": ("CampaignFolder",),
         "sim.storage.manifest": ("Manifest",),
-        "sim.campaign": ("Progress",),
     }.items()
     for name in names
 ]

@@ -2,10 +2,10 @@
 
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.bound import LowerBound, lower_bound
-from sim.campaign import Campaign, CampaignResult, Sweep
-from sim.chunk import CampaignNoise
+from sim.campaign import Campaign
 from sim.closed_form import possible_miss_of
 from sim.farthest_pair import BoundError
+from sim.parallel import CampaignNoise
 from sim.record import AxisStep, Inconsistency, Record, StepRecord, fly_one
 from sim.requirement import HitRequirement, Requirement
 from sim.results import Outcome, Results
@@ -29,7 +29,6 @@ __all__ = [
     "BoundError",
     "Campaign",
     "CampaignNoise",
-    "CampaignResult",
     "Distribution",
     "HitEstimate",
     "HitRequirement",
@@ -48,7 +47,6 @@ __all__ = [
     "StepRecord",
     "StoppingRule",
     "Sun",
-    "Sweep",
     "Target",
     "WorstEngagement",
     "empirical_distribution",

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
-
-import numpy as np
 
 from infoset.arrays import Floats
 from infoset.limits import Checked, Fraction, Positive, check_fields
 from sim.statistics import estimate_quantiles, level_name, number_text
 
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
-GROWTH = 1.05
-"""The sample grows by at least this factor between two checks: a check after every chunk would cost O(N^2)."""
 
 DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
 _QUANTILE = rf"\s*(?P<quantity>\w+)\s+p(?P<level>{DIGITS})\s*"
@@ -89,52 +84,17 @@ class StoppingRule(Checked):
         example = 'a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"'
         return cls(*parse_quantile(text, rf"\s+ci\s*<{NUMBER}", example, "the width of the confidence interval"))
 
+    @property
+    def quantity(self) -> str:
+        """Column of the results that it uses."""
+        return self.quantile.quantity
+
     def met_by(self, sample: Floats) -> bool:
         """Whether a sample is large enough."""
         if not sample.size:
             return False
         (estimate,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)
         return estimate.width is not None and estimate.width < self.width
-
-
-class Watch:
-    """Checks a stopping rule on the chunks of a campaign in their order, as far as they are stored without a gap.
-
-    `read` returns the samples of a chunk, one for each of the `groups`, the noises; each must meet the rule.
-
-    It checks after certain numbers of chunks only, which do not depend on the workers and their speed: the campaign
-    stops at the same run on one worker and on a hundred, in one session and in ten. O(N log N) over a campaign.
-    """
-
-    def __init__(self, rule: StoppingRule, groups: int, read: Callable[[int], list[Floats]], chunks: int) -> None:
-        self._rule = rule
-        self._read = read
-        self._chunks = chunks
-        self._samples: list[list[Floats]] = [[] for _ in range(groups)]
-        self._seen = 0
-        self._checks = _checks(chunks)
-        self._next = next(self._checks)
-
-    def met(self, finished: Callable[[int], bool]) -> int | None:
-        """Check the new chunks that are `finished`; return the number of chunks after which to stop, None to go on."""
-        while self._seen < self._chunks and finished(self._seen):
-            for sample, values in zip(self._samples, self._read(self._seen), strict=True):
-                sample.append(values)
-            self._seen += 1
-            if self._seen == self._next:
-                self._next = next(self._checks)
-                self._samples = [[np.concatenate(sample)] for sample in self._samples]
-                if all(self._rule.met_by(sample[0]) for sample in self._samples):
-                    return self._seen
-        return None
-
-
-def _checks(chunks: int) -> Iterator[int]:
-    """Yield the numbers of chunks after which the rule is checked."""
-    count = 0
-    while True:
-        count = max(count + 1, math.ceil(GROWTH * count))
-        yield min(count, chunks)
 
 
 def parse_quantile(text: str, end: str, wanted: str, number: str = "") -> tuple[QuantileName, float]:

@@ -1,108 +1,153 @@
-"""Runs are added to the cells of a sweep until a requirement is decided in each cell."""
+"""Runs are added to the cells of a campaign or a sweep until a rule is decided in each cell."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
-from sim.chunk import Chunk
+from infoset.arrays import Floats
 from sim.requirement import AnyRequirement, decides
 from sim.results import Results
-from sim.storage import CampaignWriter
+from sim.stopping_rule import StoppingRule
+from sim.storage import CampaignFolder
+
+GROWTH = 1.05
+"""A sample grows by at least this factor between two checks of a quantile: one after each chunk would cost O(N^2)."""
+
+
+class QuantileSample:
+    """Runs of one noise of a cell, whose quantile is checked after certain numbers of its chunks.
+
+    The numbers depend neither on the workers nor on their speed: a campaign stops at the same run on one worker and on
+    a hundred, in one session and in ten. O(N log N) over a campaign.
+    """
+
+    def __init__(self, rule: StoppingRule, chunks: int) -> None:
+        self.decided = False
+        self._rule = rule
+        self._last = chunks
+        self._values: list[Floats] = []
+        self._next_check = 1
+
+    def add(self, values: Floats) -> None:
+        """Add the values of a chunk; NaN is unknown."""
+        self._values.append(values[~np.isnan(values)])
+        count = len(self._values)
+        if count == min(self._next_check, self._last):
+            self._next_check = max(count + 1, math.ceil(GROWTH * count))
+            self.decided = self._rule.met_by(np.concatenate(self._values))
+
+
+class ShareSample:
+    """Runs of one noise of a cell, whose share that satisfies a requirement is judged by a confidence sequence."""
+
+    def __init__(self, required: AnyRequirement) -> None:
+        self.decided = False
+        self._required = required
+        self._runs = self._holding = 0
+
+    def add(self, values: Floats) -> None:
+        """Add the values of a chunk; NaN is unknown."""
+        if not values.size:
+            return
+        required = self._required
+        counts = self._holding + np.cumsum(required.holds(np.where(np.isnan(values), required.unknown, values)))
+        runs = np.arange(self._runs + 1, self._runs + values.size + 1)
+        self.decided |= bool(decides(runs, counts, required.share).any())
+        self._runs, self._holding = int(runs[-1]), int(counts[-1])
 
 
 @dataclass
 class _Cell:
-    """Progress of a cell: judged chunks; for each noise the runs, those that satisfy the bound, and the decision."""
+    """Progress of a cell: its chunks, the number of judged ones, and the judged runs of each noise."""
 
-    chunks: int = 0
-    runs: list[int] = field(default_factory=list)
-    holding: list[int] = field(default_factory=list)
-    decided: list[bool] = field(default_factory=list)
+    chunks: list[range]
+    samples: dict[str, QuantileSample | ShareSample]
+    judged: int = 0
+    waiting: dict[Sequence[int], Results] = field(default_factory=dict)
 
 
 class UndecidedCells:
-    """The chunks of a sweep that must still be simulated, and those that were simulated before an earlier chunk.
+    """The chunks that must still be simulated, and those that were simulated before an earlier chunk.
 
-    The number of runs in the manifest of the folder is the limit of each cell, `min_runs` its minimum number. The
-    requirement is decided for each noise, by the confidence sequence of `sim.requirement.judge`. A chunk is stored only
-    if the chunks before it in its cell are stored and have not decided. The stored runs are therefore the same for any
-    number of workers and after any interruption.
+    The number of runs in the manifest of the folder is the limit of each cell, `min_runs` its minimum number for a
+    requirement. The rule is decided for each noise. A chunk is stored only if the chunks before it in its cell are
+    stored and have not decided. The stored runs are therefore the same for any number of workers and after any
+    interruption.
     """
 
-    def __init__(
-        self, folder: CampaignWriter, requirement: AnyRequirement, noises: Sequence[str], min_runs: int
-    ) -> None:
+    def __init__(self, folder: CampaignFolder, rule: StoppingRule | AnyRequirement, min_runs: int) -> None:
         self._folder = folder
-        self._requirement = requirement
-        self._noises = noises
-        self._min_runs = min_runs
-        self._waiting: dict[int, tuple[Chunk, Results]] = {}
-        zeros, none = [0] * len(noises), [False] * len(noises)
-        self._cells = [_Cell(0, [*zeros], [*zeros], [*none]) for _ in range(folder.manifest.cells)]
+        self._rule = rule
+        self._min_runs = 0 if isinstance(rule, StoppingRule) else min_runs
+        chunks: list[list[range]] = [[] for _ in range(folder.manifest.cells)]
+        for cell, runs in folder.manifest.chunks():
+            chunks[cell].append(runs)
+        noises = [kind.value for kind in folder.manifest.noise.kinds]
+        self._cells = [
+            _Cell(
+                each,
+                {
+                    noise: QuantileSample(rule, len(each)) if isinstance(rule, StoppingRule) else ShareSample(rule)
+                    for noise in noises
+                },
+            )
+            for each in chunks
+        ]
         for cell in range(len(self._cells)):
             self._advance(cell)
 
     @property
     def undecided(self) -> int:
         """Number of cells that need more runs."""
-        return sum(not self._is_done(cell) for cell in range(len(self._cells)))
+        return sum(not self._is_done(cell) for cell in self._cells)
 
     @property
     def runs(self) -> tuple[int, ...]:
-        """Engagements stored without a gap from run 0 on, for each cell."""
-        manifest = self._folder.manifest
+        """Engagements stored without a gap from run 0 on, for each cell; empty if the rule has stopped none."""
+        if not any(map(self._is_decided, self._cells)):
+            return ()
         counts = []
-        for cell in range(manifest.cells):
-            number = 0
-            while number < manifest.chunks_a_cell and self._folder.has(manifest.index_of(cell, number)):
-                number += 1
-            counts.append(min(number * manifest.chunk, manifest.runs))
+        for number, cell in enumerate(self._cells):
+            stored = itertools.takewhile(partial(self._folder.has, number), cell.chunks)
+            counts.append(sum(map(len, stored)))
         return tuple(counts)
 
-    def missing(self) -> Iterator[int]:
+    def missing(self) -> Iterator[tuple[int, range]]:
         """Yield the chunks to simulate: the next one of each cell that is undecided at that time, in rounds."""
-        manifest = self._folder.manifest
-        for number in range(manifest.chunks_a_cell):
-            for cell in range(manifest.cells):
-                index = manifest.index_of(cell, number)
-                if not self._is_done(cell) and not self._folder.has(index):
-                    yield index
+        for cell, runs in self._folder.manifest.chunks():
+            if not self._is_done(self._cells[cell]) and not self._folder.has(cell, runs):
+                yield cell, runs
 
-    def store(self, chunk: Chunk, results: Results) -> None:
+    def store(self, cell: int, runs: Sequence[int], results: Results) -> None:
         """Write a simulated chunk once all chunks before it are written; discard it if its cell is then decided."""
-        self._waiting[chunk.index] = chunk, results
-        self._advance(chunk.cell)
+        self._cells[cell].waiting[runs] = results
+        self._advance(cell)
 
-    def _is_done(self, cell: int) -> bool:
-        manifest, state = self._folder.manifest, self._cells[cell]
-        runs = min(state.chunks * manifest.chunk, manifest.runs)
-        return runs == manifest.runs or (runs >= self._min_runs and all(state.decided))
+    def _is_decided(self, cell: _Cell) -> bool:
+        runs = min(cell.judged * self._folder.manifest.chunk, self._folder.manifest.runs)
+        return runs >= self._min_runs and all(sample.decided for sample in cell.samples.values())
 
-    def _advance(self, cell: int) -> None:
+    def _is_done(self, cell: _Cell) -> bool:
+        return cell.judged == len(cell.chunks) or self._is_decided(cell)
+
+    def _advance(self, number: int) -> None:
         """Judge the chunks of a cell in their order, up to the first unknown chunk or the decision of the cell."""
+        cell = self._cells[number]
         while not self._is_done(cell):
-            index = self._folder.manifest.index_of(cell, self._cells[cell].chunks)
-            if index in self._waiting:
-                self._folder.write(*self._waiting.pop(index))
-            elif not self._folder.has(index):
+            runs = cell.chunks[cell.judged]
+            if runs in cell.waiting:
+                self._folder.write(number, runs, cell.waiting.pop(runs))
+            elif not self._folder.has(number, runs):
                 return
-            self._judge(cell, index)
-        for index in [index for index, (chunk, _) in self._waiting.items() if chunk.cell == cell]:
-            del self._waiting[index]
-
-    def _judge(self, cell: int, index: int) -> None:
-        state = self._cells[cell]
-        required = self._requirement
-        samples = self._folder.chunk_samples(index, required.quantity, self._noises, unknown=required.unknown)
-        for noise, values in enumerate(samples):
-            counts = state.holding[noise] + np.cumsum(required.holds(values))
-            if not values.size:
-                continue
-            before = state.runs[noise]
-            runs = np.arange(before + 1, before + values.size + 1)
-            state.decided[noise] |= bool(decides(runs, counts, required.share).any())
-            state.runs[noise], state.holding[noise] = before + values.size, int(counts[-1])
-        state.chunks += 1
+            frame = self._folder.chunk(number, runs, ["noise", self._rule.quantity])
+            for noise, sample in cell.samples.items():
+                values = frame.loc[frame["noise"] == noise, self._rule.quantity]
+                sample.add(values.to_numpy(dtype=np.float64, na_value=np.nan))
+            cell.judged += 1
+        cell.waiting.clear()

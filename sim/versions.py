@@ -5,39 +5,37 @@ from __future__ import annotations
 import functools
 import json
 import platform
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-CALCULATING = ("infoset", "numpy", "numba", "llvmlite")
+PACKAGES = ("infoset", "numpy", "numba")
+"""Packages on which the numbers depend."""
 
 
 class VersionError(Exception):
-    """A chunk needs other versions of the packages; the message names both versions."""
-
-
-@functools.cache
-def calculating_versions() -> tuple[tuple[str, str], ...]:
-    """Return the names and versions of the packages on which results depend."""
-    return tuple((name, _version(name)) for name in CALCULATING)
+    """A worker has other versions of the packages; the message names both versions."""
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that results and records carry: those of the packages, and that of Python."""
-    return {**dict(calculating_versions()), "python": platform.python_version()}
+    """Return the versions that results, records and campaigns carry: those of the packages, and that of Python."""
+    return {**{name: _version(name) for name in PACKAGES}, "python": platform.python_version()}
 
 
-def differences(here: tuple[tuple[str, str], ...], there: tuple[tuple[str, str], ...]) -> list[str]:
-    """Return a text for each version that differs, such as `numpy 2.1 here, 2.0 there`."""
-    ours, theirs = dict(here), dict(there)
-    return [
-        f"{name} {ours.get(name, 'none')} here, {theirs.get(name, 'none')} there"
-        for name in dict.fromkeys((*ours, *theirs))
-        if ours.get(name) != theirs.get(name)
+def need_versions(wanted: Mapping[str, str]) -> None:
+    """Raise VersionError if a package has another version than the `wanted` one."""
+    differ = [
+        f"{name} {wanted.get(name)} in the campaign, {_version(name)} on the worker"
+        for name in PACKAGES
+        if wanted.get(name) != _version(name)
     ]
+    if differ:
+        raise VersionError("; ".join(differ))
 
 
+@functools.cache
 def _version(name: str) -> str:
     try:
         return version(name)

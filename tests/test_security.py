@@ -22,7 +22,6 @@ from experiments.interception.scenario_file import load_scenario
 from infoset import StateBox
 from sim import Campaign, Record, fly_one
 from sim.scenario import of_model
-from sim.storage.manifest import checksum
 from tests.built_in import scenario_text
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
@@ -144,8 +143,7 @@ def test_no_path_from_inside_a_file_is_ever_opened(
     Campaign(brief, 8, "runs").run(workers=1)
     manifest = Path("runs/manifest.json")
     value = json.loads(manifest.read_text())
-    value |= {"made_by": {"python": path}, "name": path, "version": path}
-    value["sha256"] = checksum(value)
+    value["versions"]["python"] = value["scenario"]["description"] = path
     manifest.write_text(json.dumps(value))
     Path("mine.toml").write_text(
         scenario_text("asteroid-1997").replace('description = "', f'description = "{path} ', 1)
@@ -168,11 +166,11 @@ def test_a_manifest_cannot_steer_the_terminal(
     key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    plain = Campaign(load_scenario("asteroid-1997"), 8, "runs").manifest().to_json()
+    Path("runs").mkdir()
+    Campaign(load_scenario("asteroid-1997"), 8, "runs").manifest().write(Path("runs"))
+    plain = json.loads(Path("runs/manifest.json").read_text())
     place = plain["scenario"] if key in ("name", "description") else plain
     place[key] = {f"x{ESCAPE}": ESCAPE} if key == "versions" else f"x{ESCAPE}"
-    plain["sha256"] = checksum(plain)
-    Path("runs").mkdir()
     Path("runs/manifest.json").write_text(json.dumps(plain))
     assert infoset("report", "runs") == 2
     told = capsys.readouterr()

@@ -6,6 +6,7 @@ from experiments.campaigns.command import Campaign as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, duration, fly, scenario_of
 from experiments.campaigns.samples import heading, sample_json, sample_parts, samples
 from experiments.common.errors import input_errors
+from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import show, some_runs
 from experiments.interception.strategies import own_strategy
@@ -35,13 +36,12 @@ def run(options: Options) -> None:
             until=rule,
         )
         flown = fly(campaign, options, model_notes)
-        stored, manifest = flown.result.folder, flown.result.folder.manifest
+        stored, manifest = flown.folder, flown.folder.manifest
         by_noise = samples(stored)
         results = {
             **heading(stored),
             **({"warnings": flown.warnings} if flown.warnings else {}),
             "elapsed_s": flown.elapsed_s,
-            "redone": [{"file": damage.file.name, "reason": damage.reason} for damage in flown.result.redone],
             "samples": [sample_json(sample) for sample in by_noise],
         }
         stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
@@ -53,7 +53,8 @@ def run(options: Options) -> None:
         ]
         if manifest.until is not None and manifest.stopped_after is None:
             parts.append(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")
-        written.enter(options.out, "shards", SCENARIO_FILE)
+        written.enter(options.out, "shards")
+        written.save(SCENARIO_FILE, to_toml(scenario))
         written.save(SUMMARY, to_json(results), "--json")
     parts.append(f"to see the results: infoset report {stored.path}")
     show(parts, options.quiet, stdout_taken=written.stdout_taken)

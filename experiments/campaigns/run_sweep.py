@@ -12,10 +12,11 @@ from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_report import SweepReport, default_requirement, quantile_options
 from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
+from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import say, show
 from experiments.interception.strategies import own_strategy
-from sim import CampaignNoise, Sweep
+from sim import Campaign, CampaignNoise
 from sim.storage import need_arrow, need_free
 
 ASK_FROM = 1_000_000
@@ -39,12 +40,12 @@ def run(options: Options) -> None:
                 "--set body.radius_m=80"
             )
         guarantee = options.guarantee or "guaranteed_miss_m" in {quantile.quantity for quantile in shown}
-        swept = Sweep(
+        swept = Campaign(
             scenario,
-            axes,
-            cells,
             options.runs,
             options.out,
+            axes=axes,
+            cells=cells,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
             strategy=own_strategy(options.strategy, scenario),
@@ -58,9 +59,10 @@ def run(options: Options) -> None:
         if not options.yes:
             _ask(swept)
         flown = fly(swept, options, notes)
-        report = SweepReport(flown.result.folder, sweep_table(flown.result.folder, required, shown), shown)
+        report = SweepReport(flown.folder, sweep_table(flown.folder, required, shown), shown)
         summary = to_json(report.to_json(flown.elapsed_s))
-        written.enter(options.out, "shards", SCENARIO_FILE)
+        written.enter(options.out, "shards")
+        written.save(SCENARIO_FILE, to_toml(scenario))
         report.save(written)
         written.save("summary.json", summary, "--json")
     show(report.parts(), options.quiet, stdout_taken=written.stdout_taken)
@@ -81,7 +83,7 @@ def _max_runs(options: Options) -> int | None:
     return max(MAX_RUNS_A_CELL, options.runs) if options.max_runs is None else options.max_runs
 
 
-def _ask(swept: Sweep) -> None:
+def _ask(swept: Campaign) -> None:
     """Ask the user to confirm a long sweep; without a terminal, refuse it."""
     if swept.engagements <= ASK_FROM:
         return

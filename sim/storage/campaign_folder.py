@@ -1,73 +1,64 @@
-"""Reading the folder of a campaign, finished or not."""
+"""The folder of a campaign: a manifest, and a file of runs for each chunk."""
 
 from __future__ import annotations
 
-import re
-import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import contextlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from infoset.arrays import Floats
-from sim.storage.files import DamagedError, MissingLibraryError, reporting
-from sim.storage.manifest import Manifest, read_manifest
+from sim.results import Results
+from sim.storage.files import LOCK, StorageError, is_leftover, locked, reporting, write_whole
+from sim.storage.manifest import MANIFEST, Manifest, read_manifest
 from sim.versions import install_command
 
-Numbers = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
-Codes = NDArray[np.int8]
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHARDS = "shards"
-_NAME = re.compile(r"chunk-(\d{7,12})-([0-9a-f]{8})\.parquet")
-
-
-@dataclass(frozen=True)
-class Damage:
-    """A damaged shard, or one that belongs to another campaign."""
-
-    file: Path
-    reason: str
 
 
 class CampaignFolder:
-    """The stored runs of a campaign or a sweep; `damaged` lists shards that were left out.
+    """The stored runs of a campaign or a sweep, finished or not.
 
-    A shard is named after its chunk and the CRC-32 of its bytes, and is renamed into place once it is complete: the
-    folder needs no list of its shards. When a shard is first read, all its values are checked.
+    A file is named after its cell and its runs, and is renamed into place once it is complete: the folder needs no list
+    of its files.
     """
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
         self.path = path
         self.manifest = manifest
-        self.damaged: list[Damage] = []
-        self._files: dict[int, Path] = {}
-        self._checked: set[int] = set()
-        self._tables = need_arrow()
-        self._scan()
+        shards = path / SHARDS
+        self._identity = manifest.identity
+        with reporting(shards):
+            self._names = {file.name for file in shards.iterdir()} if shards.is_dir() else set()
 
     @classmethod
     def read(cls, path: Path) -> CampaignFolder:
-        """Open a folder; raise `ManifestError` if it holds no campaign."""
+        """Open a folder; StorageError if it contains no campaign, or a library for its files is missing."""
         need_arrow()
         return cls(path, read_manifest(path))
 
-    @property
-    def finished(self) -> frozenset[int]:
-        """Numbers of the chunks that are stored and undamaged."""
-        return frozenset(self._files)
+    def has(self, cell: int, runs: Sequence[int]) -> bool:
+        """Return whether a chunk is stored."""
+        return _name(cell, runs) in self._names
 
-    def has(self, index: int) -> bool:
-        """Return whether a chunk is stored and undamaged."""
-        return index in self._files
+    @property
+    def stored_runs(self) -> list[int]:
+        """Engagements of the result that are stored, by cell."""
+        counts = [0] * self.manifest.cells
+        for cell, runs in self.manifest.chunks():
+            counts[cell] += len(runs) if self.has(cell, runs) else 0
+        return counts
 
     @property
     def finished_runs(self) -> int:
         """Engagements of the result that are stored."""
-        return self._rows(None)
+        return sum(self.stored_runs)
 
     @property
     def wanted_runs(self) -> int:
@@ -79,179 +70,130 @@ class CampaignFolder:
         """Whether every engagement of the result is stored."""
         return self.finished_runs == self.wanted_runs
 
-    def table(self, columns: Sequence[str] | None = None, cell: int | None = None) -> Any:
-        """Return rows as a pyarrow.Table, in the order of cells and runs; None is all columns, or all cells.
+    def runs(self, columns: Sequence[str] | None = None, cell: int | None = None) -> pd.DataFrame:
+        """Return the stored runs, in the order of cells and runs; None is all columns, or all cells.
 
-        A DamagedError is raised if a shard has changed since the folder was opened.
+        Unknown numbers are NaN, unknown flags NA. StorageError, which names the file, if one cannot be read.
         """
-        parts = [self._read(index, columns) for index in self._wanted(cell)]
-        return self._tables.joined(parts, columns, with_cell=bool(self.manifest.axes))
+        stored = [chunk for chunk in self.manifest.chunks() if cell in (None, chunk[0]) and self.has(*chunk)]
+        return self._read(sorted(stored, key=lambda chunk: (chunk[0], chunk[1][0])), columns)
 
-    def runs(self, columns: Sequence[str] | None = None, cell: int | None = None) -> Any:
-        """Return the stored runs as a pandas.DataFrame, in the order of cells and runs; None is all of them."""
-        frame = self._tables.frame(self.table(cell=cell), guarantees=self.manifest.scenario.set_model.is_guaranteed)
-        return frame if columns is None else frame[list(columns)]
+    def chunk(self, cell: int, runs: Sequence[int], columns: Sequence[str]) -> pd.DataFrame:
+        """Return some columns of a stored chunk."""
+        return self._read([(cell, runs)], columns)
 
-    def shards(
-        self, quantities: Sequence[str], texts: Mapping[str, Sequence[str]], cell: int | None = None
-    ) -> Iterator[tuple[dict[str, Numbers], dict[str, Codes]]]:
-        """Yield columns shard by shard, in the order of cells and runs; one shard is in memory at a time.
+    @classmethod
+    @contextlib.contextmanager
+    def begin(cls, path: Path, manifest: Manifest, *, resume: bool) -> Iterator[CampaignFolder]:
+        """Start a campaign in a folder, or resume the one in it, and hold the folder's lock until the context ends.
 
-        Columns of numbers are masked where null. `texts` has a list of values for each column of text: the codes are
-        indices in the list, -1 for other values. A DamagedError is raised if a shard has changed since the folder was
-        opened.
+        More runs in the `manifest` than in the folder extend the campaign. `resume` is whether the folder may contain
+        this campaign already. StorageError if the folder contains something else or a campaign with different settings,
+        another campaign is running in it, or it cannot be written.
         """
-        for index in self._wanted(cell):
-            yield self._columns_of(index, quantities, texts)
+        need_arrow()
+        need_free(path, resume=resume)
+        with reporting(path):
+            path.mkdir(parents=True, exist_ok=True)
+        with locked(path):
+            need_free(path, resume=resume)
+            if (path / MANIFEST).is_file():
+                manifest = read_manifest(path).continued(manifest, path)
+            manifest.write(path)
+            with reporting(path):
+                (path / SHARDS).mkdir(exist_ok=True)
+                for file in filter(is_leftover, [*path.iterdir(), *(path / SHARDS).iterdir()]):
+                    file.unlink()
+                # With more runs, the last chunk of a cell is a larger one.
+                chunks = {_name(*chunk) for chunk in replace(manifest, cell_runs=()).chunks()}
+                for file in (path / SHARDS).glob("*.parquet"):
+                    if file.name not in chunks:
+                        file.unlink()
+            yield cls(path, manifest)
 
-    def sample(self, quantity: str, noise: str, cell: int | None = None, *, unknown: float | None = None) -> Floats:
-        """Return the values of a quantity under a noise, in the order of cells and runs.
+    def write(self, cell: int, runs: Sequence[int], results: Results) -> None:
+        """Write the file of a chunk atomically."""
+        name = _name(cell, runs)
+        content = need_arrow().to_bytes(results, cell, self.manifest.noise, self._metadata(name))
+        write_whole(self.path / SHARDS / name, content)
+        self._names.add(name)
 
-        Runs without a value have the value `unknown`; None omits them.
-        """
-        # Room for all rows: the pages of memory that are never written cost nothing.
-        values, size = np.empty(self._rows(cell)), 0
-        for numbers, codes in self.shards([quantity], {"noise": [noise]}, cell):
-            (part,) = _by_noise(numbers[quantity], codes["noise"], 1, unknown)
-            values[size : size + part.size] = part
-            size += part.size
-        return values[:size]
+    def stop(self, cell_runs: tuple[int, ...]) -> None:
+        """Store the number of runs of each cell after a rule has stopped some of them."""
+        self.manifest = replace(self.manifest, cell_runs=cell_runs)
+        self.manifest.write(self.path)
 
-    def chunk_samples(
-        self, index: int, quantity: str, noises: Sequence[str], *, unknown: float | None = None
-    ) -> list[Floats]:
-        """Return the values of a quantity in one chunk, an array for each noise, as in `sample`."""
-        numbers, codes = self._columns_of(index, [quantity], {"noise": noises})
-        return _by_noise(numbers[quantity], codes["noise"], len(noises), unknown)
+    def _read(self, chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None) -> pd.DataFrame:
+        names = [_name(*chunk) for chunk in chunks]
+        files = {self.path / SHARDS / name: self._metadata(name) for name in names}
+        return need_arrow().read(files, columns)
 
-    def numbers(self, name: str, cell: int | None = None) -> Numbers:
-        """Return a column of numbers, masked where it is null."""
-        column: Numbers = np.ma.MaskedArray(np.empty(self._rows(cell)), mask=True)
-        first = 0
-        for numbers, _ in self.shards([name], {}, cell):
-            column[first : first + numbers[name].size] = numbers[name]
-            first += numbers[name].size
-        return column
+    def _metadata(self, name: str) -> dict[str, str]:
+        return {"campaign": self._identity, "name": name}
 
-    def codes(self, name: str, known: Sequence[str], cell: int | None = None) -> Codes:
-        """Return a column of text as indices in a list of values; -1 for other values."""
-        parts = [codes[name] for _, codes in self.shards([], {name: known}, cell)]
-        return np.concatenate([np.zeros(0, dtype=np.int8), *parts])
+    # What follows is for reports that do not use `runs` yet; it goes.
+    damaged: ClassVar[list[Any]] = []
 
-    def at(self, indices: Sequence[int], cell: int | None = None) -> list[dict[str, Any]]:
-        """Return whole rows, as mappings by column, at some indices of the columns."""
-        shards = self._wanted(cell)
-        starts = np.concatenate([[0], np.cumsum([self._size(index) for index in shards])])
-        rows = []
-        for index in indices:
-            shard = int(np.searchsorted(starts, index, side="right")) - 1
-            rows.append(self._read(shards[shard], None).slice(int(index - starts[shard]), 1).to_pylist()[0])
-        return rows
+    def numbers(self, name: str, cell: int | None = None) -> Any:
+        """Return a column of numbers, masked where unknown."""
+        column, unit = (f"start_{name}".replace("_km", "_m"), 1e3) if "km" in name else (name, 1.0)
+        return np.ma.masked_invalid(self.runs([column], cell)[column].to_numpy(np.float64, na_value=np.nan) / unit)
 
-    def table_file(self, columns: Mapping[str, Sequence[Any]], units: Mapping[str, str]) -> bytes:
-        """Return the Parquet file of a table derived from the campaign, of numbers and text; None is null.
+    def codes(self, name: str, known: Sequence[str], cell: int | None = None) -> Any:
+        """Return a column of text as indices in a list of values."""
+        return np.array([known.index(text) for text in self.runs([name], cell)[name]], dtype=np.int8)
 
-        The `units` are in the metadata of the fields, as in the shards.
-        """
-        table = self._tables.plain_table(columns, units)
-        return bytes(self._tables.to_bytes(table, {"campaign": self.manifest.identity}))
-
-    def _columns_of(
-        self, index: int, quantities: Sequence[str], texts: Mapping[str, Sequence[str]]
-    ) -> tuple[dict[str, Numbers], dict[str, Codes]]:
-        table = self._read(index, [*quantities, *texts])
-        return (
-            {name: self._tables.numbers(table, name) for name in quantities},
-            {name: self._tables.codes(table, name, known) for name, known in texts.items()},
+    def shards(self, quantities: Sequence[str], texts: Any, cell: int | None = None) -> Any:
+        """Yield columns."""
+        yield (
+            {name: self.numbers(name, cell) for name in quantities},
+            {name: self.codes(name, known, cell) for name, known in texts.items()},
         )
 
-    def _read(self, index: int, columns: Sequence[str] | None) -> Any:
-        """Return some columns of a shard, None being all; raise DamagedError if it has changed."""
-        try:
-            return self._valid(index, columns)
-        except (OSError, ValueError) as error:
-            raise DamagedError(
-                f"{self._files[index]}: the shard has changed or is missing: {str(error)[:200]}; delete it, and "
-                "simulate its runs again with --resume"
-            ) from None
+    def sample(self, quantity: str, noise: str, cell: int | None = None, *, unknown: float | None = None) -> Any:
+        """Return the values of a quantity under a noise."""
+        values = self.numbers(quantity, cell)[self.codes("noise", ("random", "game"), cell) == (noise == "game")]
+        return values.compressed() if unknown is None else values.filled(unknown)
 
-    def _valid(self, index: int, columns: Sequence[str] | None) -> Any:
-        """Return some columns of a shard, None being all; the first reading checks the values of all columns."""
-        file, with_cell = self._files[index], bool(self.manifest.axes)
-        if index in self._checked:
-            return self._tables.read(file, columns, with_cell=with_cell)
-        table = self._tables.read(file, None, with_cell=with_cell)
-        cell, runs = self.manifest.runs_of(index)
-        self._tables.need_valid(table, runs, cell)
-        self._checked.add(index)
-        return table if columns is None else table.select(list(columns))
+    def at(self, indices: Sequence[int]) -> list[dict[str, Any]]:
+        """Return rows."""
+        import pandas as pd
 
-    def _size(self, index: int) -> int:
-        return len(self.manifest.runs_of(index)[1])
+        rows = self.runs().iloc[list(indices)]
+        return [{k: None if v is pd.NA else v for k, v in row.items()} for row in rows.to_dict("records")]
 
-    def _rows(self, cell: int | None) -> int:
-        return sum(self._size(index) for index in self._wanted(cell))
+    def table_file(self, columns: Any, units: Any) -> bytes:
+        """Return a table as Parquet."""
+        import pandas as pd
 
-    def _is_wanted(self, index: int) -> bool:
-        cell, runs = self.manifest.runs_of(index)
-        return runs.start < self.manifest.wanted_runs(cell)
+        return bytes(pd.DataFrame(columns).to_parquet())
 
-    def _wanted(self, cell: int | None = None) -> list[int]:
-        """Return the stored chunks of the result, in the order of cells and runs."""
-        cells = {index: self.manifest.runs_of(index)[0] for index in self._files if self._is_wanted(index)}
-        return sorted(
-            (index for index in cells if cell in (None, cells[index])), key=lambda index: (cells[index], index)
-        )
 
-    def _scan(self) -> None:
-        """Find the undamaged shards, and list the others in `damaged`."""
-        folder = self.path / SHARDS
-        if not folder.is_dir():
+def _name(cell: int, runs: Sequence[int]) -> str:
+    """Return the name of the file of a chunk."""
+    return f"cell-{cell:05d}-runs-{runs[0]:08d}-{runs[-1]:08d}.parquet"
+
+
+def need_free(path: Path, *, resume: bool) -> None:
+    """Raise StorageError if a folder has content, except a campaign to `resume`."""
+    with reporting(path):
+        if not path.exists():
             return
-        with reporting(folder):
-            files = sorted(folder.iterdir())
-        for file in files:
-            matched = _NAME.fullmatch(file.name)
-            if matched is None:
-                continue
-            index = int(matched[1])
-            fault = self._fault(file, index, int(matched[2], 16))
-            if fault is None:
-                self._files[index] = file
-            else:
-                self.damaged.append(Damage(file, fault))
-
-    def _fault(self, file: Path, index: int, checksum: int) -> str | None:
-        """Return a description of the damage of a shard; None if there is none."""
-        try:
-            if index >= self.manifest.chunks:
-                return "is not a chunk of this campaign"
-            if not file.is_file():
-                return "is not an ordinary file"
-            rows, size = self._size(index), file.stat().st_size
-            if size > self._tables.BYTES_BESIDE_ROWS + self._tables.MAX_BYTES_A_ROW * rows:
-                return f"has {size} bytes, more than any shard of {rows} rows"
-            content = file.read_bytes()
-        except OSError as error:
-            return f"cannot be read: {error.strerror}"
-        if zlib.crc32(content) != checksum:
-            return f"is truncated or changed: the checksum of its {len(content)} bytes differs from the one in its name"
-        wanted = {"campaign": self.manifest.identity, "chunk": str(index)}
-        fault: str | None = self._tables.fault(content, wanted, rows, with_cell=bool(self.manifest.axes))
-        return fault
-
-
-def _by_noise(values: Numbers, codes: Codes, noises: int, unknown: float | None) -> list[Floats]:
-    samples = [values[codes == code] for code in range(noises)]
-    return [sample.compressed() if unknown is None else sample.filled(unknown) for sample in samples]
+        if not path.is_dir():
+            raise StorageError(f"{path}: is a file, not a folder; choose another name for the campaign's folder")
+        names = {file.name for file in path.iterdir() if not is_leftover(file)} - {LOCK}
+    if MANIFEST in names and not resume:
+        raise StorageError(f"{path}: contains a campaign already; continue it with --resume, or choose another folder")
+    if names and MANIFEST not in names:
+        raise StorageError(f"{path}: is not empty, and contains no campaign; choose another folder")
 
 
 def need_arrow() -> ModuleType:
-    """Return the module that reads and writes tables; raise MissingLibraryError if pyarrow is not installed."""
+    """Return the module that reads and writes files of runs; StorageError if pyarrow or pandas is not installed."""
     try:
         from sim.storage import tables
-    except ImportError:
-        raise MissingLibraryError(
-            f"campaigns are stored with pyarrow, which is not installed: {install_command('campaign')}"
+    except ImportError as error:
+        raise StorageError(
+            f"campaigns need {error.name}, which is not installed: {install_command('campaign')}"
         ) from None
     return tables

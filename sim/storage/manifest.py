@@ -5,30 +5,24 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import platform
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from infoset.limits import COUNT, NUMBER, WHOLE
-from sim.chunk import CampaignNoise
+from sim.parallel import CampaignNoise
 from sim.scenario import Scenario
-from sim.storage.codec import fingerprint, from_json, to_json
-from sim.storage.files import ManifestError, reporting, write_whole
+from sim.storage.codec import from_json, to_json
+from sim.storage.files import StorageError, reporting, write_whole
 
-FORMAT = "infoset-campaign"
 SCHEMA = 1
 MANIFEST = "manifest.json"
-MAX_BYTES = 10_000_000
 MAX_DIFFERENCES = 20
 MAX_CELLS = 10_000
-MAX_RUNS_A_SHARD = 1_000_000
 
-_PROGRESS = ("runs", "until", "stopped_after", "cell_runs", "require", "extended", "made_by")
+_MAY_DIFFER = ("runs", "until", "cell_runs", "require", "extended", "versions.python")
 """Keys that may differ between the sessions of a campaign."""
-_DERIVED = ("format", "schema", "version", "kind", "name", "scenario_hash", "sha256")
-"""Keys of the file that follow from the others."""
 
 
 @dataclass(frozen=True)
@@ -63,19 +57,16 @@ class Axis:
 class Manifest:
     """All that determines the numbers of a campaign or a sweep, its progress, and its division into chunks.
 
-    Chunks are numbered from 0; each is stored as one shard. A TypeError or ValueError is raised if a number is out of
-    its range.
+    A TypeError or ValueError is raised if a number is out of its range.
 
     Parameters
     ----------
     runs : int
         Engagements of each cell, numbered from 0; with `until` the maximum number.
     until : str or None
-        The rule that may stop the campaign early, or the requirement that stops the cells of a sweep.
-    stopped_after : int or None
-        Runs after which the rule stopped the campaign.
+        The rule that may stop a campaign early, or the requirement that stops the cells of a sweep.
     cell_runs : tuple of int
-        Engagements of each cell of a finished sweep whose cells were stopped by a requirement; otherwise empty.
+        Engagements of each cell after the rule has stopped some of them; empty before.
     require : str or None
         Requirement of a sweep, that of the last session; it does not change any result.
     extended : bool
@@ -85,21 +76,17 @@ class Manifest:
     strategy : str
         Name; for a strategy in a Python file with the hash of the file: `mine.py:Mine sha256:0123456789abcdef`.
     chunk : int
-        Engagements per shard; the last shard of a cell may have fewer. Results do not depend on it.
+        Engagements per file; the last file of a cell may have fewer. Results do not depend on it.
     axes : tuple of Axis
         Keys that a sweep varies, in all combinations of values; the last varies fastest. Empty for a campaign.
-    order : str
-        How chunks are numbered: `cells`, all chunks of a cell one after the other, or `rounds`, the first chunks of all
-        cells, then the second ones, so that cells can be extended.
     cells_hash : str
         Fingerprint of the scenarios of a sweep's cells; empty for a campaign.
-    made_by : mapping of str to str
-        Version of Python and kind of machine of the first session; they may differ when a campaign is resumed.
+    versions : mapping of str to str
+        Versions of the packages and of Python in the first session; only the latter may differ later.
     """
 
     runs: int
     until: str | None = None
-    stopped_after: int | None = None
     cell_runs: tuple[int, ...] = ()
     require: str | None = None
     extended: bool = False
@@ -112,21 +99,14 @@ class Manifest:
     axes: tuple[Axis, ...] = ()
     cells_hash: str = ""
     versions: Mapping[str, str]
-    made_by: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, limits in (("runs", COUNT), ("chunk", COUNT), ("seed", WHOLE)):
             limits.need(name, getattr(self, name))
-        if self.chunk > MAX_RUNS_A_SHARD:
-            raise ValueError(f"chunk must be at most {MAX_RUNS_A_SHARD} engagements: got {self.chunk}")
         if self.cells > MAX_CELLS:
             raise ValueError(f"axes make {self.cells} cells, more than the {MAX_CELLS} that a sweep may have")
-        if self.stopped_after is not None and not 1 <= self.stopped_after <= self.runs:
-            raise ValueError(f"stopped_after must be from 1 to {self.runs}: got {self.stopped_after}")
-        if self.cell_runs and (
-            len(self.cell_runs) != self.cells or not all(0 <= runs <= self.runs for runs in self.cell_runs)
-        ):
-            raise ValueError(f"cell_runs must contain {self.cells} numbers from 0 to {self.runs}")
+        if self.cell_runs and len(self.cell_runs) != self.cells:
+            raise ValueError(f"cell_runs must contain {self.cells} numbers")
 
     @property
     def kind(self) -> str:
@@ -143,31 +123,21 @@ class Manifest:
         """Number of simulated scenarios."""
         return math.prod(len(axis.values) for axis in self.axes)
 
+    @property
+    def stopped_after(self) -> int | None:
+        """Runs after which a rule stopped a campaign; None for a sweep, and if no rule did."""
+        return self.cell_runs[0] if self.cell_runs and not self.axes else None
+
     def wanted_runs(self, cell: int) -> int:
         """Return the engagements of a cell that belong to the result: fewer than `runs` where a rule stopped it."""
-        if self.cell_runs:
-            return self.cell_runs[cell]
-        return self.runs if self.stopped_after is None else self.stopped_after
+        return self.cell_runs[cell] if self.cell_runs else self.runs
 
-    @property
-    def chunks_a_cell(self) -> int:
-        """Number of chunks of each cell."""
-        return -(-self.runs // self.chunk)
-
-    @property
-    def chunks(self) -> int:
-        """Number of chunks of all cells."""
-        return self.chunks_a_cell * self.cells
-
-    def runs_of(self, index: int) -> tuple[int, range]:
-        """Return the cell and the numbers of the runs of a chunk."""
-        number, cell = divmod(index, self.cells)
-        first = number * self.chunk
-        return cell, range(first, min(first + self.chunk, self.runs))
-
-    def index_of(self, cell: int, number: int) -> int:
-        """Return the number of the chunk that is the `number`-th of a cell, from 0."""
-        return number * self.cells + cell
+    def chunks(self) -> Iterator[tuple[int, range]]:
+        """Yield the cell and the runs of each chunk of the result: the first chunk of each cell, then the second."""
+        for first in range(0, self.runs, self.chunk):
+            for cell in range(self.cells):
+                if first < self.wanted_runs(cell):
+                    yield cell, range(first, min(first + self.chunk, self.wanted_runs(cell)))
 
     def values_of(self, cell: int) -> dict[str, float]:
         """Return the varied values of a cell of a sweep, by key."""
@@ -178,100 +148,72 @@ class Manifest:
         return dict(reversed(values.items()))
 
     def decisive(self) -> dict[str, Any]:
-        """Return the values that must be equal in all sessions of a campaign, as JSON values."""
-        plain = {key: value for key, value in to_json(self).items() if key not in _PROGRESS}
-        return {"format": FORMAT, "schema": SCHEMA, "kind": self.kind, **plain}
+        """Return the values that must be equal in all sessions of a campaign, by dotted key."""
+        return {key: value for key, value in _flat(to_json(self)).items() if key not in _MAY_DIFFER}
 
     @property
     def identity(self) -> str:
-        """Fingerprint of `decisive`; it is stored in every shard."""
+        """Fingerprint of `decisive`; every file of runs contains it."""
         return hashlib.sha256(json.dumps(self.decisive(), sort_keys=True).encode()).hexdigest()[:32]
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the content of the file."""
-        value = {
-            "format": FORMAT,
-            "schema": SCHEMA,
-            "version": self.versions.get("infoset", ""),
-            "kind": self.kind,
-            "name": self.scenario.name,
-            "scenario_hash": fingerprint(self.scenario),
-            **to_json(self),
-        }
-        return {**value, "sha256": checksum(value)}
+    def continued(self, wanted: Manifest, folder: Path) -> Manifest:
+        """Return the manifest of this campaign, resumed as the `wanted` one, perhaps with more runs or another rule.
 
+        Raise StorageError, with all differences, if they are different campaigns.
+        """
+        there, here = self.decisive(), wanted.decisive()
+        lines = [
+            f"\n  {key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"
+            for key in dict.fromkeys((*there, *here))
+            if there.get(key) != here.get(key)
+        ]
+        if len(lines) > MAX_DIFFERENCES:
+            lines = [*lines[:MAX_DIFFERENCES], f"\n  and {len(lines) - MAX_DIFFERENCES} more"]
+        if lines:
+            raise StorageError(
+                f"{folder}: contains a campaign with different settings; repeat the command with those of the folder, "
+                f"or choose another folder:{''.join(lines)}"
+            )
+        if wanted.runs < self.runs:
+            option = "--max-runs" if wanted.axes and wanted.until else "--runs"
+            raise StorageError(
+                f"{folder}: the {self.kind} in this folder has {self.runs} runs, more than {option} {wanted.runs}; "
+                f"give {option} {self.runs} or more"
+            )
+        is_same = wanted.runs == self.runs and wanted.until == self.until
+        # Once the number of runs may depend on the results, it may in all later sessions.
+        grows = bool(self.axes) and (self.is_watched or wanted.is_watched or wanted.runs > self.runs)
+        return replace(
+            wanted,
+            versions=self.versions,
+            cell_runs=self.cell_runs if is_same else (),
+            extended=self.extended if is_same else grows,
+        )
 
-def checksum(value: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of everything in a manifest but `sha256` itself."""
-    rest = {key: inner for key, inner in value.items() if key != "sha256"}
-    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
-
-
-def made_here() -> dict[str, str]:
-    """Return Python's version and the kind of this machine."""
-    return {"python": platform.python_version(), "machine": platform.machine(), "system": platform.system()}
-
-
-def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Write a manifest into its folder atomically."""
-    write_whole(folder / MANIFEST, (json.dumps(manifest.to_json(), indent=1, allow_nan=False) + "\n").encode())
+    def write(self, folder: Path) -> None:
+        """Write the manifest into its folder atomically."""
+        text = json.dumps({"schema": SCHEMA, **to_json(self)}, indent=1, allow_nan=False)
+        write_whole(folder / MANIFEST, f"{text}\n".encode())
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Read the manifest of a folder.
-
-    A ManifestError is raised if there is none, or this version cannot read it; the message names the invalid key.
-    """
+    """Read the manifest of a folder; StorageError, which names the invalid key, if there is none that is readable."""
     file = folder / MANIFEST
     if not file.is_file():
-        raise ManifestError(
+        raise StorageError(
             f"{folder}: contains no campaign and no sweep (no file {MANIFEST}); name a folder of infoset campaign or "
             "infoset sweep"
         )
-    with reporting(file), file.open("rb") as stream:
-        content = stream.read(MAX_BYTES + 1)
     try:
-        return _parsed(content)
+        with reporting(file):
+            value = json.loads(file.read_bytes())
+        if not isinstance(value, dict) or value.pop("schema", None) != SCHEMA:
+            raise ValueError(f"schema: must be {SCHEMA}, the only one that this version of infoset reads")
+        return from_json(Manifest, value)
     except (ValueError, RecursionError) as error:
-        raise ManifestError(
+        raise StorageError(
             f"{file}: is not a readable manifest: {str(error)[:300]}; restore it from a copy, or use a new folder"
         ) from None
-
-
-def _parsed(content: bytes) -> Manifest:
-    if len(content) > MAX_BYTES:
-        raise ValueError(f"is over {MAX_BYTES // 1_000_000} MB")
-    value = json.loads(content)
-    if not isinstance(value, dict) or value.get("format") != FORMAT:
-        raise ValueError(f"format: must be {FORMAT}")
-    if value.get("schema") != SCHEMA:
-        raise ValueError(
-            f"schema: must be {SCHEMA}, the only one this version reads, found {value.get('schema')}; update infoset"
-        )
-    manifest = from_json(Manifest, {key: inner for key, inner in value.items() if key not in _DERIVED})
-    if value.get("kind") != manifest.kind:
-        raise ValueError("kind: must be sweep with axes, and campaign without")
-    if value.get("sha256") != checksum(value):
-        raise ValueError("the checksum differs: the file is damaged")
-    return manifest
-
-
-def need_same(stored: Manifest, wanted: Manifest, folder: Path) -> None:
-    """Raise ManifestError, with all differences, if the decisive values of two campaigns differ."""
-    there, here = _flat(stored.decisive()), _flat(wanted.decisive())
-    lines = [
-        f"{key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"
-        for key in dict.fromkeys((*there, *here))
-        if there.get(key) != here.get(key)
-    ]
-    if not lines:
-        return
-    if len(lines) > MAX_DIFFERENCES:
-        lines = [*lines[:MAX_DIFFERENCES], f"and {len(lines) - MAX_DIFFERENCES} more"]
-    raise ManifestError(
-        f"{folder}: contains a campaign with different settings; repeat the command with those of the folder, or "
-        "choose another folder:" + "".join(f"\n  {line}" for line in lines)
-    )
 
 
 def _flat(value: Any, path: str = "") -> dict[str, Any]:

@@ -117,7 +117,7 @@ def need_whole(folder: Path) -> None:
             case other:
                 pytest.fail(f"{path}: how does a whole {other} end?")
     if (folder / "manifest.json").exists():
-        assert CampaignFolder.read(folder).damaged == []
+        CampaignFolder.read(folder).runs()
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ import weakref
 from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import TypeAdapter
@@ -20,7 +21,7 @@ from experiments.__main__ import main as beginning
 from experiments.campaigns.flight import campaign_errors
 from infoset.model import Model
 from sim import Campaign, CampaignNoise, Scenario
-from sim.storage import CampaignFolder, CampaignWriter
+from sim.storage import CampaignFolder
 from sim.storage.codec import to_json
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
@@ -49,17 +50,17 @@ def test_an_interrupt_says_how_to_go_on(
     command: str, infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored: list[int] = []
-    write = CampaignWriter.write
+    write = CampaignFolder.write
 
-    def write_one(folder: CampaignWriter, *given: object) -> None:
+    def write_one(folder: CampaignFolder, *given: Any) -> None:
         if stored:
             raise KeyboardInterrupt
-        write(folder, *given)  # type: ignore[arg-type]
+        write(folder, *given)
         stored.append(1)
 
     more = ["--vary", "thruster.budget_m_s=100:200:2"] if command == "sweep" else []
     asked = (command, file, "--runs", 16, "--chunk", 8, "--out", "runs", *more)
-    monkeypatch.setattr(CampaignWriter, "write", write_one)
+    monkeypatch.setattr(CampaignFolder, "write", write_one)
     left = infoset(*asked)
     assert (left.code, left.out) == (130, "")
     assert left.err.splitlines()[-1] == RESUME
@@ -157,8 +158,8 @@ def test_a_campaign_interrupted_ten_times_gives_the_same_bits(brief: Scenario, f
         assert left.err.splitlines() == [RESUME]
     assert stored == sorted(set(stored))
     assert ended(begin(*asked, folder=tmp_path)).code == 0
-    expected = Campaign(brief, 2000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
-    assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
+    expected = Campaign(brief, 2000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().runs()
+    assert CampaignFolder.read(tmp_path / "runs").runs().equals(expected)
 
 
 MOMENTS = {

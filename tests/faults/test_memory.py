@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sim import Campaign, Results, Scenario
-from sim.chunk import Chunk, fly_chunk
+from sim.parallel import Task, simulate_task
 from sim.storage import CampaignFolder
 from tests.faults.conftest import Infoset, Left, need_whole
 
@@ -49,17 +49,17 @@ def with_room(room_bytes: int, *arguments: object, folder: Path) -> Left:
 def test_no_memory_is_a_message_that_says_how_to_go_on(
     infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    flown: list[Chunk] = []
+    flown: list[Task] = []
 
-    def fly(chunk: Chunk, *_: object) -> Results:
-        flown.append(chunk)
+    def fly(task: Task, *_: object) -> Results:
+        flown.append(task)
         if len(flown) > 1:
             raise MemoryError("Unable to allocate 7.45 GiB")
-        return fly_chunk(chunk)
+        return simulate_task(task)
 
     asked = ("campaign", file, "--runs", 24, "--chunk", 8, "--out", "runs", "--workers", 1)
     with monkeypatch.context() as patched:
-        patched.setattr("sim.flights.fly_chunk", fly)
+        patched.setattr("sim.parallel.simulate_task", fly)
         left = infoset(*asked)
     assert (left.code, left.out) == (2, "")
     assert left.err.splitlines()[-1].startswith("error: not enough memory (Unable to allocate 7.45 GiB); ")
@@ -89,5 +89,5 @@ def test_a_campaign_under_a_limit_ends_and_is_resumed(brief: Scenario, file: Pat
             need_whole(tmp_path / "runs")
     assert any(codes)
     assert with_room(4 << 30, *asked, folder=tmp_path).code == 0
-    expected = Campaign(brief, 4096, tmp_path / "whole").run().table
-    assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
+    expected = Campaign(brief, 4096, tmp_path / "whole").run().runs()
+    assert CampaignFolder.read(tmp_path / "runs").runs().equals(expected)

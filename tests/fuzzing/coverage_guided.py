@@ -15,7 +15,6 @@ import json
 import os
 import random
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -27,7 +26,7 @@ from typing import Any
 
 TARGETS = (
     *("scenario", "pareto-encounter", "multipoint", "pursuit-evasion", "reachable-rendezvous", "observer"),
-    *("record", "campaign", "expressions"),
+    *("record", "expressions"),
 )
 MAX_SECONDS_AN_INPUT = 2.0
 MAX_SECONDS_OF_THE_CLOCK = 60
@@ -137,8 +136,6 @@ def _subject(target: str, folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
         return _expressions()
     if target == "record":
         return _record(folder)
-    if target == "campaign":
-        return _campaign(folder)
     from experiments.common.errors import InputError
 
     from .mutations import mutated_toml
@@ -196,48 +193,6 @@ def _record(folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
 
     assert same_records(load_record(file), record)
     return parse, mutate, [original]
-
-
-def _campaign(folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
-    """Give a campaign a shard, or a manifest, whose checksum fits; the first byte says which."""
-    from sim.storage import StorageError
-    from sim.storage.manifest import MANIFEST, checksum
-
-    from .mutations import mutated_bytes
-    from .subjects import attempted, named_shard, read_campaign, small_campaign
-
-    whole = folder / "scratch" / "campaign"
-    shutil.rmtree(whole, ignore_errors=True)
-    small_campaign(whole)
-    manifest = (whole / MANIFEST).read_bytes()
-    (_, last) = sorted((whole / "shards").glob("chunk-*.parquet"))
-    shard = last.read_bytes()
-    last.unlink()
-
-    def parse(content: bytes) -> None:
-        other = whole / "shards" / named_shard(1, content[1:])
-        try:
-            if content[:1] == b"M":
-                (whole / MANIFEST).write_bytes(_fitting(content[1:]))
-            else:
-                other.write_bytes(content[1:])
-            found, message = attempted(lambda: read_campaign(whole), StorageError)
-            assert found is not None or str(whole) in message
-        finally:
-            (whole / MANIFEST).write_bytes(manifest)
-            other.unlink(missing_ok=True)
-
-    def _fitting(text: bytes) -> bytes:
-        try:
-            value = json.loads(text)
-            return json.dumps({**value, "sha256": checksum(value)}).encode()
-        except (ValueError, TypeError, RecursionError):
-            return text
-
-    def mutate(content: bytes, draw: random.Random) -> bytes:
-        return content[:1] + mutated_bytes(content[1:], draw)
-
-    return parse, mutate, [b"M" + manifest, b"S" + shard]
 
 
 def _expressions() -> tuple[Parse, Mutate, list[bytes]]:

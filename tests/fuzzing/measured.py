@@ -17,27 +17,20 @@ from pathlib import Path
 from experiments.common.errors import InputError
 from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario
-from sim.storage import CampaignFolder, StorageError
-
-def campaign(path):
-    folder = CampaignFolder.read(Path(path))
-    for damage in folder.damaged:
-        raise StorageError(damage.reason)
-    folder.table()
 
 def peak():
     # Not `resource`, whose maximum is also that of the process which began this one.
     (line,) = [line for line in open("/proc/self/status") if line.startswith("VmHWM")]
     return int(line.split()[1]) / 1024
 
-read = {"record": load_record, "campaign": campaign, "scenario": load_scenario}[sys.argv[1]]
+read = {"record": load_record, "scenario": load_scenario}[sys.argv[1]]
 found = []
 for path in sys.argv[2:]:
     Path("/proc/self/clear_refs").write_text("5")  # the maximum size so far is forgotten
     before, begun, message = peak(), time.process_time(), ""
     try:
         read(path)
-    except (InputError, StorageError) as error:
+    except InputError as error:
         message = str(error)
     found.append({"message": message, "seconds": time.process_time() - begun, "megabytes": peak() - before})
 print(json.dumps(found))
@@ -69,7 +62,7 @@ def measured(reader: str, *paths: Path) -> list[Measured]:
     Parameters
     ----------
     reader : str
-        record, campaign or scenario.
+        record or scenario.
     *paths : Path
 
     Returns

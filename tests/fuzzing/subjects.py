@@ -6,10 +6,8 @@ import dataclasses
 import io
 import json
 import zipfile
-import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,10 +21,7 @@ from experiments.observer.file import ObserverProblem, load_observer
 from experiments.pareto.file import ParetoProblem, load_pareto
 from experiments.pursuit.file import PursuitProblem, load_pursuit
 from experiments.reachability.file import Rendezvous, load_rendezvous
-from infoset import AngleSensor, StateBox
-from sim import Campaign, CampaignNoise, Record, Scenario, fly_one
-from sim.scenario import of_model
-from sim.storage import CampaignFolder
+from sim import Record, Scenario, fly_one
 
 Found = TypeVar("Found")
 
@@ -102,36 +97,3 @@ def remade_record(content: bytes, change: Callable[[dict[str, Any], dict[str, by
         for name, member in {"header.npy": text.getvalue(), **members}.items():
             archive.writestr(zipfile.ZipInfo(name), member)
     return out.getvalue()
-
-
-def small_campaign(folder: Path) -> CampaignFolder:
-    """Fly a campaign of 20 short engagements in two chunks."""
-    whole = load_scenario("asteroid-1997-single")
-    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
-    sensor = AngleSensor(0.5, 0.00015, 0.00023, 595e3)
-    model = replace(whole.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    brief = replace(whole, name="brief", **of_model(model), dispersion=box, nominal_range_m=595e3)
-    campaign = Campaign(brief, 20, folder, seed=5, noise=CampaignNoise.MIXED, chunk=12)
-    return campaign.run(workers=1).folder
-
-
-def named_shard(index: int, content: bytes) -> str:
-    """Return the name of a shard that says what is in it."""
-    return f"chunk-{index:07d}-{zlib.crc32(content):08x}.parquet"
-
-
-def read_campaign(path: Path) -> dict[str, Any]:
-    """Return everything that a campaign's folder says."""
-    folder = CampaignFolder.read(path)
-    table = folder.table()
-    known = ("random", "game")
-    return {
-        "manifest": folder.manifest,
-        "wanted": folder.wanted_runs,
-        "finished": folder.finished_runs,
-        "damaged": len(folder.damaged),
-        "rows": table.to_pylist(),
-        "numbers": [folder.numbers(name).filled(-1.0).tobytes() for name in ("miss_m", "guaranteed_miss_m", "x_km")],
-        "codes": folder.codes("noise", known).tobytes(),
-        "first": folder.at([0]) if len(table) else None,
-    }

@@ -68,10 +68,11 @@ def test_a_body_is_smaller_than_the_min_range(published: Scenario) -> None:
         replace(published, body=Body(6e6))
 
 
-def test_a_campaign_has_the_probability_of_a_hit(brief: Scenario, tmp_path: Path) -> None:
+def test_a_campaign_stores_the_hits(brief: Scenario, tmp_path: Path) -> None:
     sized = replace(brief, body=Body(3.0))
-    assert Campaign(sized, 12, tmp_path / "sized").run(workers=1).hits == simulate(sized, 12).hits
-    assert Campaign(brief, 4, tmp_path / "point").run(workers=1).hits is None
+    hits = Campaign(sized, 12, tmp_path / "sized").run(workers=1).runs()["hit"]
+    assert hits.tolist() == simulate(sized, 12).hit.tolist()
+    assert Campaign(brief, 4, tmp_path / "point").run(workers=1).runs()["hit"].isna().all()
 
 
 def test_the_record_of_a_run_has_its_hit(brief: Scenario) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import random
 import threading
 from collections.abc import Callable
@@ -11,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim import CampaignNoise, QuantileName, Requirement, Scenario, StoppingRule, Sweep
-from sim.campaign import Progress
+from sim import Campaign, CampaignNoise, QuantileName, Requirement, Scenario, StoppingRule
 from sim.requirement import Decision, judge
 from sim.scenario import of_model
 from sim.storage import Axis, CampaignFolder, read_manifest
@@ -47,7 +47,7 @@ class Shuffled(Executor):
 
 
 @pytest.fixture(scope="module")
-def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Sweep:
+def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     sensor = brief.set_model.angle_sensor
     cells = tuple(
         replace(
@@ -57,15 +57,25 @@ def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Sweep:
     )
     axis = Axis("angle_sensor.error_at_zero_range_rad", ERRORS)
     folder = tmp_path_factory.mktemp("undecided") / "sweep"
-    return Sweep(
-        brief, (axis,), cells, 16, folder, seed=3, chunk=16, noise=CampaignNoise.MIXED, until=REQUIRED, max_runs=160
+    return Campaign(
+        brief,
+        16,
+        folder,
+        seed=3,
+        noise=CampaignNoise.MIXED,
+        guarantee=False,
+        chunk=16,
+        until=REQUIRED,
+        axes=(axis,),
+        cells=cells,
+        max_runs=160,
     )
 
 
 @pytest.fixture(scope="module")
-def flown(asked: Sweep) -> CampaignFolder:
+def flown(asked: Campaign) -> CampaignFolder:
     """The sweep, simulated by one thread without an interruption."""
-    return asked.run(workers=1).folder
+    return asked.run(workers=1)
 
 
 def names(folder: Path | str) -> list[str]:
@@ -73,7 +83,8 @@ def names(folder: Path | str) -> list[str]:
 
 
 def samples(folder: CampaignFolder, cell: int) -> list[np.ndarray[Any, Any]]:
-    return [folder.sample("miss_m", noise, cell) for noise in ("random", "game")]
+    runs = folder.runs(["noise", "miss_m"], cell)
+    return [runs["miss_m"][runs["noise"] == noise].to_numpy() for noise in ("random", "game")]
 
 
 def test_cells_stop_when_they_are_decided(flown: CampaignFolder) -> None:
@@ -93,48 +104,51 @@ def test_cells_stop_when_they_are_decided(flown: CampaignFolder) -> None:
             assert Decision.UNDECIDED in before
 
 
-def test_the_runs_of_a_cell_are_those_of_a_longer_sweep(asked: Sweep, flown: CampaignFolder, tmp_path: Path) -> None:
-    whole = replace(asked, runs=160, until=None, max_runs=None, folder=tmp_path / "whole").run().folder
+def test_the_runs_of_a_cell_are_those_of_a_longer_sweep(asked: Campaign, flown: CampaignFolder, tmp_path: Path) -> None:
+    whole = replace(asked, runs=160, until=None, max_runs=None, folder=tmp_path / "whole").run()
     for cell, size in enumerate(flown.manifest.cell_runs):
-        assert flown.table(None, cell).equals(whole.table(None, cell).slice(0, size))
+        assert flown.runs(cell=cell).equals(whole.runs(cell=cell)[:size])
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_neither_workers_nor_interruptions_change_what_is_stored(
-    seed: int, asked: Sweep, flown: CampaignFolder, tmp_path: Path
+    seed: int, asked: Campaign, flown: CampaignFolder, tmp_path: Path
 ) -> None:
     again = replace(asked, folder=tmp_path / "again")
 
-    def interrupt(progress: Progress) -> None:
-        if progress.flown >= 16 * seed:
-            raise InterruptError
+    def interrupt_after(chunks: int) -> Callable[[float], None]:
+        calls = itertools.count(1)
+
+        def progress(_: float) -> None:
+            if next(calls) >= chunks:
+                raise InterruptError
+
+        return progress
 
     for _ in range(3):
         with pytest.raises(InterruptError):
-            again.run(Shuffled(seed), workers=5, resume=True, progress=interrupt)
+            again.run(Shuffled(seed), workers=5, resume=True, progress=interrupt_after(seed))
         assert not CampaignFolder.read(tmp_path / "again").complete
     result = again.run(Shuffled(seed), workers=5, resume=True)
     assert names(tmp_path / "again") == names(asked.folder)
-    assert result.folder.manifest.cell_runs == flown.manifest.cell_runs
-    told: list[Progress] = []
-    again.run(resume=True, progress=told.append)
-    assert [progress.flown for progress in told] == [0]
+    assert result.manifest.cell_runs == flown.manifest.cell_runs
+    again.run(resume=True, progress=interrupt_after(1))  # simulates nothing
 
 
 def test_a_sweep_of_fixed_runs_is_continued_until_it_is_decided(
-    asked: Sweep, flown: CampaignFolder, tmp_path: Path
+    asked: Campaign, flown: CampaignFolder, tmp_path: Path
 ) -> None:
     for runs in (16, 10):
         folder = tmp_path / f"{runs}"
         fixed = replace(asked, runs=runs, until=None, max_runs=None, folder=folder).run()
-        assert len(fixed) == runs * len(ERRORS)
+        assert fixed.finished_runs == runs * len(ERRORS)
         replace(asked, folder=folder).run(resume=True)
         assert names(folder) == names(asked.folder)
         assert read_manifest(folder).cell_runs == flown.manifest.cell_runs
 
 
-def test_more_runs_in_each_cell_change_no_decision(asked: Sweep, flown: CampaignFolder, tmp_path: Path) -> None:
-    longer = replace(asked, runs=max(flown.manifest.cell_runs), folder=tmp_path / "longer").run().folder
+def test_more_runs_in_each_cell_change_no_decision(asked: Campaign, flown: CampaignFolder, tmp_path: Path) -> None:
+    longer = replace(asked, runs=max(flown.manifest.cell_runs), folder=tmp_path / "longer").run()
     assert set(longer.manifest.cell_runs) == {max(flown.manifest.cell_runs)}
     for cell in range(len(ERRORS)):
         for short, long in zip(samples(flown, cell), samples(longer, cell), strict=True):
@@ -142,18 +156,7 @@ def test_more_runs_in_each_cell_change_no_decision(asked: Sweep, flown: Campaign
             assert decision in (Decision.UNDECIDED, judge(long, REQUIRED, watched=True).decision)
 
 
-def test_a_damaged_shard_is_simulated_again(asked: Sweep, flown: CampaignFolder, tmp_path: Path) -> None:
-    again = replace(asked, folder=tmp_path / "again")
-    again.run()
-    stored = names(again.folder)
-    (tmp_path / "again" / "shards" / stored[1]).write_bytes(b"damaged")
-    (tmp_path / "again" / "shards" / stored[-1]).unlink()
-    assert not CampaignFolder.read(tmp_path / "again").complete
-    assert len(again.run(resume=True).redone) == 1
-    assert names(again.folder) == stored == names(asked.folder)
-
-
-def test_what_does_not_fit_together(asked: Sweep) -> None:
+def test_what_does_not_fit_together(asked: Campaign) -> None:
     with pytest.raises(ValueError, match="max_runs must be at least 16"):
         replace(asked, max_runs=15)
     with pytest.raises(ValueError, match="a stopping rule of a campaign, or a requirement of a sweep"):

@@ -21,7 +21,7 @@ from experiments.common.screen import (
 )
 from experiments.interception.command import Compare
 from experiments.interception.comparison import Comparison, Flight, flights, gather, summary
-from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_in_threads, summary_head
+from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_all, summary_head
 from experiments.interception.scenario_file import scenario_warnings, study_scenario
 from experiments.interception.strategies import chosen_strategies
 from experiments.interception.study import (
@@ -35,6 +35,7 @@ from experiments.interception.study import (
 )
 from guidance import NoiseKind, Strategy
 from sim import Scenario
+from sim.parallel import Task
 
 FIGURE = "figure-comparison"
 TIES = "for each run, the worst of the four tie rules"
@@ -89,8 +90,11 @@ def _simulate(
 
         return progress
 
-    jobs = [(flown, strategies[flight[0]], progress_of(flight)) for flight, flown in wanted.items()]
-    return gather(dict(zip(wanted, simulate_in_threads(jobs, runs, seed), strict=True)))
+    tasks = [
+        Task(flown, range(runs), seed, strategy=strategies[flight[0]], progress=progress_of(flight))
+        for flight, flown in wanted.items()
+    ]
+    return gather(dict(zip(wanted, simulate_all(tasks), strict=True)))
 
 
 def _summary(comparison: Comparison) -> dict[str, object]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter
 
 from rich.table import Table
@@ -31,7 +32,7 @@ from experiments.interception.runs.shared import (
     b_plane_figures,
     bound_name,
     certificate,
-    simulate_in_threads,
+    simulate_all,
     summary_head,
 )
 from experiments.interception.scenario_file import scenario_warnings, scenario_with
@@ -39,6 +40,7 @@ from experiments.interception.strategies import own_strategy
 from experiments.interception.study import QUANTILES, SetCounts, game_note, hit_text, set_counts, set_warnings
 from infoset import Recovery
 from sim import Outcome, Results, Scenario
+from sim.parallel import Task
 from sim.statistics import shown_quantiles
 
 FIGURE = "figure-4-distributions"
@@ -61,9 +63,14 @@ def run(options: Experiment) -> None:
             (curve, flown, f"curve {curve}: {flown.noise.value}{' + range sensor' if flown.range_sensor else ''}")
             for curve, flown in reversed(curve_scenarios(scenario))
         ]
-        jobs = [(flown, own, begin(title)) for _, flown, title in slowest_first]
         courses = [Courses(flown, options.runs) for _, flown, _ in slowest_first] if options.out is not None else []
-        results = simulate_in_threads(jobs, options.runs, options.seed, courses)
+        tasks = [
+            Task(flown, range(options.runs), options.seed, strategy=own, progress=begin(title))
+            for _, flown, title in slowest_first
+        ]
+        if courses:
+            tasks = [replace(task, observe=course.observe) for task, course in zip(tasks, courses, strict=True)]
+        results = simulate_all(tasks)
         elapsed_s = perf_counter() - began_s
         curves = [
             Curve(curve, flown.noise, flown.range_sensor is not None, result)

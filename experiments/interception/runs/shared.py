@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from threading import Event
-
-import numpy as np
 
 from experiments.common.errors import InputError
 from experiments.common.screen import NOT_FINITE, BeginProgress, some_runs
-from experiments.interception.course import Courses
 from experiments.interception.study import set_counts
 from guidance import NoiseKind, Strategy
-from sim import Results, Scenario, simulate
+from sim import Results, Scenario
 from sim.adversary import BudgetError, NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.gravity import on_board_model
+from sim.parallel import Task, is_finite, simulate_tasks
 from sim.scenario import strategy_name
 from sim.storage.codec import fingerprint
 from sim.versions import versions
@@ -25,41 +21,18 @@ from sim.versions import versions
 Progress = Callable[[float], None]
 
 
-def simulate_in_threads(
-    jobs: Sequence[tuple[Scenario, Strategy | None, Progress]], runs: int, seed: int, courses: Sequence[Courses] = ()
-) -> list[Results]:
-    """Simulate scenarios in parallel, one thread per core; the kernels release the interpreter lock.
-
-    A job is a scenario, an own strategy and a progress callback, the slowest first. `courses` are observers of the
-    simulations. Raise `InputError` if results are not finite.
-    """
-    stopped = Event()
-
-    def simulate_one(job: tuple[Scenario, Strategy | None, Progress], course: Courses | None) -> Results:
-        scenario, own, report = job
-
-        def progress(share: float) -> None:
-            if stopped.is_set():
-                raise InterruptedError
-            report(share)
-
-        observe = None if course is None else course.observe
-        results = simulate(scenario, runs, seed=seed, strategy=own, progress=progress, observe=observe)
-        need_finite(results)
-        return results
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        try:
-            return list(pool.map(simulate_one, jobs, courses or [None] * len(jobs)))
-        except BaseException:
-            stopped.set()
-            raise
+def simulate_all(tasks: Sequence[Task]) -> list[Results]:
+    """Return the results of tasks, which are simulated in parallel; `InputError` if they are not finite."""
+    try:
+        results = dict(simulate_tasks(tasks))
+    except FloatingPointError:
+        raise InputError(NOT_FINITE) from None
+    return [results[task] for task in tasks]
 
 
 def need_finite(results: Results) -> None:
     """Raise `InputError` if results overflowed: no file and no figure can show them."""
-    values = np.concatenate([results.miss_m, results.impulse_m_s, results.guaranteed_miss_m.filled(0.0)])
-    if not np.isfinite(values).all():
+    if not is_finite(results):
         raise InputError(NOT_FINITE)
 
 

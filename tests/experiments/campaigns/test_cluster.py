@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.campaigns.cluster import PATIENCE_S, connected, is_open
-from experiments.cli import main
+from experiments.campaigns.cluster import cluster
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
 from sim import Campaign, CampaignNoise, Scenario
@@ -24,133 +23,26 @@ from sim.storage import CampaignFolder
 Infoset = Callable[..., tuple[int, str, str]]
 
 
-@pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
-    """Run the command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main([str(each) for each in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
-
-
-@contextlib.contextmanager
-def listening(answer: bytes | None) -> Iterator[str]:
-    """Something that listens and is no scheduler: it says nothing, or this."""
-    kept = []
-
-    def accept(server: socket.socket) -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                connection, _ = server.accept()
-                kept.append(connection)
-                if answer is not None:
-                    connection.sendall(answer)
-
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        thread = threading.Thread(target=accept, args=(server,), daemon=True)
-        thread.start()
-        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        server.shutdown(socket.SHUT_RDWR)
-        thread.join()
-    for each in kept:
-        each.close()
-
-
-def refused(address: str) -> tuple[str, float]:
-    """Why a cluster is refused, and after how long."""
-    began_s = time.monotonic()
-    with pytest.raises(InputError) as why, connected(address):
-        pytest.fail("there is no cluster")
-    return str(why.value), time.monotonic() - began_s
-
-
+@pytest.mark.filterwarnings("default")  # of the cluster's own client
 @pytest.mark.parametrize(
-    "address",
-    [
-        "",
-        "localhost",
-        "localhost:8786",
-        "http://h:1",
-        "tcp://h",
-        "tcp://h:0",
-        "tcp://h:99999",
-        "tcp://a b:1",
-        "tcp://:1",
-    ],
+    ("address", "is_open"),
+    [("tcp://127.0.0.1:1", False), ("tls://10.0.0.1:8786", False), ("tcp://10.0.0.1:8786", True)],
 )
-def test_what_is_no_address(address: str) -> None:
-    assert "must be an address such as tcp://host:8786" in refused(address)[0]
-
-
-def test_nobody_listens() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-    said, after_s = refused(f"tcp://127.0.0.1:{port}")
-    assert f"no Dask scheduler answers at tcp://127.0.0.1:{port} (Connection refused)" in said
-    assert "dask scheduler" in said
-    assert after_s < 10.0
-
-
-def test_there_is_no_such_host() -> None:
-    assert (
-        "no Dask scheduler answers at tcp://no-such-host.invalid:8786" in refused("tcp://no-such-host.invalid:8786")[0]
-    )
-
-
-@pytest.mark.parametrize("answer", [None, b"HTTP/1.1 400 Bad Request\r\n\r\n" + b" " * 200, b"\x00" * 64])
-def test_something_else_listens(answer: bytes | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert PATIENCE_S < 10.0
-    monkeypatch.setattr("experiments.campaigns.cluster.PATIENCE_S", PATIENCE_S / 4.0)
-    with listening(answer) as address:
-        said, after_s = refused(address)
-    assert f"no Dask scheduler answers at {address}" in said
-    assert after_s < 10.0
-
-
-def test_tls_without_certificates() -> None:
-    with listening(None) as address:
-        said, after_s = refused(address.replace("tcp", "tls"))
-    assert "no Dask scheduler answers at tls://" in said
-    assert after_s < 10.0
-
-
-@pytest.mark.parametrize(
-    ("address", "warned"),
-    [
-        ("tcp://127.0.0.1:8786", False),
-        ("tcp://localhost:8786", False),
-        ("tcp://[::1]:8786", False),
-        ("tls://10.0.0.1:8786", False),
-        ("tcp://10.0.0.1:8786", True),
-        ("tcp://[2001:db8::1]:8786", True),
-        ("tcp://localhost.example:8786", True),
-        ("nothing", False),
-    ],
-)
-def test_an_open_scheduler_is_warned_of(
-    address: str, warned: bool, infoset: Infoset, brief: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_no_scheduler_is_one_message_and_an_open_one_is_warned_of(
+    address: str, is_open: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(given: str) -> None:
-        raise InputError(f"asked for {given}")
-
-    assert is_open(address) == warned
-    (tmp_path / "brief.toml").write_text(to_toml(brief))
-    monkeypatch.setattr("experiments.campaigns.cluster.connected", refuse)
-    code, _, err = infoset("campaign", "brief.toml", "--runs", 8, "--out", "runs", "--dask", address)
-    assert code == 2
-    assert f"asked for {address}" in err
-    assert ("everyone who reaches that address can run programs there" in err) == warned
+    notes: list[str] = []
+    monkeypatch.setattr("experiments.campaigns.cluster.PATIENCE_S", 0.5)
+    with (
+        pytest.raises(InputError, match=f"no Dask scheduler answers at {address} .*start one with: dask scheduler"),
+        cluster(address, notes.append),
+    ):
+        pytest.fail("there is no cluster")
+    assert any("everyone who reaches that address can run programs there" in note for note in notes) == is_open
 
 
 class Processes:
-    """A Dask scheduler and workers, each a process of its own on the loopback."""
+    """A Dask scheduler and workers, each a process on the loopback."""
 
     def __init__(self, folder: Path, protocol: str = "tcp") -> None:
         self.folder = folder
@@ -205,94 +97,87 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
         yield found
 
 
-@pytest.mark.thorough
-@pytest.mark.filterwarnings("default")  # of the cluster's own client
-def test_two_workers_give_the_same_bits_and_one_that_dies_loses_nothing(
-    infoset: Infoset, brief: Scenario, processes: Processes, tmp_path: Path
-) -> None:
+@pytest.fixture
+def file(infoset: Infoset, brief: Scenario, tmp_path: Path) -> Path:
     (tmp_path / "brief.toml").write_text(to_toml(brief))
-    workers = [processes.worker(), processes.worker()]
-    processes.wait_for(2)
-    options = ("--model", "paper", "--noise", "mixed", "--chunk", 16, "--dask", processes.address)
-    asked = ("campaign", "brief.toml", *options, "--out")
-    code, out, err = infoset(*asked, "two", "--runs", 400)
-    assert (code, err) == (0, "2 Dask workers, 2 threads\nwrote shards, scenario.toml, summary.json in two\n")
-    assert "400 runs" in out
-    expected = Campaign(brief, 4000, tmp_path / "here", noise=CampaignNoise.MIXED).run().table
-    assert CampaignFolder.read(tmp_path / "two").table().equals(expected.slice(0, 400))
+    return Path("brief.toml")
+
+
+def kill_after(shards: Path, number: int, process: subprocess.Popen[bytes]) -> threading.Thread:
+    """Kill a process once a campaign has stored some files."""
 
     def kill() -> None:
-        shards = tmp_path / "killed" / "shards"
-        while not shards.is_dir() or len(list(shards.glob("*.parquet"))) < 20:
+        while len(list(shards.glob("*.parquet"))) < number:
             time.sleep(0.02)
-        workers[0].kill()
+        process.kill()
 
     killer = threading.Thread(target=kill)
     killer.start()
-    assert infoset(*asked, "killed", "--runs", 4000, "-q") == (0, "", "")
-    killer.join()
-    assert workers[0].wait() != 0
-    assert CampaignFolder.read(tmp_path / "killed").table().equals(expected)
+    return killer
 
 
 @pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
-def test_a_scheduler_that_dies_is_one_message_and_the_campaign_goes_on_without(
-    brief: Scenario, processes: Processes, tmp_path: Path
+def test_two_workers_give_the_same_bits_and_one_that_ends_loses_nothing(
+    infoset: Infoset, brief: Scenario, file: Path, processes: Processes, tmp_path: Path
 ) -> None:
-    (tmp_path / "brief.toml").write_text(to_toml(brief))
+    workers = [processes.worker(), processes.worker()]
+    processes.wait_for(2)
+    options = ("--model", "paper", "--noise", "mixed", "--chunk", 16, "--dask", processes.address)
+    code, _, err = infoset("campaign", file, *options, "--out", "two", "--runs", 400)
+    assert (code, err) == (0, "2 Dask workers, 2 threads\nwrote shards, scenario.toml, summary.json in two\n")
+    expected = Campaign(brief, 4000, tmp_path / "here", noise=CampaignNoise.MIXED).run().runs()
+    assert CampaignFolder.read(tmp_path / "two").runs().equals(expected[:400])
+    killer = kill_after(tmp_path / "killed" / "shards", 20, workers[0])
+    assert infoset("campaign", file, *options, "--out", "killed", "--runs", 4000, "-q") == (0, "", "")
+    killer.join()
+    assert CampaignFolder.read(tmp_path / "killed").runs().equals(expected)
+
+
+@pytest.mark.thorough
+@pytest.mark.filterwarnings("default")
+def test_a_scheduler_that_ends_is_one_message_and_the_campaign_goes_on_without(
+    brief: Scenario, file: Path, processes: Processes, tmp_path: Path
+) -> None:
     processes.worker()
     processes.wait_for(1)
-    asked = ["campaign", "brief.toml", "--model", "paper", "--runs", "6000", "--chunk", "16", "--out", "runs", "-q"]
-    command = [sys.executable, "-m", "experiments", *asked]
-    with subprocess.Popen(
-        [*command, "--dask", processes.address], cwd=tmp_path, stderr=subprocess.PIPE, text=True
-    ) as process:
-        shards = tmp_path / "runs" / "shards"
-        while not shards.is_dir() or len(list(shards.glob("*.parquet"))) < 10:
-            assert process.poll() is None
-            time.sleep(0.05)
-        processes.scheduler.kill()
-        _, errors = process.communicate(timeout=60)
-    assert process.returncode == 2
-    assert errors.startswith("error: ")
-    assert errors.count("\n") == 1
-    assert "continue with --resume" in errors
-    there = CampaignFolder.read(tmp_path / "runs")
-    assert there.damaged == []
-    assert 160 <= there.finished_runs < 6000
-    result = Campaign(brief, 6000, tmp_path / "runs", chunk=16).run(resume=True)
-    assert result.complete
+    asked = ["campaign", str(file), "--model", "paper", "--runs", "6000", "--chunk", "16", "--out", "runs", "-q"]
+    command = [sys.executable, "-m", "experiments", *asked, "--dask", processes.address]
+    killer = kill_after(tmp_path / "runs" / "shards", 10, processes.scheduler)
+    done = subprocess.run(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    killer.join()
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert "continue with --resume" in done.stderr
+    assert 160 <= CampaignFolder.read(tmp_path / "runs").finished_runs < 6000
+    assert Campaign(brief, 6000, tmp_path / "runs", chunk=16).run(resume=True).complete
 
 
 @pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
-def test_workers_of_another_version_and_no_workers_at_all(
-    infoset: Infoset, brief: Scenario, processes: Processes, tmp_path: Path
+def test_no_workers_and_workers_of_another_version(
+    infoset: Infoset, file: Path, processes: Processes, tmp_path: Path
 ) -> None:
-    (tmp_path / "brief.toml").write_text(to_toml(brief))
-    asked = ("campaign", "brief.toml", "--runs", 16, "--out", "runs", "--dask", processes.address)
-    began_s = time.monotonic()
+    asked = ("campaign", file, "--runs", 16, "--out", "runs", "--dask", processes.address)
     code, _, err = infoset(*asked)
     assert code == 2
     assert "has no workers; start some with: dask worker" in err
-    assert time.monotonic() - began_s < 12.0
     old = tmp_path / "old" / "infoset-0.0.1.dist-info"
     old.mkdir(parents=True)
     (old / "METADATA").write_text("Metadata-Version: 2.1\nName: infoset\nVersion: 0.0.1\n")
-    processes.worker(PYTHONPATH=str(tmp_path / "old"))
+    processes.worker(PYTHONPATH=os.pathsep.join([str(tmp_path / "old"), os.environ.get("PYTHONPATH", "")]))
     processes.wait_for(1)
     code, _, err = infoset(*asked)
     assert code == 2
-    assert f"infoset {version('infoset')} here, 0.0.1 there" in err
-    assert not (tmp_path / "runs").exists()
+    assert f"infoset {version('infoset')} in the campaign, 0.0.1 on the worker" in err
 
 
 @pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make a certificate")
-def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(
-    infoset: Infoset, brief: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_an_encrypted_cluster_refuses_others(
+    infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As docs/campaigns.md says: one certificate for all, named in Dask's configuration."""
     import dask
@@ -315,8 +200,7 @@ def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(
     for name, path in names.items():
         monkeypatch.setenv(name, str(path))
     monkeypatch.setenv("DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION", "True")
-    (tmp_path / "brief.toml").write_text(to_toml(brief))
-    asked = ("campaign", "brief.toml", "--model", "paper", "--runs", 64, "--chunk", 16, "--dask")
+    asked = ("campaign", file, "--model", "paper", "--runs", 64, "--chunk", 16, "--dask")
     found = Processes(tmp_path, "tls")
     with found.stack:
         found.wait_until_up()
@@ -330,6 +214,5 @@ def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(
             code, out, err = infoset(*asked, address, "--out", "others")
             assert (code, out) == (2, "")
             assert err.startswith("error: --dask: no Dask scheduler answers at")
-    expected = Campaign(brief, 64, tmp_path / "here").run().table
-    assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
-    assert not (tmp_path / "others").exists()
+    expected = Campaign(brief, 64, tmp_path / "here").run().runs()
+    assert CampaignFolder.read(tmp_path / "runs").runs().equals(expected)

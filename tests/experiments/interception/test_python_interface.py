@@ -19,8 +19,7 @@ import infoset
 import sim
 from experiments import find_worst, fly_one, load_record, load_scenario, lower_bound, plot, save, simulate
 from experiments.common.errors import InputError
-from sim import CampaignNoise, Record, Results
-from sim.chunk import Chunk
+from sim import Record, Results
 from sim.results import join
 from tests.built_in import scenario_text
 
@@ -111,19 +110,6 @@ def test_only_results_in_space_have_the_columns_of_the_second_axis(results: Resu
     save(spatial, tmp_path / "results.csv")
     (head, *_) = csv.reader((tmp_path / "results.csv").read_text().splitlines())
     assert [name for name in head if name in columns] == columns
-
-
-def test_rows_of_a_campaign_in_space_have_the_start_in_km_and_the_miss_in_m(results: Results) -> None:
-    pytest.importorskip("pyarrow")
-    from sim.storage import tables
-
-    chunk = Chunk(0, 0, load_scenario(NAME), range(3), 4, CampaignNoise.RANDOM)
-    for flown, known in ((results, False), (with_lateral_columns(results), True)):
-        rows = tables.rows(chunk, flown, with_cell=False).to_pydict()
-        assert rows["y_km"] == ([-0.003, -0.001, 0.001] if known else [None] * 3)
-        assert rows["vy_km_s"] == ([-0.002, 0.0, 0.002] if known else [None] * 3)
-        assert rows["miss_z_m"] == ([4.0, 6.0, 8.0] if known else [None] * 3)
-        assert rows["z_km"] == (results.position_m[:, 0] / 1e3).tolist()
 
 
 def test_results_and_records_are_drawn(results: Results, record: Record) -> None:

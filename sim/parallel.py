@@ -1,0 +1,207 @@
+"""Simulation of runs in parallel: on threads or processes of this machine, or on a cluster."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+import numpy as np
+
+from guidance import NoiseKind, Strategy
+from sim.engagement import Step
+from sim.results import Results, join
+from sim.scenario import Scenario
+from sim.simulate import simulate
+from sim.versions import need_versions, versions
+
+_PARENT_CHECK_S = 0.5
+
+
+class CampaignNoise(Enum):
+    """Measurement noise of a campaign; MIXED is random in even runs and game in odd ones."""
+
+    RANDOM = "random"
+    GAME = "game"
+    MIXED = "mixed"
+
+    @property
+    def kinds(self) -> tuple[NoiseKind, ...]:
+        """Noises of run 0, 1, 2, ..., repeated."""
+        return (NoiseKind.RANDOM, NoiseKind.GAME) if self is CampaignNoise.MIXED else (NoiseKind(self.value),)
+
+    def of_run(self, run: int) -> NoiseKind:
+        """Return the noise of a run."""
+        return self.kinds[run % len(self.kinds)]
+
+    def applied_to(self, scenario: Scenario) -> Scenario:
+        """Return a scenario with this noise; MIXED leaves it unchanged."""
+        return scenario if self is CampaignNoise.MIXED else replace(scenario, noise=NoiseKind(self.value))
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Runs of one scenario that one worker simulates.
+
+    Parameters
+    ----------
+    runs : sequence of int
+        Run numbers in increasing order.
+    noise : CampaignNoise or None
+        Noise of the runs; None is the scenario's.
+    cell : int
+        Number of the scenario in a sweep.
+    progress, observe : callable or None
+        As for `simulate`; for threads only.
+    versions : dict of str to str
+        Versions of the packages that must simulate the runs.
+    """
+
+    scenario: Scenario
+    runs: Sequence[int]
+    seed: int
+    noise: CampaignNoise | None = None
+    guarantee: bool = True
+    strategy: Strategy | None = None
+    cell: int = 0
+    progress: Callable[[float], None] | None = None
+    observe: Callable[[int, Step], None] | None = None
+    versions: dict[str, str] = field(default_factory=versions)
+
+
+def simulate_tasks(
+    tasks: Iterable[Task], executor: Executor | None = None, workers: int | None = None
+) -> Generator[tuple[Task, Results], None, None]:
+    """Simulate tasks on an executor and yield each with its results as soon as it is finished, in any order.
+
+    The results of a run depend neither on the executor nor on the other runs of its task. When the generator is closed
+    or ends with an error, tasks that have not started are cancelled, and threads stop after their current step.
+
+    Parameters
+    ----------
+    tasks : iterable of Task
+        Tasks, of which a limited number is taken at a time.
+    executor : Executor or None
+        An executor of `concurrent.futures`, or one with the same interface. None uses threads of this process: the
+        kernels release the interpreter's lock.
+    workers : int or None
+        Number of threads, by default one per core; with an executor the number of tasks that are submitted at a time,
+        by default two per core.
+
+    Raises
+    ------
+    VersionError
+        If the workers have other versions of the packages.
+    FloatingPointError
+        If results are not finite.
+    """
+    cores = os.cpu_count() or 1
+    stopped = threading.Event()
+    if executor is None:
+        pool: Executor = ThreadPoolExecutor(workers or cores)
+        at_once, check = (workers or cores) + 1, stopped.is_set
+    else:
+        pool, at_once, check = executor, workers or 2 * cores, None
+    waiting = iter(tasks)
+    running: dict[Future[Results], Task] = {}
+    can_wait = True
+    try:
+        while True:
+            for task in itertools.islice(waiting, at_once - len(running)):
+                running[pool.submit(simulate_task, task, check)] = task
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                yield running.pop(future), future.result()
+    except MemoryError:
+        can_wait = False  # Numba may still hold its lock, and a running task would wait for it for ever
+        raise
+    finally:
+        stopped.set()
+        for future in running:
+            future.cancel()
+        if executor is None:
+            pool.shutdown(wait=can_wait, cancel_futures=True)
+
+
+def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Results:
+    """Simulate the runs of a task and return the results in the order of the runs; see `simulate_tasks`.
+
+    The simulation ends with an InterruptedError after a step at which `stopped` returns true.
+    """
+    need_versions(task.versions)
+
+    def progress(share: float) -> None:
+        if stopped is not None and stopped():
+            raise InterruptedError
+        if task.progress is not None:
+            task.progress(share)
+
+    noise = task.noise or CampaignNoise(task.scenario.noise.value)
+    runs_by_noise = {kind: [run for run in task.runs if noise.of_run(run) is kind] for kind in noise.kinds}
+    results = join(
+        [
+            simulate(
+                replace(task.scenario, noise=kind),
+                runs,
+                seed=task.seed,
+                strategy=task.strategy,
+                guarantee=task.guarantee,
+                progress=progress,
+                observe=task.observe,
+            )
+            for kind, runs in runs_by_noise.items()
+            if runs
+        ]
+    )
+    if not is_finite(results):
+        raise FloatingPointError(f"results of runs {task.runs[0]} to {task.runs[-1]} are not finite")
+    return results.take(np.argsort(results.runs))
+
+
+def is_finite(results: Results) -> bool:
+    """Whether no result overflowed."""
+    values = (results.miss_m, results.impulse_m_s, results.guaranteed_miss_m.filled(0.0))
+    return all(bool(np.isfinite(each).all()) for each in values)
+
+
+@contextlib.contextmanager
+def worker_processes(count: int) -> Iterator[Executor]:
+    """Start processes that simulate tasks, and end them on exit from the context, after an error at once.
+
+    Half of the work of an engagement needs the interpreter, which threads share and processes do not. A process takes
+    one or two seconds to start. Processes are spawned: forked ones would keep the lock of a campaign's folder after
+    this process has ended.
+    """
+    before = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(
+        count, multiprocessing.get_context("spawn"), initializer=_end_with, initargs=(os.getpid(),)
+    )
+    try:
+        yield pool
+    except BaseException:
+        for child in set(multiprocessing.active_children()) - before:
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _end_with(parent: int) -> None:
+    """Ignore SIGINT (the parent handles it); exit when the parent dies, which the pool does not do."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_PARENT_CHECK_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
