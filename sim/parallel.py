@@ -135,7 +135,8 @@ def simulate_tasks(
 def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Results:
     """Simulate the runs of a task and return the results in the order of the runs; see `simulate_tasks`.
 
-    The simulation ends with an InterruptedError after a step at which `stopped` returns true.
+    The simulation ends with an InterruptedError after a step at which `stopped` returns true. A FloatingPointError is
+    raised if results are not finite.
     """
     need_versions(task.versions)
 

@@ -57,20 +57,24 @@ def to_bytes(results: Results, cell: int, noise: CampaignNoise, metadata: Mappin
 def read(files: Mapping[Path, Mapping[str, str]], columns: Sequence[str] | None = None) -> pd.DataFrame:
     """Return some columns of all files, one after the other; None is all columns.
 
-    Each file must have the schema and its metadata in `files`. StorageError, which names the file, if one cannot be
-    read or has others.
+    Each file must have the schema and its metadata in `files`. A StorageError, which names the file, is raised if one
+    cannot be read or has others.
     """
     names = SCHEMA.names if columns is None else list(columns)
     parts = [pa.schema([SCHEMA.field(name) for name in names]).empty_table()]
     for file, metadata in files.items():
         try:
-            fragment = _FORMAT.make_fragment(str(file), LocalFileSystem())
-            found = fragment.physical_schema
-            if not found.equals(SCHEMA) or found.metadata != {k.encode(): v.encode() for k, v in metadata.items()}:
-                raise ValueError("it is no file of runs of this campaign")
-            parts.append(fragment.to_table(schema=SCHEMA, columns=names))
+            parts.append(_table(file, metadata, names))
         except (pa.ArrowException, OSError, ValueError) as error:
             raise StorageError(
                 f"{file}: cannot be read: {str(error)[:200]}; delete it, and simulate its runs again with --resume"
             ) from None
     return pa.concat_tables(parts).to_pandas(types_mapper={pa.bool_(): pd.BooleanDtype()}.get)
+
+
+def _table(file: Path, metadata: Mapping[str, str], names: Sequence[str]) -> pa.Table:
+    fragment = _FORMAT.make_fragment(str(file), LocalFileSystem())
+    found = fragment.physical_schema
+    if not found.equals(SCHEMA) or found.metadata != {k.encode(): v.encode() for k, v in metadata.items()}:
+        raise ValueError("it is no file of runs of this campaign")
+    return fragment.to_table(schema=SCHEMA, columns=names)

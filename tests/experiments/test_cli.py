@@ -399,7 +399,7 @@ def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
 def test_what_is_wrong_is_said_before_the_work(
     arguments: list[str], parts: list[str], infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("experiments.interception.runs.shared.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("sim.parallel.simulate", lambda *_: pytest.fail("began to work"))
     monkeypatch.setattr("experiments.interception.runs.engage.fly_one", lambda *_: pytest.fail("began to work"))
     message = infoset.refused(*arguments)
     for part in parts:
@@ -440,7 +440,7 @@ def test_a_folder_that_may_not_be_written_is_found_before_the_work(
     def refuse(*_: object, **__: object) -> None:  # chmod does not stop root
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("experiments.interception.runs.shared.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("sim.parallel.simulate", lambda *_: pytest.fail("began to work"))
     with monkeypatch.context() as patched:
         patched.setattr(Path, "mkdir", refuse)
         message = infoset.refused("experiment", "--out", "out")
@@ -515,7 +515,7 @@ def test_results_that_are_not_finite_are_refused(infoset: Command, monkeypatch: 
         results.miss_m[:] = math.inf
         return results
 
-    monkeypatch.setattr("experiments.interception.runs.shared.simulate", overflowing)
+    monkeypatch.setattr("sim.parallel.simulate", overflowing)
     assert "not finite" in infoset.refused("experiment", "--runs", 1)
 
 
@@ -523,7 +523,7 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("experiments.interception.runs.shared.simulate", interrupt)
+    monkeypatch.setattr("sim.parallel.simulate", interrupt)
     code, out, err = infoset("experiment", "--out", "out")
     # Before it, perhaps, that kernels are compiled.
     assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")

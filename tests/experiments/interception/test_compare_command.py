@@ -148,7 +148,7 @@ def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Pat
 def test_what_is_wrong_is_said_before_the_work(
     arguments: list[str], parts: list[str], infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("experiments.interception.runs.shared.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("sim.parallel.simulate", lambda *_: pytest.fail("began to work"))
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith("error: ")
@@ -178,7 +178,7 @@ def test_interrupted(infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("experiments.interception.runs.shared.simulate", interrupt)
+    monkeypatch.setattr("sim.parallel.simulate", interrupt)
     code, out, err = infoset("--out", "out")
     # Before it, perhaps, that kernels are compiled.
     assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")
