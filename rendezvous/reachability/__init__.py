@@ -23,12 +23,11 @@ from rendezvous.reachability.selection import (
     samples,
     vertices,
 )
-from rendezvous.reachability.sets import Budget, ReachableSets, SetCounts, SetKind, TooLargeError
+from rendezvous.reachability.sets import ReachableSets, SetCounts, SetKind, TooLargeError
 from rendezvous.reachability.solve import OptimalControls, Route, Solution, min_periods, solve
 
 __all__ = [
     "MAX_PERIODS",
-    "Budget",
     "Effort",
     "EmptyTubeError",
     "FeedbackPlan",

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import clarabel
 import numpy as np
 from scipy.linalg import block_diag
 
 from rendezvous._arrays import Flags, Floats, Places
-from rendezvous.reachability.conic import APART, STEADY, ConeProgram, NoSolutionError, Optimum
+from rendezvous.reachability.conic import MAX_GAP, ConeProgram, NoSolutionError, Optimum
 from rendezvous.reachability.problem import Block
 
 Constraints = tuple[Floats, Floats, Places, Places]
@@ -332,7 +331,7 @@ class Maximiser:
         soft = lifted.moments >= 0
         self._use(np.ones(len(soft), dtype=bool) if soft.sum() < _MANY_ROWS else ~soft)
 
-    def maximise(self, cost: Floats, max_gap: float = APART) -> Floats:
+    def maximise(self, cost: Floats, max_gap: float = MAX_GAP) -> Floats:
         """Return a maximiser of a linear function, both of shape (p,), with at most this duality gap."""
         return self._solved(cost, max_gap).point
 
@@ -361,16 +360,14 @@ class Maximiser:
         self._used = used
         self._program = self._with_cost(np.zeros(self._lifted.size))
         if self._lifted.size:
-            # Every answer is checked; for a box, refinement would take a third of the time.
-            changes = STEADY if self._lifted.ball else {"iterative_refinement_enable": False}
-            self._solver = self._program.solver(**changes)
+            self._solver = self._program.solver()
 
     def _with_cost(self, cost: Floats) -> ConeProgram:
         lifted, used = self._lifted, self._used
         program = ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows[used], lifted.limits[used])
         return with_thrust(program, lifted)
 
-    def _solved(self, cost: Floats, max_gap: float = APART) -> Optimum:
+    def _solved(self, cost: Floats, max_gap: float = MAX_GAP) -> Optimum:
         lifted = self._lifted
         if not lifted.size:
             return Optimum(np.zeros(0), np.zeros(int(self._used.sum())))
@@ -392,14 +389,9 @@ class Maximiser:
         down = -cost / (size if size > 0.0 else 1.0)
         self._solver.update(q=down)
         solution = self._solver.solve()
-        if solution.status == clarabel.SolverStatus.Solved:
-            point, multipliers = np.array(solution.x), np.array(solution.z)
-            try:
-                self._program.need_solution(point, multipliers, down, max_gap)
-            except NoSolutionError:
-                pass
-            else:
-                return Optimum(point, self._program.of_rows(multipliers))
-        if self._lifted.ball:
-            return self._with_cost(down).solve(max_gap)
-        return Optimum(self._with_cost(down).vertex(), np.zeros(int(self._used.sum())))
+        try:
+            return self._program.checked(np.array(solution.x), np.array(solution.z), down, max_gap)
+        except NoSolutionError:
+            if self._lifted.ball:
+                raise
+            return Optimum(self._with_cost(down).vertex(), np.zeros(int(self._used.sum())))

@@ -6,29 +6,25 @@ from bisect import bisect_left
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import lstsq
 
 from infoset.polytope import null_space_basis, relative_interior
 from rendezvous._arrays import Flags, Floats, Places
 from rendezvous.reachability.admissible import Lifted, deep_point, lift, min_relaxation
-from rendezvous.reachability.conic import ConeProgram, NoSolutionError
+from rendezvous.reachability.conic import MAX_GAP, MAX_VIOLATION, ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import Block
 
 _REACHED = 1e-9
 """Constraints that are broken by less than this, relative to their sizes, count as kept."""
 _PRESSED = 1e-7
-_APART = 1e-8
-"""Maximum relative gap between the norm and its lower bound."""
-_CLOSE = 1e-13
-"""Gap at which the search stops, where rounding allows it."""
-_ZERO = 1e-11
-"""Norms below this part of the reach of the controls count as zero, unless their lower bound is above rounding."""
-_BROKEN = 1e-11
+_CLOSE = 1e-12
+"""Relative gap between the norm and its lower bound at which the search stops."""
+_ZERO, _ABSOLUTE = 1e-11, 1e-12
+"""Norms below the first part of what the controls can do count as zero, unless their lower bound is above rounding; the
+second is the maximum gap where it is more than the relative one."""
 _ULP = float(np.finfo(float).eps)
 _RANK = 1e-13
-_ROUNDS = 6
+_ROUNDS = 5
 _REACH = 1e4
-_NEWTON_STEPS, _IDLE = 16, 5
 
 
 class EmptyTubeError(ValueError):
@@ -160,8 +156,8 @@ class MinimumNorm:
 def min_norm(lifted: Lifted, weights: Floats) -> MinimumNorm:
     """Minimise |weights x(T)| over all controls of a block, a set without equations; weights, shape (n,), are positive.
 
-    Raise `NoSolutionError` if the norm found is not within 1e-8 of its lower bound, or its controls violate a
-    constraint.
+    Raise `NoSolutionError` if the norm found is not within 1e-8 of its lower bound, or 1e-12 of what the controls can
+    do, or the controls violate a constraint by more than 1e-9.
 
     The cone program minimises t with |weights x(T)| <= t, not the square of the norm, whose multipliers vanish with
     it. A solver finds t to its tolerance times the size of the states; the program is therefore solved again about its
@@ -196,106 +192,108 @@ class _Search:
         self._free = weights * lifted.free[-1]
         self._response = weights[:, None] * lifted.response[-1]
         self._soft = lifted.moments >= 0
-        self._size = lifted.size
-        self._group = lifted.ball or 1
-        self._point = np.zeros(self._size)
-        self.value = float(np.linalg.norm(self._free))
-        self._merit = np.inf
+        self._lengths = np.abs(lifted.rows).sum(axis=1)
+        self._reach = float(np.linalg.norm(np.abs(self._free) + np.abs(self._response).sum(axis=1)))
+        self._point = np.zeros(lifted.size)
+        self.value = self._merit = np.inf
+        self.violation = 0.0
         self._bound, self._error = -np.inf, 0.0
         self._direction = np.zeros(len(self._free))
         self._multipliers = np.zeros(len(lifted.rows))
-        reach = np.abs(self._free) + np.abs(self._response).sum(axis=1)
-        self._lengths = np.abs(lifted.rows).sum(axis=1)
-        self._reach = float(np.linalg.norm(reach))
-
-    @property
-    def at_zero(self) -> bool:
-        """Whether the norm at the point is zero to rounding."""
-        return self._outside(self._point) <= _BROKEN and self.value <= (
-            _ZERO * self._reach if not self.above_zero else 32.0 * _ULP * self._reach
-        )
-
-    @property
-    def _good(self) -> bool:
-        return self.at_zero or self._merit <= _APART * self.value + self._error
 
     @property
     def above_zero(self) -> bool:
         """Whether the lower bound proves that zero is not reached."""
         return self._bound > self._error
 
+    @property
+    def at_zero(self) -> bool:
+        """Whether the norm at the point is zero to rounding."""
+        return self.value <= _ZERO * self._reach and not self.above_zero
+
+    @property
+    def _gap(self) -> float:
+        """The gap between the norm and its lower bound, beyond rounding."""
+        return 0.0 if self.at_zero else abs(self.value - max(self._bound, 0.0)) - self._error
+
     def solve(self) -> None:
-        """Solve the cone program, repeatedly about its solution if that is not accurate enough, and improve it."""
-        if not self._size:
-            self._offer_point(self._point)
-            self._offer_bound(self._free / max(self.value, 1e-300), self._multipliers)
+        """Solve the cone program, and again about its own solution until the gap is small."""
+        if not self._lifted.size:
+            self.value = float(np.linalg.norm(self._free))
+            self._offer_bound(self._free, self._multipliers)
             return
         scale = 1.0
         for _ in range(_ROUNDS):
-            start, before = self._point, self._merit
-            program, kept = self._program(start, scale)
-            for inner, dual in program.attempts():
-                multipliers = np.zeros(len(self._multipliers))
-                multipliers[kept] = program.of_rows(dual)[: len(kept)]
-                multipliers[~self._soft] = 0.0
-                guess = start + scale * inner[:-1], -program.of_cones(dual)[0][1:], multipliers
-                self._offer_point(guess[0])
-                self._offer_bound(guess[1], guess[2])
-                self._improve(*guess)
-                if self._good:
-                    return
-                if self._merit < 0.5 * before:
-                    break
+            self._improve(scale)
+            if self._gap <= _CLOSE * self.value:
+                return
             scale = min(scale, self.value)
 
     def result(self) -> MinimumNorm:
-        """Return the solution; raise NoSolutionError if it is not accurate enough."""
-        if not self._good:
+        """Return the solution; raise `NoSolutionError` if it is not accurate enough."""
+        allowed = max(MAX_GAP * self.value, _ABSOLUTE * self._reach)
+        if not (self._gap <= allowed and self.violation <= MAX_VIOLATION):
             raise NoSolutionError(
-                f"the minimum terminal norm was not found: it lies between {self._bound:.6g} and {self.value:.6g} of "
-                "the largest bound on a state"
+                f"the minimum terminal norm was not solved to {MAX_GAP:g}: relative gap {self._gap / self.value:.2g}, "
+                f"constraints violated by {self.violation:.2g}"
             )
         residual = self._residual(self._direction, self._multipliers)
         if self.at_zero and self._bound < -_ZERO * self._reach:
             # Zero is inside the set reached: no constraint is active.
-            return MinimumNorm(self._point, True, np.zeros(len(self._multipliers)), np.zeros(self._size))
+            return MinimumNorm(self._point, True, np.zeros(len(self._multipliers)), np.zeros(self._lifted.size))
         multipliers = self._multipliers.copy()
-        if not self._lifted.ball and self._size:
+        if not self._lifted.ball and self._lifted.size:
             # The rows of a box, which hold a control at its bound.
             hard = np.flatnonzero(~self._soft)
             multipliers[hard] = np.maximum(-self._lifted.rows[hard] @ residual, 0.0)
         return MinimumNorm(self._point, self.at_zero, multipliers, residual)
 
+    def _improve(self, scale: float) -> None:
+        """Solve the cone program about the point, in units of `scale`, and offer its point and multipliers."""
+        program, kept = self._program(self._point, scale)
+        inner, dual = program.answer()
+        if not (np.isfinite(inner).all() and np.isfinite(dual).all()):
+            return
+        parts = list(program.parts(dual))
+        multipliers = np.zeros(len(self._multipliers))
+        multipliers[kept] = parts[0][1] if len(kept) else ()
+        direction = -next(part for kind, part in parts if kind == "cone")[1:]
+        point = self._point + scale * inner[:-1]
+        self._offer_point(point)
+        self._offer_bound(direction, multipliers)
+        # A bound is active where its multiplier is above its slack, both in the units of the program.
+        active = self._soft & (multipliers > (self._lifted.limits - self._lifted.rows @ point) / scale)
+        held = self._norms(self._residual(direction, multipliers * self._soft)) > (1.0 - self._norms(point)) / scale
+        self._offer_bound(*self._sharpened(direction, multipliers, np.flatnonzero(active), held))
+
     def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, Places]:
         """The cone program in v = start + scale z, without the constraints that z cannot reach."""
-        lifted, size = self._lifted, self._size
+        lifted, size = self._lifted, self._lifted.size
         slack = (lifted.limits - lifted.rows @ start) / scale
-        reach = _REACH if scale < 1.0 else np.inf
-        kept = np.flatnonzero(slack < reach) if scale == 1.0 else np.flatnonzero(slack < reach * self._lengths)
-        ends = slack[kept] if scale == 1.0 else np.maximum(slack[kept], 0.0)
+        kept = np.flatnonzero(slack < _REACH * self._lengths)
         cost = np.zeros(size + 1)
         cost[-1] = 1.0
-        program = ConeProgram(cost).keep(lifted.rows[kept], ends)
+        program = ConeProgram(cost).keep(lifted.rows[kept], slack[kept])
         if scale < 1.0:
             unit = np.eye(size)
             program.keep(np.vstack([unit, -unit]), np.full(2 * size, _REACH))
         program.bound(self._response, (self._free + self._response @ start) / scale, cost)
         if lifted.ball:
-            self._bound_thrust(program, start, scale, reach)
+            self._bound_thrust(program, start, scale)
         return program, kept
 
-    def _bound_thrust(self, program: ConeProgram, start: Floats, scale: float, reach: float) -> None:
+    def _bound_thrust(self, program: ConeProgram, start: Floats, scale: float) -> None:
         """|start + scale z| <= 1 as |z|^2 <= 2 w with an affine w, which is accurate for any scale."""
         group = self._lifted.ball
-        for first in range(0, self._size, group):
+        for first in range(0, self._lifted.size, group):
             mine = slice(first, first + group)
             room = 0.5 * (1.0 - float(start[mine] @ start[mine])) / scale
-            if room > group * reach + scale * group * reach**2:
+            if room > group * _REACH + scale * group * _REACH**2:
                 continue
             size = max(1.0, room)
-            top = np.zeros(self._size + 1)
+            top = np.zeros(self._lifted.size + 1)
             top[mine] = -start[mine] / size
-            block = np.zeros((group + 1, self._size + 1))
+            block = np.zeros((group + 1, self._lifted.size + 1))
             block[:group, mine] = np.sqrt(scale / size) * np.eye(group)
             block[group] = np.sqrt(0.5) * top
             free = np.zeros(group + 1)
@@ -312,123 +310,33 @@ class _Search:
             return
         direction = direction / length
         multipliers = np.where(self._soft, np.maximum(multipliers, 0.0), 0.0) / length
-        residual = self._residual(direction, multipliers)
-        pressed = self._norms(residual)
+        pressed = self._norms(self._residual(direction, multipliers))
         bound = float(direction @ self._free - multipliers @ self._lifted.limits) - float(pressed.sum())
         if bound > self._bound:
             turned, held = np.abs(direction), np.abs(self._lifted.rows).T @ multipliers
             parts = turned @ np.abs(self._free) + multipliers @ np.abs(self._lifted.limits)
             self._error = 8.0 * _ULP * float(parts + (np.abs(self._response).T @ turned + held).sum() + self._reach)
             self._bound, self._direction, self._multipliers = bound, direction, multipliers
-            self._merit = self._merit_of(self._point)
 
     def _offer_point(self, point: Floats) -> None:
-        merit = self._merit_of(point)
-        if merit < self._merit or not np.isfinite(self._merit):
-            self._point, self._merit = point, merit
-            self.value = float(np.linalg.norm(self._free + self._response @ point))
-
-    def _merit_of(self, point: Floats) -> float:
-        value = float(np.linalg.norm(self._free + self._response @ point))
-        outside = self._outside(point)
-        # A violated constraint gains about as much; violated by more than rounding, the search goes on from the point.
-        return abs(value - max(self._bound, 0.0)) + outside * self._reach + (1.0 if outside > _BROKEN else 0.0)
-
-    def _outside(self, point: Floats) -> float:
-        broken = float((self._lifted.rows @ point - self._lifted.limits - 32.0 * _ULP * self._lengths).max(initial=0.0))
-        if self._lifted.ball and self._size:
-            broken = max(broken, float(self._norms(point).max()) - 1.0)
-        return broken
-
-    def _improve(self, point: Floats, direction: Floats, multipliers: Floats) -> None:
-        """Improve point and bound by Newton's method on the conditions of optimality.
-
-        A bound is active in the next step where its multiplier is above its slack (a primal-dual active set). The
-        unknowns are the step, the direction y / |y| and the multipliers: the system stays well conditioned for small y.
-        """
-        pressed = self._norms(self._residual(direction, multipliers))
-        idle = 0
-        for _ in range(_NEWTON_STEPS):
-            before = self._merit
-            gaps = self._lifted.limits - self._lifted.rows @ point
-            active = np.flatnonzero(self._soft & (multipliers > gaps))
-            held = pressed > 1.0 - self._norms(point)
-            self._offer_bound(*self._sharpened(direction, multipliers, active, held))
-            step, turned, forces, pressed = self._newton(point, active, held, pressed)
-            point, multipliers = point + step, np.zeros(len(gaps))
-            multipliers[active] = forces
-            self._offer_point(point)
-            length = float(np.linalg.norm(turned))
-            if not length > _RANK:
-                return
-            direction, multipliers, pressed = turned / length, multipliers / length, pressed / length
-            self._offer_bound(direction, multipliers)
-            idle = 0 if self._merit < before else idle + 1
-            if self._merit <= _CLOSE * self.value or idle == _IDLE:
-                return
-            if idle > 1:
-                point = self._slid(point, direction, multipliers, pressed, held)
-
-    def _newton(
-        self, point: Floats, active: Places, held: Flags, pressed: Floats
-    ) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return a step, the terminal state after it in units of its norm before, and multipliers."""
-        size, count, group = self._size, len(self._free), self._group
-        normals = np.zeros((len(held), size))
-        for period in range(len(held)):
-            mine = slice(period * group, (period + 1) * group)
-            normals[period, mine] = point[mine]
-        normals = normals[held]
-        state = self._free + self._response @ point
-        tied = np.vstack([self._response, self._lifted.rows[active], normals])
-        system = np.zeros((size + len(tied),) * 2)
+        """Use a point of smaller norm; a violation of constraints is added, times what it can gain."""
+        outside = float((self._lifted.rows @ point - self._lifted.limits).max(initial=0.0))
         if self._lifted.ball:
-            system[:size, :size] = np.diag(np.repeat(np.where(held, np.maximum(pressed, 0.0), 0.0), group))
-        system[:size, size:], system[size:, :size] = tied.T, tied
-        system[size : size + count, size : size + count] = -max(float(np.linalg.norm(state)), 1e-300) * np.eye(count)
-        missing = self._lifted.limits[active] - self._lifted.rows[active] @ point
-        right = np.concatenate([np.zeros(size), -state, missing, 0.5 * (1.0 - (normals**2).sum(axis=1))])
-        solution = lstsq(system, right, cond=_RANK, lapack_driver="gelsy")[0]
-        step, turned, forces, norms = np.split(solution, np.cumsum([size, count, len(active)]))
-        after = np.zeros(len(held))
-        after[held] = norms
-        return step, turned, forces, after
-
-    def _slid(self, point: Floats, direction: Floats, multipliers: Floats, pressed: Floats, held: Flags) -> Floats:
-        """Move along a descent direction that Newton's method neglected, up to the first bound, which becomes active.
-
-        The norm falls by rounding for a step of an ulp, and by more than rounding for the whole step.
-        """
-        slope = np.where(np.repeat(held, self._group), 0.0, self._residual(direction, multipliers))
-        steep = float(np.linalg.norm(slope))
-        if steep == 0.0:
-            return point
-        way = -slope / steep
-        rate, gaps = self._lifted.rows @ way, self._lifted.limits - self._lifted.rows @ point
-        ahead = np.flatnonzero(self._soft & (rate > _RANK) & (multipliers == 0.0))
-        lengths = np.maximum(gaps[ahead], 0.0) / rate[ahead]
-        a, b = self._norms(way) ** 2, (way * point).reshape(-1, self._group).sum(axis=1)
-        free = np.flatnonzero(~held & (a > _RANK**2))
-        c = np.minimum(self._norms(point)[free] ** 2 - 1.0, 0.0)
-        others = (np.sqrt(b[free] ** 2 - a[free] * c) - b[free]) / a[free]
-        far = min(lengths.min(initial=np.inf), others.min(initial=np.inf))
-        if not np.isfinite(far):
-            return point
-        multipliers[ahead[lengths <= far]] = steep
-        pressed[free[others <= far]] = steep
-        self._offer_point(point + far * way)
-        return np.asarray(point + far * way)
+            outside = max(outside, float(self._norms(point).max()) - 1.0)
+        value = float(np.linalg.norm(self._free + self._response @ point))
+        merit = value + outside * self._reach
+        if merit < self._merit:
+            self._point, self.value, self.violation, self._merit = point, value, outside, merit
 
     def _sharpened(self, direction: Floats, multipliers: Floats, active: Places, held: Flags) -> tuple[Floats, Floats]:
         """Move multipliers to where controls that are not at their bounds are stationary."""
-        moving = np.repeat(~held, self._group)
+        moving = np.repeat(~held, self._lifted.ball or 1)
         system = np.hstack([self._response[:, moving].T, self._lifted.rows[np.ix_(active, moving)].T])
         both = np.concatenate([direction, multipliers[active]])
         both = both - np.linalg.lstsq(system, system @ both, rcond=_RANK)[0]
         sharp = np.zeros(len(multipliers))
-        length = max(float(np.linalg.norm(both[: len(direction)])), 1e-300)
-        sharp[active] = both[len(direction) :] / length
-        return both[: len(direction)] / length, sharp
+        sharp[active] = both[len(direction) :]
+        return both[: len(direction)], sharp
 
     def _norms(self, controls: Floats) -> Floats:
-        return np.asarray(np.linalg.norm(controls.reshape(-1, self._group), axis=1))
+        return np.asarray(np.linalg.norm(controls.reshape(-1, self._lifted.ball or 1), axis=1))

@@ -66,8 +66,8 @@ class ReachabilityProblem:
     Raises
     ------
     ValueError
-        If shapes do not fit, a number is not finite, a bound is not positive, there is no period, or A(T-1)...A(0)
-        multiplies deviations by over 1e10, relative to the bounds.
+        If a shape does not fit, a number is not finite, a bound is not positive, there are no periods or more than 256,
+        or A(T-1)...A(0) multiplies deviations by over 1e10, relative to the bounds.
     InadmissibleStartError
         If x(0) breaks a constraint.
     """
@@ -85,14 +85,10 @@ class ReachabilityProblem:
     state_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.transition.ndim != 3 or not len(self.transition):
-            raise ValueError("A(t) must have the shape (T, n, n), with at least one period")
         periods, n = self.transition.shape[:2]
-        if periods > MAX_PERIODS:
-            raise ValueError(f"there must be at most {MAX_PERIODS} periods, found {periods}")
-        if self.control.ndim != 3 or not self.control.shape[2]:
-            raise ValueError("B(t) must have the shape (T, n, m), with at least one control")
         m = self.control.shape[2]
+        if not 1 <= periods <= MAX_PERIODS:
+            raise ValueError(f"there must be 1 to {MAX_PERIODS} periods, found {periods}")
         arrays = {
             "A(t)": (self.transition, (periods, n, n)),
             "B(t)": (self.control, (periods, n, m)),
@@ -101,37 +97,14 @@ class ReachabilityProblem:
             "the bounds on controls": (self.control_bounds, (m,)),
         }
         for name, (array, shape) in arrays.items():
-            if array.shape != shape:
-                raise ValueError(f"{name} must have the shape {shape}, found {array.shape}")
-            if not np.isfinite(array).all():
-                raise ValueError(f"{name} must be finite")
+            if array.shape != shape or not np.isfinite(array).all():
+                raise ValueError(f"{name} must be finite, of shape {shape}")
         if (self.state_bounds <= 0.0).any() or (self.control_bounds <= 0.0).any():
             raise ValueError("all bounds on states and controls must be positive")
         if self.thrust is ThrustShape.BALL and np.ptp(self.control_bounds) > 0.0:
             raise ValueError("for thrust in a ball the bounds on controls must be equal")
-        self._check_more(periods, n, m)
         self._check_growth()
         self._check_start()
-
-    def _check_more(self, periods: int, n: int, m: int) -> None:
-        if (self.normals is None) != (self.offsets is None):
-            raise ValueError("constraints need both normals and offsets")
-        if self.normals is not None and self.offsets is not None:
-            k = len(self.normals)
-            if self.normals.shape != (k, n) or self.offsets.shape != (periods + 1, k):
-                raise ValueError(f"constraints need normals of shape (k, {n}) and offsets of shape ({periods + 1}, k)")
-            if not np.isfinite(self.normals).all() or np.isnan(self.offsets).any() or (self.offsets == -np.inf).any():
-                raise ValueError("normals must be finite, and offsets numbers or plus infinity")
-            if (np.linalg.norm(self.normals, axis=1) == 0.0).any():
-                raise ValueError("a constraint has a normal of zero length")
-            if len(self.constraint_names) not in (0, k):
-                raise ValueError("there must be a name for each constraint, or none")
-        if len(self.state_names) not in (0, n):
-            raise ValueError("there must be a name for each state, or none")
-        if self.between is not None and (
-            self.between.ndim != 4 or self.between.shape[0] != periods or self.between.shape[2:] != (n, n + m)
-        ):
-            raise ValueError(f"matrices of states within periods must have the shape ({periods}, s, {n}, {n + m})")
 
     def _check_growth(self) -> None:
         moved = np.diag(self.state_bounds)
@@ -206,11 +179,6 @@ class ReachabilityProblem:
         """Number of controls m."""
         return int(self.control.shape[2])
 
-    @property
-    def sizes(self) -> str:
-        """Numbers of states, controls and periods as text."""
-        return f"{self.states} states and {self.controls} controls in {self.periods} periods"
-
     def run(self, controls: ArrayLike) -> Floats:
         """Return the states, shape (..., T + 1, n), under `controls`, shape (..., T, m)."""
         thrust = np.asarray(controls, dtype=float)
@@ -257,8 +225,6 @@ class ReachabilityProblem:
         return self._part(start, self.periods, np.asarray(state, dtype=float))
 
     def _part(self, start: int, end: int, state: Floats) -> ReachabilityProblem:
-        if not 0 <= start < end <= self.periods:
-            raise ValueError(f"periods {start} to {end} must be a part of the {self.periods} periods, and not empty")
         return replace(
             self,
             transition=self.transition[start:end],

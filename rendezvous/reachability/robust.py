@@ -193,7 +193,7 @@ class _Program:
             )
         if optimum.status != 0:
             raise NoSolutionError(f"HiGHS: {optimum.message}")
-        ConeProgram(cost).keep(matrix, np.array(self.limits)).need_solution(optimum.x, -optimum.ineqlin.marginals)
+        ConeProgram(cost).keep(matrix, np.array(self.limits)).checked(optimum.x, -optimum.ineqlin.marginals)
         return self._plan(optimum.x)
 
     def _plan(self, solution: Floats) -> FeedbackPlan:

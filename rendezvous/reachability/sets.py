@@ -12,10 +12,12 @@ import numpy as np
 from infoset.polytope import Polytope, polytope_from_support
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
-from rendezvous.reachability.conic import APART
+from rendezvous.reachability.conic import MAX_GAP
 from rendezvous.reachability.optimum import BlockOptimum
 from rendezvous.reachability.problem import ReachabilityProblem
 
+MAX_SECONDS, MAX_MEGABYTES, MAX_DIMENSION = 5.0, 500.0, 6
+"""Limits of the exact route: the computing time of all blocks, the memory for one step, and the states of a block."""
 _FEW_CONTROLS = 24
 _AT_BOUND = 1.0 - 1e-10
 _SHARP = 1e-7
@@ -31,20 +33,7 @@ class SetKind(Enum):
 
 
 class TooLargeError(ArithmeticError):
-    """The exact route would exceed its budget."""
-
-
-@dataclass(frozen=True)
-class Budget:
-    """Limits of the exact route.
-
-    `seconds` is the computing time, s, for all blocks; a step that is expected to exceed it is not started. `megabytes`
-    is the memory, MB, for one step, and `dimension` the maximum number of states of a block.
-    """
-
-    seconds: float = 5.0
-    megabytes: float = 500.0
-    dimension: int = 6
+    """The exact route would exceed its limits."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +57,6 @@ class ReachableSets:
 
     def bounds(self, kind: SetKind) -> Floats:
         """Return the minimum and maximum value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
-        _need_kind(kind)
         result = np.zeros((self.problem.periods + 1, self.problem.states, 2))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
             result[:, block.states] = part.bounds(kind) * block.scale[:, None]
@@ -78,24 +66,14 @@ class ReachableSets:
         """Return the maximum of direction . x over the set of a `kind` at a `time`, shape (k,).
 
         `directions`, shape (k, n), are such that direction . x is taken in the units of the problem.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If an argument has a wrong type, the time is not from 0 to T, or directions have a wrong shape.
         """
-        self._need_time(kind, time)
-        rows = np.asarray(directions, dtype=float)
-        if rows.ndim != 2 or rows.shape[1] != self.problem.states:
-            raise ValueError(f"directions must have the shape (k, {self.problem.states}): got {rows.shape}")
-        total = np.zeros(len(rows))
+        total = np.zeros(len(directions))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
-            total += part.support(kind, time, rows[:, block.states] * block.scale)
+            total += part.support(kind, time, directions[:, block.states] * block.scale)
         return total
 
     def counts(self, kind: SetKind, time: int) -> SetCounts | None:
         """Return the counts of the set of a `kind` at a `time`; None if its vertices are not known."""
-        self._need_time(kind, time)
         sets = [polytope for part in self.parts if (polytope := part.polytope(kind, time)) is not None]
         if len(sets) < len(self.parts):
             return None
@@ -110,59 +88,32 @@ class ReachableSets:
 
         `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error of the projection of
         a set that is represented by programs.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If an argument has a wrong type, the time is not from 0 to T, or an axis is not the index of a state.
         """
-        self._need_time(kind, time)
-        indices = np.asarray(axes)
-        if indices.ndim != 1 or indices.dtype.kind not in "iu":
-            raise TypeError(f"axes must be a list of indices of states: got {axes!r:.80}")
-        if indices.min() < 0 or indices.max() >= self.problem.states:
-            raise ValueError(
-                f"axes must be from 0 to {self.problem.states - 1}, the index of a state: got {axes!r:.80}"
-            )
-        wanted: list[int] = indices.tolist()
         order: list[int] = []
         points = np.zeros((1, 0))
         for block, part in zip(self.problem.blocks, self.parts, strict=True):
-            mine = [int(np.flatnonzero(block.states == axis)[0]) for axis in wanted if axis in block.states]
+            mine = [int(np.flatnonzero(block.states == axis)[0]) for axis in axes if axis in block.states]
             if not mine:
                 continue
             order += [int(block.states[index]) for index in mine]
             scaled = part.projection(kind, time, np.eye(block.size)[mine], tolerance).vertices * block.scale[mine]
             points = np.hstack([np.repeat(points, len(scaled), axis=0), np.tile(scaled, (len(points), 1))])
-        return points[:, [order.index(axis) for axis in wanted]]
-
-    def _need_time(self, kind: SetKind, time: int) -> None:
-        _need_kind(kind)
-        if not isinstance(time, int | np.integer):
-            raise TypeError(f"time must be a whole number of periods: got {time!r}")
-        if not 0 <= time <= self.problem.periods:
-            raise ValueError(f"time must be from 0 to {self.problem.periods}, the number of periods: got {time}")
-
-
-def _need_kind(kind: object) -> None:
-    if not isinstance(kind, SetKind):
-        raise TypeError(f"kind must be SetKind.FORWARD or SetKind.TUBE: got {kind!r}")
+        return points[:, [order.index(axis) for axis in axes]]
 
 
 class Meter:
-    """Measures the computing time of hulls, and raises an error before a hull that is expected to exceed the budget.
+    """Measures the computing time of hulls, and raises an error before a hull that is expected to exceed a limit.
 
     Qhull's time for k points in R^d grows as k^(d/2) at worst, and the memory of the check as vertices times facets.
     Both are extrapolated from the last hull of that dimension, or from values of a slow machine for the first hull.
     """
 
-    def __init__(self, budget: Budget) -> None:
-        self.budget = budget
+    def __init__(self) -> None:
         self._began_s = perf_counter()
         self._last: dict[int, tuple[int, float, int]] = {}
 
     def hull(self, points: Floats) -> Polytope:
-        """Return the hull of points, shape (k, n); `TooLargeError` is raised where it would exceed the budget."""
+        """Return the hull of points, shape (k, n); `TooLargeError` is raised where it would exceed a limit."""
         count, size = points.shape
         if size > 2:
             self._check(count, size)
@@ -178,8 +129,8 @@ class Meter:
         expected_s = perf_counter() - self._began_s + growth * last_s
         expected_mb = 1e-6 * growth * facets * (8.0 * count + 4.0 * growth * facets)
         for expected, most, unit in (
-            (expected_s, self.budget.seconds, "s"),
-            (expected_mb, self.budget.megabytes, "MB"),
+            (expected_s, MAX_SECONDS, "s"),
+            (expected_mb, MAX_MEGABYTES, "MB"),
         ):
             if expected > most:
                 raise TooLargeError(
@@ -194,15 +145,15 @@ class ExactSets:
     Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X; G-(t) = {x in X: A x in G-(t + 1) - B U}, whose
     half-spaces need no inverse of A; the tube is the intersection of both. Where zero is not reached the tube is a face
     of G+ that rounding would lose; it is then the image of the vertices of the optimal controls. The constructor raises
-    `TooLargeError` if the block exceeds the budget of the meter, or a hull is expected to, and `UncertainHullError` if
+    `TooLargeError` if the block exceeds a limit, or a hull is expected to, and `UncertainHullError` if
     rounding decides which points are vertices of a set.
     """
 
     def __init__(self, optimum: BlockOptimum, meter: Meter) -> None:
         block = optimum.block
-        if block.size > meter.budget.dimension:
+        if block.size > MAX_DIMENSION:
             raise TooLargeError(
-                f"a block has {block.size} states, more than the limit of {meter.budget.dimension} for exact sets"
+                f"a block has {block.size} states, more than the limit of {MAX_DIMENSION} for exact sets"
             )
         self._optimum, self._meter = optimum, meter
         rows = np.vstack([np.eye(len(block.controls)), -np.eye(len(block.controls))])
@@ -327,7 +278,7 @@ class LiftedSets:
         def furthest(direction: Floats) -> Floats:
             cost = direction @ response
             if tolerance > _SHARP:
-                return np.asarray(free + response @ program.maximise(cost, max(APART, _GAP * tolerance)))
+                return np.asarray(free + response @ program.maximise(cost, max(MAX_GAP, _GAP * tolerance)))
             return np.asarray(free + response @ program.maximise_sharply(cost))
 
         return polytope_from_support(furthest, len(rows), tolerance)

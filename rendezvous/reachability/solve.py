@@ -17,7 +17,6 @@ from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_r
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 from rendezvous.reachability.sets import (
     BlockSets,
-    Budget,
     ExactSets,
     LiftedSets,
     Meter,
@@ -132,11 +131,11 @@ def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) ->
     return OptimalControls(problem, tuple(block_optimum(block, relative=relative) for block in problem.blocks))
 
 
-def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budget | None = None) -> Solution:
+def solve(problem: ReachabilityProblem, route: Route | None = None) -> Solution:
     """Compute the minimum terminal norm, all controls that attain it, and the forward sets and tube.
 
     No `route` selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
-    and the expected cost is within the `budget`; otherwise the lifted route.
+    and the expected cost is within limits; otherwise the lifted route.
 
     Raises
     ------
@@ -144,16 +143,10 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
         If no control keeps the constraints.
     TooLargeError, UncertainHullError
         If `route` is the exact route and it is not possible.
-    TypeError
-        If an argument has a wrong type.
     """
-    _need_type("problem", problem, ReachabilityProblem)
-    _need_type("route", route or Route.LIFTED, Route)
-    budget = budget or Budget()
-    _need_type("budget", budget, Budget)
     optimal = optimal_controls(problem)
     lifted: tuple[BlockSets, ...] = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
-    meter = Meter(budget)
+    meter = Meter()
     reason = "as asked" if route is Route.LIFTED else _refusal(problem, asked=route is Route.EXACT)
     if reason is None:
         try:
@@ -169,11 +162,6 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
     elif route is Route.EXACT:
         raise TooLargeError(reason)
     return Solution(problem, optimal, ReachableSets(problem, lifted), Route.LIFTED, reason)
-
-
-def _need_type(name: str, value: object, kind: type) -> None:
-    if not isinstance(value, kind):
-        raise TypeError(f"{name} must be of the type {kind.__name__}: got {value!r:.80}")
 
 
 def _exact(optima: tuple[BlockOptimum, ...], meter: Meter) -> tuple[BlockSets, ...]:

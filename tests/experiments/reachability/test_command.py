@@ -96,6 +96,7 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Command) -> None:
         (["--route", "exakt"], "--route: "),
         (["rendezvous-16-periods", "--route", "exact"], "--route exact: for thrust in a ball"),
         (["approach-cone", "--select", "vertices"], "choose for example --select samples:20"),
+        ([CASES / "s2_2_68.toml"], "a convex program was not solved to 1e-07: relative gap"),
         ([CASES / "s4_1_59.toml", "--select", "vertices"], "the optimal controls have 22875 vertices, more than the"),
         (
             [
@@ -122,12 +123,10 @@ def test_a_conflict_says_when_and_by_how_much(infoset: Command) -> None:
     assert infoset("reach", *settings, "--set", relaxed[0], "--set", relaxed[1], "--select", "energy")[0] == 0
 
 
-@pytest.mark.parametrize("name", ["s2_1_76", "s2_1_193", "s2_2_68", "near_0.1726"])
+@pytest.mark.parametrize("name", ["s2_1_76", "s2_1_193", "near_0.1726"])
 def test_problems_that_ended_in_a_traceback_or_a_refusal(infoset: Command, name: str) -> None:
     found = infoset.json("reach", CASES / f"{name}.toml")
     assert [each["name"] for each in found["controls"]] == ["energy", "l1", "norms", "peak", "chebyshev", "analytic"]
-    if name == "s2_2_68":
-        assert found["optimal_miss"] == pytest.approx(679.084, abs=5e-4)
 
 
 @pytest.mark.parametrize("route", ["auto", "exact", "lifted"])

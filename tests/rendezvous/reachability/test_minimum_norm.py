@@ -29,7 +29,7 @@ from rendezvous.reachability import (
     samples,
     solve,
 )
-from rendezvous.reachability.conic import NoSolutionError
+from rendezvous.reachability.conic import CONE_TOLERANCE, NoSolutionError
 from rendezvous.reachability.optimum import block_optimum
 from rendezvous.reachability.solve import OptimalControls
 
@@ -42,8 +42,8 @@ Paper = Callable[..., ReachabilityProblem]
 CASES = Path(__file__).parent / "cases"
 SELECTIONS = (minimum_energy, minimum_l1, minimum_norms, minimum_peak, chebyshev_centre, analytic_centre)
 RELATIVE = 1e-6
-ZERO = 1e-11
-"""Of what controls can do: misses below are zero."""
+ZERO, ABSOLUTE = 1e-11, 1e-12
+"""Of what controls can do: misses below the first are zero, and the second is the error of small ones."""
 
 
 def optimal_controls(problem: ReachabilityProblem) -> OptimalControls:
@@ -65,7 +65,7 @@ def assert_precise(problem: ReachabilityProblem, miss: float) -> bool:
     if miss == 0.0:
         assert expected <= ZERO * size_of(problem)
         return True
-    assert abs(miss - expected) <= RELATIVE * expected + rounding
+    assert abs(miss - expected) <= max(RELATIVE * expected, ABSOLUTE * size_of(problem)) + rounding
     return True
 
 
@@ -139,7 +139,7 @@ def test_axes_without_thrust(paper: Paper, axes: tuple[int, ...], thrust: Thrust
     assert optimal.miss == pytest.approx(cone_program(Dense(still), "norm")[0], rel=RELATIVE)
     for select in SELECTIONS:
         controls = select(optimal)
-        assert float(optimal.excess(controls)) < 1e-9
+        assert float(optimal.excess(controls)) < (1e-9 if thrust is ThrustShape.BOX else CONE_TOLERANCE)
     if thrust is ThrustShape.BOX:
         bounds = [solve(still, route).sets.bounds(SetKind.TUBE) for route in Route]
         assert np.abs((bounds[0] - bounds[1]) / still.state_bounds[:, None]).max() < 1e-9
