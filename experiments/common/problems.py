@@ -5,15 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous.two_body import OrbitalElements, orbit_fault, semi_major_axis_m
+from rendezvous.two_body import OrbitalElements, orbit_fault
 
 MAX_RADIANS, MIN_RADIANS = 1000.0, 1e-9
 """Angles of the orbit during a problem, within which linear motion is meaningful."""
 EARTH_M3_S2, EARTH_RADIUS_M = 3.986004418e14, 6378137.0
-_MAX_RADII = 1000.0
-"""Maximum semi-major axis in radii of the planet: that of an orbit in metres, read as kilometres, is greater."""
-_STAR_M3_S2 = 1e19
-"""Gravitational parameter between that of Jupiter, 1.27e17, and that of the Sun, 1.33e20."""
 
 
 def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
@@ -26,21 +22,14 @@ def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
         )
 
 
-def check_orbit(
-    key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float, planet_radius_m: float | None = None
-) -> None:
-    """Raise ValueError if the orbit of a state (position and velocity, SI) meets its planet, or is absurdly large.
+def check_orbit(key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float) -> None:
+    """Raise ValueError, which begins with `key`, if the orbit of a state (position and velocity, SI) meets its planet.
 
-    Without a radius, that of a planet with the density of the Earth is used. No planet or moon is denser, so that
-    theirs are greater. Orbits about a star have no upper limit. The message begins with `key`.
+    The planet has the density of the Earth. No planet or moon is denser, so that the radius of theirs is greater.
     """
     position, velocity = (np.asarray(vector, dtype=float) for vector in state)
     densest_m = EARTH_RADIUS_M * (mu_m3_s2 / EARTH_M3_S2) ** (1.0 / 3.0)
-    fault = orbit_fault(position, velocity, mu_m3_s2, densest_m if planet_radius_m is None else planet_radius_m)
-    if fault is None and mu_m3_s2 < _STAR_M3_S2:
-        radii = semi_major_axis_m(position, velocity, mu_m3_s2) / densest_m
-        if radii > _MAX_RADII:
-            fault = f"the orbit is {radii:.4g} times as large as the planet; at most {_MAX_RADII:g} times make sense"
+    fault = orbit_fault(position, velocity, mu_m3_s2, densest_m)
     if fault is not None:
         raise ValueError(f"{key}: {fault}")
 
@@ -52,4 +41,4 @@ def check_rate(rate_rad_s: float, eccentricity: float = 0.0) -> None:
     """
     axis_m = (EARTH_M3_S2 / rate_rad_s**2) ** (1.0 / 3.0)
     state = OrbitalElements(axis_m, eccentricity, 0.0, 0.0, 0.0, 0.0).state(EARTH_M3_S2)
-    check_orbit("orbit_rate_rad_s", state, EARTH_M3_S2, EARTH_RADIUS_M)
+    check_orbit("orbit_rate_rad_s", state, EARTH_M3_S2)

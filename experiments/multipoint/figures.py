@@ -1,4 +1,4 @@
-"""Figures of visits: the path with the targets, the control, the costates, the cost against each time."""
+"""Figures of visits: the path with the targets, the control, the costates."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from experiments.common.display_units import length_unit
 from experiments.common.figure_style import (
@@ -17,15 +16,13 @@ from experiments.common.figure_style import (
     LIMIT,
     LINE_LOOKS,
     MEASURED,
-    SET_EDGE,
     SET_FILL,
     TRUTH,
     figure_grid,
     place_labels,
     style,
 )
-from experiments.multipoint.file import Axes as FrameAxes
-from experiments.multipoint.report import CostCurve, Report, Scene, cost_curves
+from experiments.multipoint.report import Report, Scene
 from infoset.arrays import Floats
 
 _TRACK_POINTS = 241
@@ -45,7 +42,6 @@ def draw_all(report: Report) -> Iterator[Figure]:
     yield draw_path(report.scene)
     yield draw_control(report.scene, report.problem.max_control_m_s2)
     yield draw_costates(report.scene)
-    yield draw_times(report.scene, cost_curves(report.scene))
 
 
 @style()
@@ -54,7 +50,7 @@ def draw_path(scene: Scene) -> Figure:
     positions = scene.path.state(scene.times)[:, :3]
     name, per_m = length_unit(float(np.abs(positions).max()))
     positions = positions * per_m
-    hill = scene.axes is FrameAxes.HILL
+    hill = scene.hill
     planes = ((1, 0), (1, 2)) if hill else ((0, 1), (0, 2))
     labels = scene.axis_titles
     figure, panels = figure_grid(88.0, 1, 2, (14.0, 4.0, 20.0, 7.0), (17.0, 0.0))
@@ -100,7 +96,7 @@ def _path_handles(scene: Scene) -> list[Line2D]:
         handles.append(handle("flyby", marker="o", **_NODE))
     if any(rendezvous):
         handles.append(handle("rendezvous", marker="D", **_NODE))
-    if scene.axes is not FrameAxes.HILL:
+    if not scene.hill:
         parameter = getattr(scene.tour.targets, "gravitational_parameter_m3_s2", 0.0)
         sun = abs(parameter / _SUN_M3_S2 - 1.0) < 0.01
         handles.append(handle("Sun" if sun else "centre of gravity", **_CENTRE))
@@ -188,33 +184,3 @@ def _mark_times(scene: Scene, above: Axes, below: Axes) -> None:
             above.annotate(target, (time, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
                            textcoords="offset points", ha="center", fontsize=7.0)  # fmt: skip
     below.set_xlabel(f"time, {name}")
-
-
-@style()
-def draw_times(scene: Scene, curves: list[CostCurve]) -> Figure:
-    """Draw the cost against the time of each visit."""
-    name, per_s = scene.time_unit
-    columns = min(len(curves), 3)
-    rows = -(-len(curves) // columns)
-    figure, panels = figure_grid(20.0 + 48.0 * rows, rows, columns, (16.0, 4.0, 12.0, 7.0), (15.0, 16.0))
-    for panel in panels[len(curves) :]:
-        panel.remove()
-    cost, gradient = scene.path.cost, scene.path.time_gradient
-    for index, (panel, curve) in enumerate(zip(panels, curves, strict=False)):
-        now = float(scene.path.nodes.arrive_s[index])
-        panel.plot(curve.time_s * per_s, curve.cost, color=SET_EDGE)
-        panel.plot(now * per_s, cost, marker="o", color=INK, markersize=4.0)
-        ends = 0.12 * float(np.ptp(curve.time_s)) * np.array([-1.0, 1.0])
-        slope: dict[str, Any] = {"color": MEASURED, "linewidth": 0.9, "label": "slope $dI/dt$"}
-        panel.plot((now + ends) * per_s, cost + gradient[index] * ends, **slope)
-        if curve.cost.max() > 20.0 * max(curve.cost.min(), 1e-300):
-            panel.set_yscale("log")
-            panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _position: f"{value:g}"))
-            panel.yaxis.set_minor_formatter(NullFormatter())
-        panel.set_xlabel(f"time of {scene.names[index]}, {name}")
-        panel.set_title(f"({chr(ord('a') + index)})", loc="left")
-        if index % columns == 0:
-            panel.set_ylabel("$I$, m$^2$/s$^3$")
-    panels[0].legend(loc="best")
-    return figure

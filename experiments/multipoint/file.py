@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property
 from typing import Annotated, ClassVar
 
@@ -17,18 +16,10 @@ from experiments.common.problems import check_angle, check_orbit, check_rate
 from infoset.arrays import Floats
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
 from rendezvous.multipoint import DriftingTargets, KeplerTargets, KeplerTour, Meet, Target, TimeLimits, Tour
-from rendezvous.multipoint.segments import check_times
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 from rendezvous.two_body import OrbitalElements, coast
 
 Vector = Annotated[tuple[float, float, float], NUMBER]
-
-
-class Axes(Enum):
-    """Axes of positions and velocities."""
-
-    HILL = "hill"
-    INERTIAL = "inertial"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,16 +95,6 @@ class MultipointProblem:
             raise ValueError(
                 "orbit_rate_rad_s (Hill's axes) or gravitational_parameter_m3_s2 (inertial axes) is needed, not both"
             )
-        self._check_bodies()
-        if self.optimise_times:
-            self.limits()
-        elif self.times_s is None:
-            index = [target.time_s for target in self.target].index(None)
-            raise ValueError(f"target.{index + 1}.time_s: is missing, and optimise_times is false")
-        else:
-            check_times(0.0, self.times_s, self.times_s + self.tour.dwell_s)
-
-    def _check_bodies(self) -> None:
         bodies = {"chaser": self.chaser, **{f"target.{i}": target for i, target in enumerate(self.target, start=1)}}
         rate, mu = self.orbit_rate_rad_s, self.gravitational_parameter_m3_s2
         if rate is not None:
@@ -133,11 +114,6 @@ class MultipointProblem:
         _ = self.tour  # raises ValueError if a target is wrong
 
     @property
-    def axes(self) -> Axes:
-        """The axes of positions and velocities."""
-        return Axes.INERTIAL if self.orbit_rate_rad_s is None else Axes.HILL
-
-    @property
     def times_s(self) -> Floats | None:
         """The times of the file, by target as listed; None if one is missing."""
         times = [target.time_s for target in self.target]
@@ -147,11 +123,6 @@ class MultipointProblem:
     def latest_s(self) -> float | None:
         """The latest time of the last visit."""
         return None if self.times is None else self.times.latest_s
-
-    @property
-    def price_per_s(self) -> float:
-        """The price of a second of the last time, m^2/s^4."""
-        return 0.0 if self.times is None else self.times.price_per_s
 
     def limits(self) -> TimeLimits:
         """Return the limits of the times; ValueError if the last time has neither a limit nor a price."""

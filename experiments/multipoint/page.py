@@ -6,7 +6,6 @@ import numpy as np
 
 from experiments.common.display_units import length_unit
 from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
-from experiments.multipoint.file import Axes
 from experiments.multipoint.report import Report
 
 MOMENTS = 401
@@ -23,7 +22,7 @@ def multipoint_page(report: Report) -> str:
         until_s = nodes.leave_s[visit] if visit < len(scene.order) - 1 else scene.end_s
         tracks.append(Track(target, 1 + visit, scene.target_path(visit, time_s[time_s <= until_s])))
     marks = [Mark("" if visit else "visit", state[:3], "diamond") for visit, state in enumerate(path.arrival_states)]
-    hill, axes = scene.axes is Axes.HILL, scene.axis_titles
+    hill, axes = scene.hill, scene.axis_titles
     if not hill:
         marks.append(Mark("centre of attraction", np.zeros(3), "plus"))
     unit = length_unit(float(np.abs(positions).max()))

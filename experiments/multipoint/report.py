@@ -1,4 +1,4 @@
-"""Results of `infoset multipoint`: the path with its targets, the cost against each time, JSON and a table."""
+"""Results of `infoset multipoint`: the path with its targets, JSON, CSV and a table."""
 
 from __future__ import annotations
 
@@ -13,22 +13,18 @@ from experiments.common.display_units import Unit, time_unit
 from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
 from experiments.common.problem_command import trajectories_csv
 from experiments.common.screen import Part, number_table
-from experiments.multipoint.file import Axes, MultipointProblem
+from experiments.multipoint.file import MultipointProblem
 from infoset.arrays import Floats
 from rendezvous.multipoint import BestOrder, Path, Tour, Visits
 
 _POINTS = 1601
-_CURVE_POINTS = 41
-_NEAREST = 0.12
-_JUMP = 0.3
-_MAX_CURVES = 9
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A path with the targets; `order` contains their indices, in the order of the visits."""
+    """A path with the targets, whose indices `order` has in the order of the visits; axes are Hill's or inertial."""
 
-    axes: Axes
+    hill: bool
     tour: Visits
     order: tuple[int, ...]
     path: Path
@@ -41,12 +37,12 @@ class Scene:
     @property
     def axis_titles(self) -> tuple[str, str, str]:
         """Return the titles of the axes."""
-        return AXIS_TITLES if self.axes is Axes.HILL else INERTIAL_TITLES
+        return AXIS_TITLES if self.hill else INERTIAL_TITLES
 
     @property
     def axes_text(self) -> str:
         """Return the directions of the axes."""
-        return AXES if self.axes is Axes.HILL else "inertial, those of the problem file"
+        return AXES if self.hill else "inertial, those of the problem file"
 
     @property
     def end_s(self) -> float:
@@ -70,52 +66,6 @@ class Scene:
         """Return the positions of the target of a visit, shape (n, 3)."""
         targets = np.full(len(times_s), self.order[visit])
         return np.asarray(self.tour.targets.states(targets, times_s)[:, :3])
-
-
-@dataclass(frozen=True)
-class CostCurve:
-    """Cost against the time of one visit, the other times fixed; both arrays have shape (k,)."""
-
-    time_s: Floats
-    cost: Floats
-
-
-def cost_curves(scene: Scene) -> list[CostCurve]:
-    """Compute the cost against the time of each of the first nine visits, between its neighbours.
-
-    A curve ends where no path exists, or where the path jumps to another local minimum.
-    """
-    return [_cost_curve(scene, visit) for visit in range(min(len(scene.order), _MAX_CURVES))]
-
-
-def _cost_curve(scene: Scene, visit: int) -> CostCurve:
-    path, nodes = scene.path, scene.path.nodes
-    low = scene.tour.start_s if visit == 0 else float(nodes.leave_s[visit - 1])
-    dwell_s, now = float(nodes.leave_s[visit] - nodes.arrive_s[visit]), float(nodes.arrive_s[visit])
-    last = visit == len(scene.order) - 1
-    high = now + 0.5 * (now - low) if last else float(nodes.arrive_s[visit + 1]) - dwell_s
-    width = high - low
-    times = np.linspace(low + _NEAREST * width, high if last else high - _NEAREST * width, _CURVE_POINTS)
-    times = np.unique(np.append(times, now))
-    # From the present time outwards, so that each path starts from a near one.
-    costs = {now: path.cost}
-    for side in (times[times > now], times[times < now][::-1]):
-        fly = scene.tour.flyer(scene.order, path)
-        reached, cost, slope = now, path.cost, float(path.time_gradient[visit])
-        for time in side:
-            varied = nodes.arrive_s.copy()
-            varied[visit] = time
-            try:
-                flown = fly(varied)
-            except ValueError:
-                break
-            expected = cost + 0.5 * (time - reached) * (slope + float(flown.time_gradient[visit]))
-            if abs(flown.cost - expected) > _JUMP * max(flown.cost, cost):
-                break
-            reached, cost, slope = float(time), flown.cost, float(flown.time_gradient[visit])
-            costs[reached] = cost
-    known = np.array(sorted(costs))
-    return CostCurve(known, np.array([costs[time] for time in known]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +98,7 @@ def report_json(report: Report) -> dict[str, object]:
         "order_chosen": report.order_chosen,
         "times_chosen": report.times_chosen,
         "cost_m2_s3": path.cost,
-        **({"cost_with_price_m2_s3": report.best.objective} if report.problem.price_per_s > 0.0 else {}),
+        "cost_with_price_m2_s3": report.best.objective,
         "order": report.scene.names,
         "times_s": path.nodes.arrive_s,
         "time_gradient_m2_s4": path.time_gradient,
@@ -196,7 +146,7 @@ def report_lines(report: Report) -> Iterator[Part]:
     path, nodes = report.scene.path, report.scene.path.nodes
     yield f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"
     yield f"axes: {report.scene.axes_text}"
-    if report.problem.price_per_s > 0.0:
+    if report.best.objective > path.cost:
         yield f"cost including the price of time = {report.best.objective:.8g} m^2/s^3"
     unit, per_s = report.scene.time_unit
     table = number_table(

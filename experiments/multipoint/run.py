@@ -34,7 +34,7 @@ def solve(problem: MultipointProblem, options: Multipoint, begin: BeginProgress)
             f"{problem.name}: max_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
             f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
         )
-    scene = Scene(problem.axes, problem.tour, best.order, best.path)
+    scene = Scene(problem.orbit_rate_rad_s is not None, problem.tour, best.order, best.path)
     return Report(problem, options.order, times, scene, best, peak)
 
 
@@ -52,7 +52,8 @@ def _best(
         return BestOrder(order, timed.path, timed.objective, 1, timed.evaluations)
     assert problem.times_s is not None
     path = tour.fly(order, problem.times_s)
-    return BestOrder(order, path, path.cost + problem.price_per_s * float(problem.times_s[-1]), 1, 1)
+    price_per_s = 0.0 if problem.times is None else problem.times.price_per_s
+    return BestOrder(order, path, path.cost + price_per_s * float(problem.times_s[-1]), 1, 1)
 
 
 COMMAND = ProblemCommand(
@@ -63,6 +64,6 @@ COMMAND = ProblemCommand(
     lines=report_lines,
     to_html=multipoint_page,
     figures="experiments.multipoint.figures",
-    figure_names=("figure-path", "figure-control", "figure-costates", "figure-times"),
+    figure_names=("figure-path", "figure-control", "figure-costates"),
 )
 run = COMMAND.run

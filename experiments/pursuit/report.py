@@ -18,7 +18,6 @@ from rendezvous.pursuit_evasion import (
     Ended,
     Flight,
     Observation,
-    PlayerEnd,
     PlayerHistory,
     Solution,
     Verdict,
@@ -51,93 +50,38 @@ class Report:
 
 
 def report_json(report: Report) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`."""
-    solution, certificate = report.solution, report.certificate
+    """Return the results for `experiments.common.output.to_json`; keys are the names of the solution's fields."""
+    solution, capture, certificate = report.solution, report.solution.capture, report.certificate
     return {
+        "axes": INERTIAL_AXES,
+        "units": solution.units,
         "verdict": solution.verdict,
-        **_capture_json(solution.capture),
         "route": solution.route,
         "looked_at_s": solution.looked_at_s,
-        "propellant_exhausted_by": solution.exhausted,
-        "axes": INERTIAL_AXES,
-        "units": {"length_km": solution.units.length_m / M_PER_KM, "time_s": solution.units.time_s},
-        "certificate": None if certificate is None else _certificate_json(certificate),
-        "distance_curve": {
-            "duration_s": solution.curve.duration_s,
-            "distance_km": solution.curve.distance_m / M_PER_KM,
-            "min_curvature": solution.curve.min_curvature,
+        "exhausted": solution.exhausted,
+        "capture": capture and {key: value for key, value in vars(capture).items() if key != "extremal"},
+        "certificate": certificate
+        and {
+            "saddle_point": certificate.claims_saddle_point,
+            "failures": certificate.failures,
+            "undecided": certificate.undecided,
+            **vars(certificate),
         },
-        **({"feedback": _feedback_json(report.feedback)} if report.feedback is not None else {}),
+        "distance_curve": solution.curve,
+        "feedback": report.feedback and {**vars(report.feedback), "flights": _flights_json(report.feedback.flights)},
     }
 
 
-def _capture_json(capture: Capture | None) -> dict[str, object]:
-    if capture is None:
-        keys = ("capture_time_s", "capture_position_km", "direction", "pursuer", "evader")
-        return dict.fromkeys((*keys, "closing_speed_km_s", "curvature"))
-    return {
-        "capture_time_s": capture.time_s,
-        "capture_position_km": capture.position_m / M_PER_KM,
-        "direction": capture.direction,
-        "pursuer": _player_json(capture.pursuer),
-        "evader": _player_json(capture.evader),
-        "closing_speed_km_s": capture.closing_speed_m_s / M_PER_KM,
-        "curvature": capture.curvature,
-    }
-
-
-def _player_json(end: PlayerEnd) -> dict[str, object]:
-    return {
-        "propellant_kg": end.propellant_kg,
-        "final_position_km": end.position_m / M_PER_KM,
-        "final_velocity_km_s": end.velocity_m_s / M_PER_KM,
-        "costate0": end.costate_at_start,
-    }
-
-
-def _certificate_json(certificate: Certificate) -> dict[str, object]:
-    return {
-        "saddle_point": certificate.claims_saddle_point,
-        "failures": certificate.failures,
-        "undecided": certificate.undecided,
-        "residual": certificate.residual,
-        "hamiltonian_drift": certificate.hamiltonian_drift,
-        "second_integrator_gap_m": certificate.integrator_gap_m,
-        "closing_speed_km_s": certificate.closing_speed_m_s / M_PER_KM,
-        "min_curvature": certificate.min_curvature,
-        "no_conjugate_point": certificate.no_conjugate_point,
-        "no_earlier_capture": certificate.no_earlier_capture,
-        "min_distance_from_centre_km": certificate.min_distance_m / M_PER_KM,
-        "above_the_planet": certificate.above_the_planet,
-        "pursuer_alone_s": certificate.pursuer_alone_s,
-        "evader_deviations": [
-            {"policy": deviation.name, "capture_time_s": deviation.capture_s, "conclusive": deviation.conclusive}
-            for deviation in certificate.evader_deviations
-        ],
-        "directions_found": certificate.directions_found,
-        "directions_tried": certificate.directions_tried,
-        "max_excess_m": certificate.max_excess_m,
-    }
-
-
-def _feedback_json(feedback: Feedback) -> dict[str, object]:
-    return {
-        "policy": feedback.policy,
-        "replan_s": feedback.replan_s,
-        "delay_s": feedback.observation.delay_s,
-        "position_noise_m": feedback.observation.position_error_m,
-        "velocity_noise_m_s": feedback.observation.velocity_error_m_s,
-        "seed": feedback.seed,
-        "flights": [
-            {
-                "ended": flight.ended,
-                "time_s": flight.time_s,
-                "distance_m": flight.distance_m,
-                "last_predicted_capture_s": flight.predicted_s[-1],
-            }
-            for flight in feedback.flights
-        ],
-    }
+def _flights_json(flights: Sequence[Flight]) -> list[dict[str, object]]:
+    return [
+        {
+            "ended": flight.ended,
+            "time_s": flight.time_s,
+            "distance_m": flight.distance_m,
+            "last_predicted_s": flight.predicted_s[-1],
+        }
+        for flight in flights
+    ]
 
 
 def trajectories(report: Report) -> str:
@@ -165,34 +109,28 @@ def report_lines(report: Report) -> Iterator[Part]:
     yield f"{report.problem.name}: {_verdict(solution)}"
     yield f"axes: {INERTIAL_AXES}"
     if solution.capture is not None:
-        yield from _capture_parts(solution.capture, solution)
+        yield from _capture_lines(solution.capture, solution)
     if report.certificate is not None:
         yield from (f"  {line}" for line in _certificate_lines(report.certificate))
     if report.feedback is not None:
         yield from _feedback_lines(report.feedback)
 
 
-def _capture_parts(capture: Capture, solution: Solution) -> Iterator[Part]:
+def _capture_lines(capture: Capture, solution: Solution) -> Iterator[Part]:
     """Yield vectors as columns of their components, which a narrow screen does not break, and the scalars as lines."""
+    pursuer, evader = capture.pursuer, capture.evader
     table = number_table(
         "", "capture at\nkm", "direction\nto evader", "velocity of\npursuer, km/s", "velocity of\nevader, km/s"
     )
-    vectors = (
-        capture.position_m / M_PER_KM,
-        capture.direction,
-        capture.pursuer.velocity_m_s / M_PER_KM,
-        capture.evader.velocity_m_s / M_PER_KM,
-    )
-    for axis, components in zip("xyz", zip(*vectors, strict=True), strict=True):
-        table.add_row(axis, *(f"{value:.{digits}f}" for value, digits in zip(components, (6, 9, 9, 9), strict=True)))
+    for i, axis in enumerate("xyz"):
+        velocities = (f"{player.velocity_m_s[i] / M_PER_KM:.9f}" for player in (pursuer, evader))
+        table.add_row(axis, f"{capture.position_m[i] / M_PER_KM:.6f}", f"{capture.direction[i]:.9f}", *velocities)
     yield table
-    curvatures = " and ".join(f"{value:.5f}" if value >= 1e-3 else f"{value:.3g}" for value in capture.curvature)
-    spent = f"pursuer {capture.pursuer.propellant_kg:.8f}, evader {capture.evader.propellant_kg:.8f}"
-    yield f"propellant spent, kg: {spent}"
+    yield f"propellant spent, kg: pursuer {pursuer.propellant_kg:.8f}, evader {evader.propellant_kg:.8f}"
     yield f"closing speed {capture.closing_speed_m_s / M_PER_KM:.10f} km/s"
     yield (
-        f"curvatures of the distance over the direction: {curvatures} times "
-        f"{solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)"
+        f"curvatures of the distance over the direction: {' and '.join(f'{value:.4g}' for value in capture.curvature)} "
+        f"times {solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)"
     )
     yield f"method: {solution.route.value}"
 

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field
 from experiments.common.input_file import read_file
 from experiments.common.problems import check_angle, check_orbit
 from infoset.arrays import Floats
-from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive, check_fields
+from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive
 from rendezvous.reachability import (
     MAX_PERIODS,
     MotionModel,
@@ -147,11 +147,6 @@ class Rendezvous:
     """A rendezvous in T `periods`; `acceleration_m_s2` is that of a unit control.
 
     The constraints hold at t = 0..T, and at `checks_between_periods` instants within each period.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not within its limits, or two of them contradict each other.
     """
 
     kind: ClassVar[str] = "reachable-rendezvous"
@@ -173,7 +168,6 @@ class Rendezvous:
     navigation: Navigation | None = None
 
     def __post_init__(self) -> None:
-        check_fields(self)
         check_angle("period_s, in all periods,", self.periods * self.period_s, self.ellipse.mean_motion_rad_s)
         if self.disturbance is not None and self.checks_between_periods:
             raise ValueError("checks_between_periods: must be 0 with a disturbance")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -153,8 +153,9 @@ def report_json(report: Report) -> dict[str, object]:
         ],
         "controls": [_member_json(rendezvous, member) for member in report.members],
         "control_ranges": report.ranges,
-        "replan": None if report.flight is None else _flight_json(rendezvous, report.flight, report.noisy),
-        "robust": None if report.robustness is None else _robust_json(report.robustness),
+        "replan": report.flight and _flight_json(rendezvous, report.flight),
+        "replan_noisy": [_flight_json(rendezvous, flight) for flight in report.noisy],
+        "robust": report.robustness and _robust_json(report.robustness),
     }
 
 
@@ -166,42 +167,21 @@ def _set_json(solution: Solution, kind: SetKind, time: int, bounds: Floats) -> d
 
 def _member_json(rendezvous: Rendezvous, member: Member) -> dict[str, object]:
     return {
-        "name": member.name,
-        "u": member.controls,
+        **vars(member),
+        "nonlinear_miss": member.nonlinear_miss,
         "delta_v_m_s": delta_v(rendezvous, member.controls),
         **vars(effort(member.controls)),
-        "linear_end": member.linear[-1],
-        "nonlinear_end": member.nonlinear[-1],
-        "nonlinear_miss": member.nonlinear_miss,
-        "between_periods_excess": member.between,
     }
 
 
-def _flight_json(rendezvous: Rendezvous, flight: Flight, noisy: Sequence[Flight]) -> dict[str, object]:
-    return {
-        "miss": flight.miss,
-        "end": flight.states[-1],
-        "u": flight.controls,
-        "delta_v_m_s": delta_v(rendezvous, flight.controls),
-        "expected_misses": flight.expected_misses,
-        "relaxations": flight.relaxations,
-        "noisy_misses": [noisy_flight.miss for noisy_flight in noisy],
-        "noisy_max_relaxations": [noisy_flight.relaxations.max() for noisy_flight in noisy],
-    }
+def _flight_json(rendezvous: Rendezvous, flight: Flight) -> dict[str, object]:
+    return {**vars(flight), "miss": flight.miss, "delta_v_m_s": delta_v(rendezvous, flight.controls)}
 
 
 def _robust_json(robustness: Robustness) -> dict[str, object]:
     plan = robustness.plan
-    return {
-        "without_feedback": {"nominal_miss": robustness.fixed_miss, "conflict": robustness.conflict},
-        "with_feedback": {
-            "worst_miss": None if plan is None else plan.worst_miss,
-            "conflict": robustness.refusal,
-            "nominal_u": None if plan is None else plan.nominal,
-            "min": None if plan is None else plan.lower,
-            "max": None if plan is None else plan.upper,
-        },
-    }
+    shown = plan and {key: getattr(plan, key) for key in ("worst_miss", "nominal", "lower", "upper")}
+    return {**vars(robustness), "plan": shown}
 
 
 def report_lines(report: Report) -> Iterator[Part]:

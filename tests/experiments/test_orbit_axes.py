@@ -40,7 +40,7 @@ def test_the_papers_axes() -> None:
         ("reach", "rendezvous-2021", ["orbit.semi_major_axis_km={}"], "orbit: semi_major_axis_m"),
         ("multipoint", "service-2", ["orbit_rate_rad_s={rate}"], "orbit_rate_rad_s"),
         ("pareto", "pareto-2008", ["orbit_rate_rad_s={rate}"], "orbit_rate_rad_s"),
-        ("pursuit", "leo-pursuit", ["pursuer.orbit.semi_major_axis_km={}"], "pursuer.orbit"),
+        ("pursuit", "leo-pursuit", ["pursuer.orbit.semi_major_axis_km={}"], "pursuer"),
         (
             *("multipoint", "asteroid-tour"),
             ["gravitational_parameter_km3_s2=398600.4418", "chaser.elements.semi_major_axis_km={}"],
@@ -48,12 +48,9 @@ def test_the_papers_axes() -> None:
         ),
     ],
 )
-@pytest.mark.parametrize(
-    ("axis_km", "said"), [(418.0, "the orbit meets the planet"), (6796000.0, "times as large as the planet")]
-)
-def test_an_orbit_inside_the_earth_or_in_metres_is_refused(
-    infoset: Command, command: str, problem: str, settings: list[str], key: str, axis_km: float, said: str
+def test_an_orbit_inside_the_earth_is_refused(
+    infoset: Command, command: str, problem: str, settings: list[str], key: str
 ) -> None:
-    rate = np.sqrt(3.986004418e14 / (1e3 * axis_km) ** 3)
-    options = [part for each in settings for part in ("--set", each.format(axis_km, rate=rate))]
-    assert any(key in line and said in line for line in infoset.refused(command, problem, *options).splitlines())
+    rate = np.sqrt(3.986004418e14 / 418e3**3)
+    options = [part for each in settings for part in ("--set", each.format(418.0, rate=rate))]
+    assert f"{key}: the orbit meets the planet" in infoset.refused(command, problem, *options)

@@ -10,9 +10,8 @@ import pytest
 
 from experiments.common.figure_style import figure_bytes
 from experiments.multipoint.command import Multipoint
-from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
+from experiments.multipoint.figures import draw_control, draw_costates, draw_path
 from experiments.multipoint.file import load_multipoint
-from experiments.multipoint.report import cost_curves
 from experiments.multipoint.run import COMMAND
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
@@ -141,7 +140,7 @@ def test_five_targets_as_listed(infoset: Command) -> None:
     [
         (THREE, ["--order", "bets"], "--order: "),
         (changed("2600.0", "1200.0"), [], "times must increase: visit 2 is at 1200 s, not after 1200 s"),
-        (changed("time_s = 2600.0\n", ""), [], "target.2.time_s: is missing, and optimise_times is false"),
+        (changed("time_s = 2600.0\n", ""), [], "--times given: needs time_s of every target"),
         (OPTIMISED.replace("time_s = 2600.0\n", ""), ["--times", "given"], "--times given: needs time_s"),
         (OPTIMISED.replace("2600.0", "900.0"), ["--times", "given"], "times must increase: visit 2 is at 900 s"),
         (changed('"T2"', '"T1"'), [], "target 'T1' is listed twice"),
@@ -158,7 +157,7 @@ def test_five_targets_as_listed(infoset: Command) -> None:
         (changed('meet = "flyby"', "dwell_s = 5.0"), [], "target 'T1': a flyby cannot dwell"),
         (HEAD, [], "target: is missing"),
         (changed("eccentricity = 0.280177641", "eccentricity = 1.0", TOUR), [], "target.#1.elements: an ellipse has"),
-        (changed("132712440018.0", "1e-50", TOUR), [], "chaser: the orbit is"),
+        (changed("132712440018.0", "1e-50", TOUR), [], "no trajectory was found"),
     ],
 )
 def test_unsound_problems_are_refused(
@@ -211,21 +210,12 @@ def test_orders_that_do_not_fit_the_times_are_left_out(infoset: Command, mine: C
 
 def test_figures_say_what_they_show() -> None:
     scene = COMMAND.report(Multipoint()).scene
-    curves = cost_curves(scene)
-    times_s = scene.path.nodes.arrive_s
-    assert len(curves) == 3
-    for index, curve in enumerate(curves):
-        assert curve.cost[np.flatnonzero(curve.time_s == times_s[index])] == [scene.path.cost]
-        moved = times_s.copy()
-        moved[index] = curve.time_s[0]
-        assert curve.cost[0] == pytest.approx(scene.tour.fly((0, 1, 2), moved).cost, rel=1e-12)
     plane = draw_path(scene).axes[0]
     assert (plane.get_xlabel(), plane.get_ylabel()) == ("y (along-track), km", "x (radial), km")
     assert [each.get_ylabel() for each in draw_control(scene).axes] == ["$u$, mm/s$^2$", "$|u|$, mm/s$^2$"]
     costates = draw_costates(scene).axes[0]
     pieces = [line for line in costates.get_lines() if len(line.get_xydata()) > 2]  # type: ignore[arg-type]
     assert len(pieces) == 9  # three components, broken where they jump
-    assert draw_times(scene, curves).axes[0].get_xlabel() == "time of T1, s"
 
 
 def test_matplotlib_warns_of_nothing_in_the_path_of_a_tour(caplog: pytest.LogCaptureFixture) -> None:

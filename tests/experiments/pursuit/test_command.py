@@ -26,26 +26,26 @@ def geo() -> Solution:
 def test_the_slides_case_as_json(infoset: Command) -> None:
     found = infoset.json("pursuit", "geo-pursuit")
     assert found["verdict"] == "captured"
-    assert found["capture_time_s"] == pytest.approx(45343.620266, rel=1e-8)
-    assert found["capture_position_km"] == pytest.approx([-39420.497090, -19052.538637, 604.130676], abs=1e-6)
-    assert found["direction"] == pytest.approx([0.250766441, 0.966273907, 0.058574134], abs=1e-9)
-    assert found["pursuer"]["propellant_kg"] == pytest.approx(264.21499851, abs=1e-8)
-    assert found["evader"]["propellant_kg"] == pytest.approx(132.10749926, abs=1e-8)
-    assert found["pursuer"]["final_velocity_km_s"] == pytest.approx([1.612976850, -2.237162348, -0.068126510], abs=1e-9)
-    assert found["evader"]["final_velocity_km_s"] == pytest.approx([1.436953246, -2.493381998, -0.023752323], abs=1e-9)
-    assert found["pursuer"]["costate0"][0] == pytest.approx(24.257983895970675, rel=1e-8)
-    assert found["evader"]["costate0"][0] == pytest.approx(-36.84357583098579, rel=1e-8)
-    assert found["closing_speed_km_s"] == pytest.approx(0.2891199953, abs=1e-10)
-    assert found["curvature"] == pytest.approx([0.05030, 0.69579], abs=5e-6)
-    certificate = found["certificate"]
+    capture, certificate = found["capture"], found["certificate"]
+    assert capture["time_s"] == pytest.approx(45343.620266, rel=1e-8)
+    assert capture["position_m"] == pytest.approx([-39420497.090, -19052538.637, 604130.676], abs=1e-3)
+    assert capture["direction"] == pytest.approx([0.250766441, 0.966273907, 0.058574134], abs=1e-9)
+    assert capture["pursuer"]["propellant_kg"] == pytest.approx(264.21499851, abs=1e-8)
+    assert capture["evader"]["propellant_kg"] == pytest.approx(132.10749926, abs=1e-8)
+    assert capture["pursuer"]["velocity_m_s"] == pytest.approx([1612.976850, -2237.162348, -68.126510], abs=1e-6)
+    assert capture["evader"]["velocity_m_s"] == pytest.approx([1436.953246, -2493.381998, -23.752323], abs=1e-6)
+    assert capture["pursuer"]["costate_at_start"][0] == pytest.approx(24.257983895970675, rel=1e-8)
+    assert capture["evader"]["costate_at_start"][0] == pytest.approx(-36.84357583098579, rel=1e-8)
+    assert capture["closing_speed_m_s"] == pytest.approx(289.1199953, abs=1e-7)
+    assert capture["curvature"] == pytest.approx([0.05030, 0.69579], abs=5e-6)
     assert (certificate["saddle_point"], certificate["failures"]) == (True, [])
-    assert {each["policy"] for each in certificate["evader_deviations"]} == {each.value for each in Policy}
+    assert {each["name"] for each in certificate["evader_deviations"]} == {each.value for each in Policy}
 
 
 def test_a_capture_is_at_the_capture_radius(infoset: Command) -> None:
-    found = infoset.json("pursuit", "leo-pursuit")
-    apart = np.subtract(found["evader"]["final_position_km"], found["pursuer"]["final_position_km"])
-    np.testing.assert_allclose(apart, found["direction"], atol=1e-6)
+    capture = infoset.json("pursuit", "leo-pursuit")["capture"]
+    apart = np.subtract(capture["evader"]["position_m"], capture["pursuer"]["position_m"])
+    np.testing.assert_allclose(apart, 1000.0 * np.array(capture["direction"]), atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_verdicts_without_a_capture(settings: list[str], verdict: str, said: str
     assert len(Path("x.csv").read_text().splitlines()) == 1
     assert "there is no trajectory to show" in infoset.refused("pursuit", *options, "--html", "page.html")
     found = infoset.json("pursuit", *options)
-    assert (found["verdict"], found["capture_time_s"], found["certificate"]) == (verdict, None, None)
+    assert (found["verdict"], found["capture"], found["certificate"]) == (verdict, None, None)
 
 
 def test_a_game_that_takes_too_long_to_follow_is_bounded(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,8 +96,8 @@ def test_a_game_that_takes_too_long_to_follow_is_bounded(infoset: Command, monke
 
 def test_feedback(infoset: Command, tmp_path: Path) -> None:
     found = infoset.json("pursuit", "leo-pursuit", "--feedback", "coast")
-    assert found["feedback"]["replan_s"] == pytest.approx(found["capture_time_s"] / 50.0)
-    assert found["feedback"]["flights"][0]["time_s"] < found["capture_time_s"]
+    assert found["feedback"]["replan_s"] == pytest.approx(found["capture"]["time_s"] / 50.0)
+    assert found["feedback"]["flights"][0]["time_s"] < found["capture"]["time_s"]
     (tmp_path / "script.csv").write_text("0,coast\n20000,outward\n")
     (flight,) = infoset.json("pursuit", "--feedback", "script.csv")["feedback"]["flights"]
     assert flight["ended"] == "captured"

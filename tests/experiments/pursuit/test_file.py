@@ -51,8 +51,7 @@ ORBIT = TEXT.partition("[pursuer.orbit]")[2].partition("\n\n")[0]
             "evader.orbit: an ellipse has a semi-major axis",
         ),
         (TEXT.replace("= 42166.0", "= nan", 1), "pursuer.orbit.semi_major_axis_km: must be a finite number"),
-        (TEXT.replace("= 0.00013", "= 0.9"), "pursuer.orbit: the orbit meets the planet: its perigee is 4216.6 km"),
-        (TEXT.replace("= 42166.0", "= 42166000.0", 1), "pursuer.orbit: the orbit is 6611 times as large as the planet"),
+        (TEXT.replace("= 0.00013", "= 0.9"), "pursuer: the orbit meets the planet: its perigee is 4216.6 km"),
         (TEXT.replace("inclination_deg = 1.565\n", ""), "pursuer.orbit.inclination_rad: is missing"),
         (
             TEXT + STATE.format("[1, 0, 0]", "[0, 1, 0]"),
@@ -71,9 +70,9 @@ ORBIT = TEXT.partition("[pursuer.orbit]")[2].partition("\n\n")[0]
         ),
         (TEXT.replace("[pursuer]", "j2 = 0.001\n[pursuer]"), "gravity: J2 needs the equatorial radius"),
         (TEXT.replace("planet_radius_km = 6378.137\n", ""), "gravity.planet_radius_m: is missing"),
-        (with_state("[42000.0, 0.0, 0.0]", "[0.0, 9.0, 0.0]"), "evader.state: the orbit is a parabola or a hyperbola"),
-        (with_state("[42000.0, 0.0, 0.0]", "[1.0, 0.0, 0.0]"), "evader.state: the orbit is a fall along a line"),
-        (with_state("[0.0, 0.0, 0.0]"), "evader.state: the position is the centre of the planet"),
+        (with_state("[42000.0, 0.0, 0.0]", "[0.0, 9.0, 0.0]"), "evader: the orbit is a parabola or a hyperbola"),
+        (with_state("[42000.0, 0.0, 0.0]", "[1.0, 0.0, 0.0]"), "evader: the orbit is a fall along a line"),
+        (with_state("[0.0, 0.0, 0.0]"), "evader: the position is the centre of the planet"),
     ],
 )
 def test_what_is_no_game_is_refused(text: str, line: str) -> None:
@@ -91,7 +90,7 @@ def test_what_maps_vary() -> None:
     # The evader of the slides is 9 degrees behind the pursuer: 79 + 309 against 47 + 350.
     same = game_at(problem, {"phase_deg": -9.0}).evader
     assert same.position_m == pytest.approx(problem.game.evader.position_m, rel=1e-12)
-    with pytest.raises(ValueError, match="mass_kg must be greater than 0"):
+    with pytest.raises(ValueError, match="dry_mass_kg: must be less than mass_kg"):
         game_at(problem, {"mass_ratio": 0.0})
     with pytest.raises(ValueError, match="within the capture radius"):
         game_at(problem, {"capture_radius_km": 7000.0})
