@@ -21,8 +21,6 @@ from guidance import NoiseKind, Thruster, TieRule
 from infoset import (
     AngleSensor,
     Bias,
-    Convention,
-    ErrorShape,
     InitialSet,
     Model,
     RangeSensor,
@@ -123,8 +121,8 @@ def gravity_scenario(number: int) -> Scenario:
 def camera_scenario(number: int) -> Scenario:
     """Return the random scenario with a number, with a camera; two of three are in space, one in eight has rates.
 
-    The centroid error is a tenth of the range threshold, or less. The convention, the shape of the errors, the bias,
-    the first and the last image, and the probability of a lost image are random.
+    The centroid error is a tenth of the range threshold, or less. The bias, the first and the last image, and the
+    probability of a lost image are random.
     """
     generator = np.random.default_rng(np.random.SeedSequence(entropy=22, spawn_key=(number,)))
     scenario = random_scenario(number, rate_sensor=number % 8 == 5)
@@ -136,13 +134,10 @@ def camera_scenario(number: int) -> Scenario:
     centroid_m = 0.1 * model.range_threshold_m * float(10.0 ** -abs(generator.normal(0.0, 1.0)))
     last_s = arrival_s * float(10.0 ** generator.uniform(-2.5, -0.7)) if often(0.5) else 0.0
     first_s = last_s + (arrival_s - last_s) * float(generator.uniform(0.3, 1.1))
-    convention = list(Convention)[number // 3 % 3] if number % 3 else Convention.PLANE
     sensor = AngleSensor.camera(
         model.angle_sensor.period_s,
         model.angle_sensor.constant_error_rad * float(10.0 ** generator.uniform(-2.0, 0.0)),
         0.0 if often(0.1) else centroid_m * (1.0 - 1e-12),
-        convention=convention,
-        error_shape=ErrorShape.DISC if number % 3 and (convention is Convention.CONE or often(0.3)) else None,
         bias=Bias.CONSTANT if often(0.5) else Bias.RANDOM,
         first_image_s=first_s if often(0.5) else None,
         last_image_s=last_s,

@@ -4,7 +4,7 @@
     python -m benchmarks.soundness --engagements 200000 --hostile      # execution errors of 2 %, a manoeuvring target
     python -m benchmarks.soundness --engagements 200000 --random rate  # random scenarios, each with a rate sensor
     python -m benchmarks.soundness --engagements 100000 --random       # random scenarios without one
-    python -m benchmarks.soundness --engagements 200000 --space        # out of the plane, all conventions, Sun anywhere
+    python -m benchmarks.soundness --engagements 200000 --space        # out of the plane, Sun anywhere
     python -m benchmarks.soundness --engagements 40000 --camera        # random scenarios with a camera
     python -m benchmarks.soundness --engagements 40000 --camera scheduled  # with a cut-off or times of impulses
     python -m benchmarks.soundness --engagements 20000 --gravity       # random scenarios in strong gravity
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from benchmarks.random_scenarios import camera_scenario, gravity_scenario, random_scenario, scheduled
 from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
-from infoset import AngleSensor, Convention, ErrorShape, InformationSetView, InitialSet, Model, RateSensor
+from infoset import InformationSetView, InitialSet, Model, RateSensor
 from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
@@ -74,7 +74,7 @@ def kind_of(batch: int) -> NDArray[np.int64]:
     return np.arange(batch) // 2 % len(KINDS)
 
 
-def every_noise(draws: Draws, sensor: AngleSensor) -> MixedNoise:
+def every_noise(draws: Draws) -> MixedNoise:
     """Return the noise of a batch, with all kinds."""
     signs = np.where(draws.tie >= 0.0, 1.0, -1.0)
     # Half of the biases are at the bound, the others anywhere.
@@ -82,11 +82,6 @@ def every_noise(draws: Draws, sensor: AngleSensor) -> MixedNoise:
     constant = np.broadcast_to(bias[..., None], signs.shape)
     extremal = {name: np.where(errors >= 0.0, 1.0, -1.0) for name, errors in draws.errors.items()}
     constants = {name: errors[..., :1] + np.zeros_like(errors) for name, errors in extremal.items()}
-    if sensor.is_disc:
-        # The rim of the disc, half of the time along one of the axes, where plane angles are exceeded most.
-        along = np.abs(draws.tie[:1]) < 0.5
-        signs = np.where(along, signs * np.array([1.0, 0.0])[:, None, None], signs * (np.sqrt(0.5) * (1.0 - 1e-15)))
-        constant = constant / np.maximum(1.0, np.hypot(*constant) * (1.0 + 1e-15))
     return MixedNoise(
         (
             RandomNoise(draws.errors, draws.bias),
@@ -99,20 +94,16 @@ def every_noise(draws: Draws, sensor: AngleSensor) -> MixedNoise:
 
 
 def in_space(scenario: Scenario, number: int) -> Scenario:
-    """Return the scenario out of the plane: another y axis, convention, direction of the Sun for every number."""
+    """Return the scenario out of the plane: another y axis and direction of the Sun for every number."""
     random = np.random.default_rng(np.random.SeedSequence(entropy=21, spawn_key=(number,)))
     model, sun = scenario.set_model, scenario.sun
-    convention = list(Convention)[number % len(Convention)]
     sensor = model.angle_sensor
     if random.uniform() < 0.25:  # a bound that rises with range
         swapped = sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad
         sensor = replace(sensor, error_at_nominal_range_rad=swapped[0], error_at_zero_range_rad=swapped[1])
-    is_disc = convention is Convention.CONE or random.uniform() < 0.25
-    differ = not is_disc and random.uniform() < 0.5
+    differ = random.uniform() < 0.5
     sensor = replace(
         sensor,
-        convention=convention,
-        error_shape=ErrorShape.DISC if is_disc else None,
         error_at_nominal_range_y_rad=1.5 * (sensor.error_at_nominal_range_rad or 0.0) if differ else None,
         error_at_zero_range_y_rad=0.7 * sensor.constant_error_rad if differ else None,
     )
@@ -169,7 +160,7 @@ def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
         scenario = replace(scenario, target=target)
     if draws.pointing is not None and first // batch % 2:
         draws = replace(draws, pointing=np.where(draws.pointing >= 0.0, 1.0, -1.0))
-    flight = Engagements(scenario, draws, noise=every_noise(draws, scenario.set_model.angle_sensor))
+    flight = Engagements(scenario, draws, noise=every_noise(draws))
     while flight.flying:
         flight.advance()
     results = flight.results(np.arange(first, first + batch))

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from experiments import load_scenario
 from guidance import NoiseKind, TieRule
-from infoset import ErrorShape, InitialSet, Model
+from infoset import InitialSet, Model
 from sim import Results, Scenario, simulate
 from sim.results import join
 from sim.scenario import of_model
@@ -42,12 +42,9 @@ def rows() -> Iterator[tuple[str, Scenario]]:
     spatial = load_scenario("asteroid-1997-space")
     meter = spatial.range_sensor
     spatial = replace(spatial, range_sensor=None)
-    disc = replace(spatial.set_model, angle_sensor=replace(spatial.set_model.angle_sensor, error_shape=ErrorShape.DISC))
     yield "random", spatial
     for tie in (TieRule.UPPER, TieRule.ALTERNATE, TieRule.RANDOM):
         yield f"game, {tie.value}", replace(spatial, noise=NoiseKind.GAME, tie=tie)
-    yield "random in the disc", replace(spatial, **of_model(disc))
-    yield "game in the disc, upper", replace(spatial, **of_model(disc), noise=NoiseKind.GAME)
     # Gravity is the only acceleration, as in the prototype.
     sure = in_model(spatial, Model.GUARANTEED)
     sure = replace(sure, **of_model(replace(sure.set_model, disturbance_m_s2=0.0)))

@@ -98,9 +98,7 @@ class GameNoise:
         side = self.truth_side
         shift_m = self.shift_m[..., min(sight.step, self.shift_m.shape[-1] - 1), None]
         shifted = sensor.nearest(sight, sight.alpha_rad - side * shift_m / sight.range_m)
-        joined = np.where(side == 0.0, chosen, shifted)
-        # Components of two points of a disc can be outside the disc.
-        return sensor.measured(sight, sensor.limited(sensor.error(sight, joined))) if sensor.is_disc else joined
+        return np.where(side == 0.0, chosen, shifted)
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         upper, lower = np.abs(miss.upper_m), np.abs(miss.lower_m)
@@ -135,7 +133,7 @@ def _angle(
     reach = sensor.error_bounds(np.where(upper_is_worse, upper.range_m, lower.range_m))
     minimum, maximum, range_of_min, range_of_max = predicted.min_and_max_alpha()
     bound = sensor.bound(sight)
-    chosen = keep_point(
+    return keep_point(
         (worst > other) | ((worst == other) & upper_is_worse),
         point_at_top=worst - reach,
         point_at_bottom=worst + reach,
@@ -144,7 +142,6 @@ def _angle(
         lower=sight.alpha_rad - bound,
         upper=sight.alpha_rad + bound,
     )
-    return chosen if sensor.has_plane_angles_in_box else sensor.nearest(sight, chosen)
 
 
 def _range(

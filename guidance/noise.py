@@ -39,7 +39,7 @@ class LineOfSight:
     ----------
     alpha_rad, omega_rad_s : ndarray, shape (B,)
         True line-of-sight angle (rad) and its rate (rad/s). In space, shape (2, B): the angles atan2(y, x) and
-        atan2(z, x) in every convention of the sensor.
+        atan2(z, x).
     range_m : ndarray, shape (B,)
         True distance, m.
     sensors : mapping of str to Sensor
@@ -119,5 +119,5 @@ class MeasurementNoise(Protocol):
         -------
         mapping of str to ndarray, shape (B,)
             Measured values by sensor, rad, m or rad/s. A sensor that is left out gives no measurement in this step. In
-            space, angles in the convention of the sensor and rates have shape (2, B).
+            space, angles and rates have shape (2, B).
         """

@@ -6,15 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from guidance.noise import LineOfSight, draws_of_step, need_draws
 from infoset import AngleSensor, InformationSetView
 from infoset.arrays import Floats
 from infoset.sensor import Measurements
-
-DISC_TOLERANCE = 1e-9
-"""Maximum distance outside the unit disc that is taken as rounding."""
 
 
 @dataclass(frozen=True)
@@ -59,23 +54,13 @@ class ScriptedNoise:
         Raises
         ------
         ValueError
-            If errors are missing for this step, have another shape than the measurements, or two of an angle sensor
-            with errors in a disc are outside it.
+            If errors are missing for this step, or have another shape than the measurements.
         """
-        errors = {}
-        for name, sensor in sight.sensors.items():
-            if name not in self.errors:
-                continue
-            label = f"errors[{name!r}]"
-            now = draws_of_step(label, self.errors[name], sight.step, sight.shape(sensor))
-            is_disc = now.ndim == 2 and isinstance(sensor, AngleSensor) and sensor.is_disc
-            if is_disc and np.hypot(*now).max() > 1.0 + DISC_TOLERANCE:
-                raise ValueError(
-                    f"{label} must lie in the unit disc, because the angle sensor's error is in a disc or a cone: at "
-                    f"step {sight.step} the root of the sum of squares is {np.hypot(*now).max():.6g}"
-                )
-            errors[name] = now
-        return errors
+        return {
+            name: draws_of_step(f"errors[{name!r}]", self.errors[name], sight.step, sight.shape(sensor))
+            for name, sensor in sight.sensors.items()
+            if name in self.errors
+        }
 
 
 @dataclass(frozen=True)
@@ -86,7 +71,7 @@ class RandomNoise(ScriptedNoise):
     ----------
     errors : mapping of str to ndarray, shape (B, steps)
         Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound. In space, draws of angles and rates
-        have shape (2, B, steps); those of an angle sensor with errors in a disc are uniform in the unit disc.
+        have shape (2, B, steps).
     bias : ndarray, shape (B,), or (2, B) in space, or None
         Constant errors of the centroid part of a camera's bound, in units of that part; `errors` are then those of the
         pixel part. None draws errors of the whole bound.

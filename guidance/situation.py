@@ -115,18 +115,15 @@ class Situation:
     def axis(self, name: str) -> Situation:
         """Return the planar situation of x and one lateral axis, "y" or "z", which is z in it.
 
-        The measured angle is the plane angle in every convention of the sensor. Budget and engine are the whole ones.
+        Budget and engine are the whole ones.
         """
         if len(self.axes) == 1:
             return self
-        number, angle_sensor = self.axes.index(name), self.information.model.angle_sensor
-        measured = dict(self.measured)
-        if angle_sensor.name in measured:
-            measured[angle_sensor.name] = angle_sensor.plane_angles(measured[angle_sensor.name])
+        number = self.axes.index(name)
         return replace(
             self,
             predicted_miss=self.predicted_miss.axis(number),
-            measured={key: values if values.ndim == 1 else values[number] for key, values in measured.items()},
+            measured={key: values if values.ndim == 1 else values[number] for key, values in self.measured.items()},
             last_impulse_m_s=self.last_impulse_m_s[number],
             information=self.information.axis(name),
             sensors={

@@ -13,7 +13,7 @@ from infoset.information_set import InformationSet, InformationSetView
 from infoset.model import InitialSet, Model, Recovery, SetModel, SetSettings, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.sensor import Sensor
-from infoset.sensors import AngleSensor, Bias, Convention, ErrorShape, RangeSensor, RateSensor
+from infoset.sensors import AngleSensor, Bias, RangeSensor, RateSensor
 from infoset.set_queries import Section, to_omega_alpha
 from infoset.set_state import SetStatus
 from infoset.zonotope import Zonotope
@@ -33,9 +33,7 @@ __version__ = version("infoset")
 __all__ = [
     "AngleSensor",
     "Bias",
-    "Convention",
     "ConvexPolygons",
-    "ErrorShape",
     "Estimate",
     "ExtremePoints",
     "Inconsistency",

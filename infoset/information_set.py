@@ -211,7 +211,7 @@ class InformationSet(InformationSetView):
         Parameters
         ----------
         alpha_rad : array_like, shape () or (B,), in space (2,) or (2, B)
-            Measured angle alpha_m, rad; in space both angles in the convention of the sensor, that of y first.
+            Measured angle alpha_m, rad; in space both angles, that of y first.
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
         """

@@ -266,7 +266,7 @@ class SetModel(SetSettings):
     def axis(self, name: str) -> SetModel:
         """Return the planar model of x and one lateral axis, "y" or "z", which is z in it.
 
-        It has plane angles and no error of pointing: `section_laws` adds what couples the two axes.
+        It has no error of pointing: `section_laws` adds what couples the two axes.
         """
         return self if len(self.axes) == 1 else self._planar[name]
 

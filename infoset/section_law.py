@@ -11,14 +11,10 @@ from numpy.typing import NDArray
 
 from infoset._compile import inlined, record_of
 from infoset.model import Interval, SetModel
-from infoset.sensors import Convention
 
 BOUND_SLACK = 1e-9
 """Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
 ROUNDING = 16.0 * sys.float_info.epsilon
-PLANE, LINEAR, ELEVATION, CONE = range(4)
-"""How a measured angle bounds the slope of its axis: alone; alone, with a band that is made linear in the range because
-the exact one is not concave; as elevation of a gimbal; within a cone."""
 
 
 class SectionLaw(NamedTuple):
@@ -52,8 +48,8 @@ class SectionLaw(NamedTuple):
         Box of initial states, m and m/s; the guaranteed model enlarges it by the error of the scale.
     rectangle : bool
         Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
-    angles : int
-        How a measured angle bounds the slope z/x: `PLANE`, `LINEAR`, `ELEVATION` or `CONE`.
+    linear_band : bool
+        Whether the band of an angle is made linear in the range, because the exact one is not concave.
     other_error_at_zero_range, other_error_slope : float
         Error bound of the angle of the other axis; zero in a plane.
     pointing_along, pointing_across : float
@@ -85,7 +81,7 @@ class SectionLaw(NamedTuple):
     vx_min: float
     vx_max: float
     rectangle: bool
-    angles: int
+    linear_band: bool
     other_error_at_zero_range: float
     other_error_slope: float
     pointing_along: float
@@ -106,14 +102,8 @@ def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
     if len(laws) == 1:
         return tuple(laws)
     psi = model.pointing_error_rad if model.is_guaranteed else 0.0
-    angles, convention = [law.angles for law in laws], model.angle_sensor.convention
-    if model.is_guaranteed and convention is Convention.GIMBAL:
-        angles[1] = ELEVATION
-    elif model.is_guaranteed and convention is Convention.CONE:
-        angles = [CONE, CONE]
     return tuple(
         law._replace(
-            angles=angles[channel],
             other_error_at_zero_range=laws[1 - channel].error_at_zero_range,
             other_error_slope=laws[1 - channel].error_slope,
             pointing_along=(1.0 - math.cos(psi)) * (1.0 + law.impulse_error),
@@ -188,7 +178,7 @@ def _law(model: SetModel) -> SectionLaw:
         vx_min=float(box.vx_m_s[0]),
         vx_max=float(box.vx_m_s[1]),
         rectangle=not model.starts_as_box,
-        angles=LINEAR if centroid > 0.0 or (guaranteed and slope > 0.0) else PLANE,
+        linear_band=centroid > 0.0 or (guaranteed and slope > 0.0),
         other_error_at_zero_range=0.0,
         other_error_slope=0.0,
         pointing_along=0.0,

@@ -18,14 +18,12 @@ from infoset._compile import ZERO, allocation_free, inlined
 from infoset.arrays import Floats
 from infoset.chains import Chain
 from infoset.history import ANGLE, IMPULSE, PREDICTION, LastSight
-from infoset.section_law import CONE, ELEVATION, PLANE, SectionLaw
+from infoset.section_law import SectionLaw
 
 CUT_SLACK = 16.0 * chains.EPSILON
 SUM_SLACK = 8.0 * chains.EPSILON
 RIGHT_ANGLE = 0.5 * math.pi
 ANGLE_SLACK = 1e-12
-WIDEST_CONE, CONE_STRETCH = 0.2, 1.01
-"""Maximum error of a direction, rad, that bounds an angle, and a bound of asin(k sin(b))/(k b) up to it."""
 
 ALIVE = np.iinfo(np.int64).max
 
@@ -99,13 +97,8 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
     centroid = 0.0
     if law.centroid_error > 0.0:
         centroid = law.centroid_error / nearest_range(law.label_max - range_m, law)
-    constant, other_constant = law.error_at_zero_range + centroid, law.other_error_at_zero_range + centroid
-    if law.angles == CONE:
-        if max(abs(alpha), abs(across)) >= RIGHT_ANGLE:
-            return RIGHT_ANGLE, 0.0
-        constant, other_constant = constant * CONE_STRETCH / math.cos(across), constant * CONE_STRETCH / math.cos(alpha)
-        growth, other_growth = growth * CONE_STRETCH / math.cos(across), growth * CONE_STRETCH / math.cos(alpha)
-    minimum, other_min = abs(alpha) + constant, abs(across) + other_constant
+    minimum = abs(alpha) + law.error_at_zero_range + centroid
+    other_min = abs(across) + law.other_error_at_zero_range + centroid
     before = own = minimum + growth
     other_before = other = other_min + other_growth
     for _ in range(3):
@@ -117,8 +110,6 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
     own += (own - before) + ANGLE_SLACK
     other += (other - other_before) + ANGLE_SLACK
     if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
-        return RIGHT_ANGLE, 0.0
-    if law.angles == CONE and max(own - abs(alpha), other - abs(across)) > WIDEST_CONE:
         return RIGHT_ANGLE, 0.0
     cosine, other_cosine = math.cos(own), math.cos(other)
     passed = minimum + growth / cosine / other_cosine <= own
@@ -134,8 +125,8 @@ def slope_band(alpha: float, across: float, travelled: float, x: float, law: Sec
     `alpha` and `across` are the angles of this axis and of the other one, rad. `travelled` is the decrease of the range
     since the start, m, the same for all labels.
     """
-    if law.angles != PLANE:
-        return wide_slope_band(alpha, across, travelled, x, law)
+    if law.linear_band:
+        return linear_slope_band(alpha, across, travelled, x, law)
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = alpha - bound, alpha + bound
     if law.exact_angles:
@@ -145,54 +136,30 @@ def slope_band(alpha: float, across: float, travelled: float, x: float, law: Sec
 
 
 @allocation_free
-def wide_slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
-    """Return what `slope_band` does if the band of an axis depends on the angle of the other one, or is not concave.
+def linear_slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
+    """Return what `slope_band` does for an error bound that rises with the range, or that of a camera.
 
-    Bounds over all labels need an upper bound whose product with x is a concave function of x. Therefore the factors by
-    which the angle of the other axis widens the band are the same for all labels, and two error bounds have a wider
-    band, whose product with x is linear. If the bound h(x) rises with range, x h(x) is convex: a chord and a tangent
-    are above it. With the bound p + c/x of a camera, x tan(alpha + p + c/x) is convex: a tangent in the angle, with the
-    slope at the steepest angle of all labels, is above it.
+    Bounds over all labels need an upper bound whose product with x is a concave function of x. Therefore these two
+    error bounds have a wider band, whose product with x is linear. If the bound h(x) rises with range, x h(x) is
+    convex: a chord and a tangent are above it. With the bound p + c/x of a camera, x tan(alpha + p + c/x) is convex: a
+    tangent in the angle, with the slope at the steepest angle of all labels, is above it.
     """
-    falling, rising = law.centroid_error > 0.0, law.error_slope > 0.0
     bound = law.error_at_zero_range + law.error_slope * x
-    if falling and x > 0.0:
+    if law.centroid_error > 0.0 and x > 0.0:
         bound += law.centroid_error / x
     if not law.exact_angles:
         return alpha - bound, alpha + bound
-    near, far = max(law.label_min - travelled, 0.0), law.label_max - travelled
+    far = law.label_max - travelled
     own, other = steepest_angles(alpha, across, far, law)
     if own >= RIGHT_ANGLE:
         return -np.inf, np.inf
-    cosine, other_cosine = math.cos(own), math.cos(other)
-    # The error bound depends on the true distance, in a plane x/cos(alpha).
-    farthest = far / cosine / other_cosine
-    maximum = law.error_at_zero_range + max(law.error_slope, 0.0) * farthest
-    other_max = law.other_error_at_zero_range + max(law.other_error_slope, 0.0) * farthest
-    if falling:
-        centroid = law.centroid_error / nearest_range(travelled, law)
-        maximum += centroid
-        other_max += centroid
-    if rising:
-        bound = law.error_at_zero_range + law.error_slope * ((near + far - near * far / x) / cosine / other_cosine)
-    if law.angles == CONE:
-        # asin(sin(b)/cos(across)) is at most its secant k b.
-        bound *= math.asin(math.sin(maximum) / math.cos(across)) / maximum
-    if rising or falling:
-        bound = bound / cosine**2
-        lower, upper = math.tan(alpha) - bound, math.tan(alpha) + bound
-    else:
-        lower, upper = alpha - bound, alpha + bound
-        lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
-        upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
-    if law.angles == ELEVATION:
-        # z/x is tan(elevation)/cos(azimuth), with the factor 1/cos(azimuth) between two bounds.
-        min_factor = 1.0 / math.cos(max(abs(across) - other_max, 0.0))
-        max_factor = 1.0 / math.cos(abs(across) + other_max)
-        factor = 0.5 * (min_factor + max_factor)
-        doubt = 0.5 * (max_factor - min_factor) * math.tan(own)
-        lower, upper = factor * lower - doubt, factor * upper + doubt
-    return lower, upper
+    cosine = math.cos(own)
+    if law.error_slope > 0.0:
+        near = max(law.label_min - travelled, 0.0)
+        # The error bound depends on the true distance, at most x/(cos(own) cos(other)).
+        bound = law.error_at_zero_range + law.error_slope * ((near + far - near * far / x) / cosine / math.cos(other))
+    bound = bound / cosine**2
+    return math.tan(alpha) - bound, math.tan(alpha) + bound
 
 
 @inlined

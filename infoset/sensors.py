@@ -16,28 +16,6 @@ from infoset.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
 
 
-class Convention(Enum):
-    """Which two angles an angle sensor measures in space.
-
-    PLANE: atan2(y, x) and atan2(z, x). GIMBAL: azimuth atan2(y, x) and elevation atan2(z, hypot(x, y)). CONE: a
-    direction, given by the angles of PLANE; the bound is that of the angle between measured and true direction.
-    """
-
-    PLANE = "plane"
-    GIMBAL = "gimbal"
-    CONE = "cone"
-
-
-class ErrorShape(Enum):
-    """Shape of the set of errors of an angle sensor in space.
-
-    BOX: each angle has its own bound. DISC: the root of the sum of squares is within the bound.
-    """
-
-    BOX = "box"
-    DISC = "disc"
-
-
 class Bias(Enum):
     """How the random error of a camera is drawn.
 
@@ -57,7 +35,9 @@ NEGLIGIBLE_ERROR_RAD = 1e-60
 
 @dataclass(frozen=True)
 class AngleSensor(Sensor):
-    """A line-of-sight angle sensor. Its error bound is linear in the range, or that of a camera.
+    """A sensor of the line-of-sight angles atan2(z, x) and, in space, atan2(y, x), each with its own error.
+
+    The error bound is linear in the range, or that of a camera.
 
     Parameters
     ----------
@@ -74,9 +54,6 @@ class AngleSensor(Sensor):
         Maximum distance between the point of the body that a camera measures and its centre, m.
     error_at_nominal_range_y_rad, error_at_zero_range_y_rad : float or None
         The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For space only.
-    error_shape : ErrorShape or None
-        Shape of the set of errors in space; None is DISC for the convention CONE and BOX for the others. The
-        information set takes a disc as the box around it.
     first_image_s, last_image_s : float
         Times before the nominal arrival of the first and the last image, s. Images begin at the start for None, and
         continue until the true arrival for 0.
@@ -105,8 +82,6 @@ class AngleSensor(Sensor):
     centroid_error_m: NotNegative = 0.0
     error_at_nominal_range_y_rad: Part | None = None
     error_at_zero_range_y_rad: Part | None = None
-    convention: Convention = Convention.PLANE
-    error_shape: ErrorShape | None = None
     bias: Bias = Bias.RANDOM
     first_image_s: Positive | None = None
     last_image_s: NotNegative = 0.0
@@ -133,16 +108,6 @@ class AngleSensor(Sensor):
                 "AngleSensor: first_image_s must be at least last_image_s, because both are times before the arrival: "
                 f"got {self.first_image_s!r} and {self.last_image_s!r}"
             )
-        if self.convention is Convention.CONE and self.error_shape is ErrorShape.BOX:
-            raise ValueError(
-                "AngleSensor: error_shape must be disc for the convention cone, whose bound is that of one angle: "
-                "got box"
-            )
-        if self.is_disc and self.axis("y") != self.axis("z"):
-            raise ValueError(
-                "AngleSensor: an error in a disc or a cone has one bound: leave error_at_nominal_range_y_rad and "
-                "error_at_zero_range_y_rad out"
-            )
 
     @classmethod
     def camera(
@@ -162,16 +127,6 @@ class AngleSensor(Sensor):
         return (self.pixel_error_rad if self.is_camera else self.error_at_zero_range_rad) or 0.0
 
     @property
-    def is_disc(self) -> bool:
-        """Whether the two errors of a measurement in space are in a disc."""
-        return self.convention is Convention.CONE or self.error_shape is ErrorShape.DISC
-
-    @property
-    def has_plane_angles_in_box(self) -> bool:
-        """Whether each plane angle is measured with a separate bound, as in a plane."""
-        return self.convention is Convention.PLANE and not self.is_disc
-
-    @property
     def is_spatial(self) -> bool:
         """Whether a value is set that only an engagement in space uses."""
         return self != self.axis("z")
@@ -183,13 +138,7 @@ class AngleSensor(Sensor):
     @cached_property
     def _planar(self) -> dict[str, AngleSensor]:
         """The sensors of both plane angles, which strategies need at every step."""
-        plain = replace(
-            self,
-            error_at_nominal_range_y_rad=None,
-            error_at_zero_range_y_rad=None,
-            convention=Convention.PLANE,
-            error_shape=None,
-        )
+        plain = replace(self, error_at_nominal_range_y_rad=None, error_at_zero_range_y_rad=None)
         if self.is_camera:
             return {"y": plain, "z": plain}
         at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
@@ -236,23 +185,9 @@ class AngleSensor(Sensor):
         at_nominal, at_zero = self._bounds_of_y
         return np.stack([at_zero + (at_nominal - at_zero) / (self.nominal_range_m or 1.0) * y, self.error_bound(z)])
 
-    def plane_angles(self, measured: Floats) -> Floats:
-        """Return the angles atan2(y, x) and atan2(z, x) of measured angles, rad, shape (..., B)."""
-        if self.convention is not Convention.GIMBAL:
-            return measured
-        azimuth, elevation = measured
-        return np.stack([azimuth, np.arctan2(np.tan(elevation), np.cos(azimuth))])
-
-    def of_plane_angles(self, alpha_rad: Floats) -> Floats:
-        """Return the angles of the sensor for angles atan2(y, x) and atan2(z, x), rad: inverse of `plane_angles`."""
-        if self.convention is not Convention.GIMBAL:
-            return alpha_rad
-        y, z = alpha_rad
-        return np.stack([y, np.arctan(np.tan(z) * np.cos(y))])
-
     def true_value(self, sight: Geometry) -> Floats:
-        """Return the line-of-sight angles in the convention of the sensor, rad."""
-        return self.of_plane_angles(sight.alpha_rad)
+        """Return the line-of-sight angles, rad."""
+        return sight.alpha_rad
 
     def bound(self, sight: Geometry) -> Floats:
         """Return the error bound at the true range, rad."""
@@ -271,59 +206,14 @@ class AngleSensor(Sensor):
         Parameters
         ----------
         error, bias : ndarray, shape (..., B)
-            Errors in units of the bounds of the two parts, within [-1, 1] or the unit disc.
+            Errors in units of the bounds of the two parts, within [-1, 1].
         """
         share = self.constant_error_rad / self.error_bound(sight.range_m)
         return share * error + (1.0 - share) * bias
 
-    def measured(self, sight: Geometry, error: Floats | float) -> Floats:
-        """Return the measured angles for an error in units of the bound, rad.
-
-        In the convention CONE, the true direction is turned by the angle |error| bound toward the projection of (0,
-        error_y, error_z) on the plane across it.
-        """
-        if self.convention is not Convention.CONE:
-            return self.true_value(sight) + self.error_bounds(sight.range_m) * error
-        (a, b, c), (right, up) = _direction(sight.alpha_rad), np.broadcast_to(error, sight.alpha_rad.shape)
-        along = right * b + up * c
-        x, y, z = -along * a, right - along * b, up - along * c
-        turn, length = self.bound(sight) * np.hypot(right, up), np.hypot(x, np.hypot(y, z))
-        cosine, share = np.cos(turn), np.divide(np.sin(turn), length, out=np.zeros_like(turn), where=length > 0.0)
-        x, y, z = cosine * a + share * x, cosine * b + share * y, cosine * c + share * z
-        return np.stack([np.arctan2(y, x), np.arctan2(z, x)])
-
     def error(self, sight: Geometry, measured: Floats) -> Floats:
         """Return the error of measured angles in units of the bound."""
-        if self.convention is not Convention.CONE:
-            return (measured - self.true_value(sight)) / np.maximum(self.bound(sight), NEGLIGIBLE_ERROR_RAD)
-        (a, b, c), (x, y, z) = _direction(sight.alpha_rad), _direction(measured)
-        # The vector product of the true and the measured direction; their sum of products is the cosine.
-        p, q, r = b * z - c * y, c * x - a * z, a * y - b * x
-        turn = np.arctan2(np.hypot(p, np.hypot(q, r)), a * x + (b * y + c * z)) / self.bound(sight)
-        # The component of the measured direction across the true one is the projection of (0, right, up).
-        slope = (q * c - r * b) / a
-        right, up = (r * a - p * c) - slope * b, (p * b - q * a) - slope * c
-        size = np.hypot(right, up)
-        share = np.divide(turn, size, out=np.zeros_like(turn), where=size > 0.0)
-        return np.stack([right * share, up * share])
-
-    def limited(self, error: Floats) -> Floats:
-        """Return the possible error (in units of the bound) that is nearest to an error."""
-        return np.asarray(error / np.maximum(1.0, np.hypot(*error))) if self.is_disc else super().limited(error)
-
-    def nearest(self, sight: Geometry, wanted: Floats) -> Floats:
-        """Return the possible measurement that is nearest to wanted angles; in a disc, with their direction of error.
-
-        Parameters
-        ----------
-        wanted : ndarray, shape (..., B)
-            Angles atan2(y, x) and atan2(z, x), rad; the measurement is in the convention of the sensor.
-        """
-        wanted = self.of_plane_angles(wanted)
-        if not self.is_disc:
-            return super().nearest(sight, wanted)
-        error = self.error(sight, wanted)
-        return np.where(np.hypot(*error) <= 1.0, wanted, self.measured(sight, self.limited(error)))
+        return (measured - sight.alpha_rad) / np.maximum(self.bound(sight), NEGLIGIBLE_ERROR_RAD)
 
     def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         """Cut by the angle."""
@@ -336,24 +226,13 @@ class AngleSensor(Sensor):
     def share(self, apart: Apart) -> Floats:
         """Return half of the maximum difference of the angles, in units of the bound, shape (n,).
 
-        An angle changes by at most as much as z/x. The elevation of a gimbal also depends on the azimuth, by the
-        product of the two slopes, which is at most half of `slope` squared. The bound may fall with the distance, which
-        is greater than the range. An axis that is measured without error is left out.
+        An angle changes by at most as much as z/x. The bound may fall with the distance, which is greater than the
+        range. An axis that is measured without error is left out.
         """
         angles = np.abs(apart.offset_m) / apart.range_m
-        if self.convention is Convention.GIMBAL:
-            y, z = angles
-            angles = np.stack([y, z + 0.5 * apart.slope**2 * y])
         bounds = np.minimum(self.error_bounds(apart.range_m), self.error_bounds(apart.farthest_m))
         shares = np.where(bounds == 0.0, 0.0, 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD))
-        return np.asarray(np.hypot.reduce(shares) if self.is_disc else shares.max(axis=0))
-
-
-def _direction(alpha_rad: Floats) -> Floats:
-    """Return the unit vectors (x, y, z) of angles atan2(y, x) and atan2(z, x), shape (3, B)."""
-    (sin_y, sin_z), (cos_y, cos_z) = np.sin(alpha_rad), np.cos(alpha_rad)
-    x, y, z = cos_y * np.abs(cos_z), sin_y * np.abs(cos_z), sin_z * np.abs(cos_y)
-    return np.asarray(np.array([x, y, z]) / np.hypot(x, np.hypot(y, z)))
+        return np.asarray(shares.max(axis=0))
 
 
 @dataclass(frozen=True)

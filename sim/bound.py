@@ -161,5 +161,5 @@ def pair_at(scenario: Scenario, label_m: float, vx_m_s: float, *, last_common_st
     """
     approach = Approach(scenario, label_m, vx_m_s)
     if last_common_step is not None:
-        return max((approach.pair(last_common_step, axes) for axes in approach.choices), key=UNLIMITED)
+        return approach.pair(last_common_step)
     return max(approach.best_pair(), approach.single(), key=UNLIMITED)

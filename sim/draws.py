@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance import NoiseKind, TieRule
-from infoset import AngleSensor, Bias, StateBox
+from infoset import Bias, StateBox
 from infoset.arrays import Floats
 from sim.gravity import max_impulses_m_s, with_gravity
 from sim.scenario import Scenario
@@ -83,9 +83,6 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     }
     camera = scenario.set_model.angle_sensor
     bias = lateral(BIAS, 1)[..., 0] if camera.bias is Bias.CONSTANT else None
-    if camera.is_disc:
-        errors[AngleSensor.name] = in_disc(errors[AngleSensor.name])
-        bias = None if bias is None else in_disc(bias)
     return Draws(
         position_m,
         velocity_m_s,
@@ -101,25 +98,6 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
             else None
         ),
     )
-
-
-def in_disc(errors: Floats) -> Floats:
-    """Return the points of the unit disc for points of the square [-1, 1]^2, shape (2, ...).
-
-    Notes
-    -----
-    Uniform points of the square become uniform points of the disc. The map commutes with the exchange of the two
-    coordinates and with a change of their signs.
-
-    References
-    ----------
-    Shirley and Chiu (1997), A low distortion map between disk and square.
-    """
-    swapped = np.abs(errors[0]) < np.abs(errors[1])
-    greater, lesser = np.where(swapped, errors[::-1], errors)
-    angle = 0.25 * np.pi * np.divide(lesser, greater, out=np.zeros_like(lesser), where=greater != 0.0)
-    mapped = np.stack([greater * np.cos(angle), greater * np.sin(angle)])
-    return np.where(swapped, mapped[::-1], mapped)
 
 
 def corners(box: StateBox) -> tuple[Floats, Floats]:

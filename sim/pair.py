@@ -8,9 +8,9 @@ import numpy as np
 
 from guidance import Strategy
 from guidance.noise import LineOfSight
-from infoset import AngleSensor, Convention, InformationSetView
+from infoset import InformationSetView
 from infoset.arrays import Floats
-from infoset.sensor import Measurements, Sensor
+from infoset.sensor import Measurements
 from sim.draws import Draws
 from sim.engagement import Engagements
 from sim.kepler import KeplerMotion, Passage
@@ -57,8 +57,7 @@ class PairNoise:
     Parameters
     ----------
     last_common_step : int
-        Last step in which both truths of a pair are measured at the middle between them: the mean of the measured
-        values, or of the directions if the sensor measures a direction (`Convention.CONE`).
+        Last step in which both truths of a pair are measured at the middle between them.
 
     Attributes
     ----------
@@ -74,24 +73,10 @@ class PairNoise:
         """Measure the middle of each pair, or after the last common step the true values."""
         if sight.step > self.last_common_step:
             return {name: sensor.true_value(sight) for name, sensor in sight.sensors.items()}
-        measured = {name: _common(sensor, sight) for name, sensor in sight.sensors.items()}
+        measured = {name: middle(sensor.true_value(sight)) for name, sensor in sight.sensors.items()}
         for name, sensor in sight.sensors.items():
-            error = sensor.error(sight, measured[name])
-            is_disc = isinstance(sensor, AngleSensor) and sensor.is_disc
-            share = np.hypot(*error) if is_disc else np.abs(error)
-            self.max_share = max(self.max_share, float(share.max()))
+            self.max_share = max(self.max_share, float(np.abs(sensor.error(sight, measured[name])).max()))
         return measured
-
-
-def _common(sensor: Sensor, sight: LineOfSight) -> Floats:
-    """Return the common measurement of each pair, for both of them."""
-    true = sensor.true_value(sight)
-    if not (isinstance(sensor, AngleSensor) and sensor.convention is Convention.CONE):
-        return middle(true)
-    slopes = np.tan(true)
-    directions = np.stack([*slopes, np.ones_like(slopes[0])])
-    *lateral, along = middle(directions / np.linalg.norm(directions, axis=0))
-    return np.asarray(np.arctan2(lateral, along))
 
 
 def middle(values: Floats) -> Floats:

@@ -26,7 +26,7 @@ class AxisStep:
     Parameters
     ----------
     measured : mapping of str to float
-        Values measured in this step by sensor: "angle" (rad, in the convention of the sensor), "rate" (rad/s) and
+        Values measured in this step by sensor: "angle" (rad), "rate" (rad/s) and
         "range" (m), which is the same for both axes.
     true_angle_rad, true_rate_rad_s : float
         True line of sight in the plane of x and the axis.

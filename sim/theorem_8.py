@@ -9,7 +9,7 @@ from guidance.least_effort import unavoidable_m
 from guidance.situation import Situation
 from infoset import AngleSensor, SetModel
 from infoset.arrays import Flags, Floats
-from infoset.section_law import BOUND_SLACK, PLANE, section_laws
+from infoset.section_law import BOUND_SLACK, section_laws
 
 ONE_LABEL = 1e-7
 """Maximum width of the interval of labels, in labels: the misses of all its labels are the same."""
@@ -27,7 +27,7 @@ def has_theorem_8(model: SetModel, delay_steps: int) -> bool:
     minimum, maximum = model.label_limits_m
     fastest = max(-vx for vx in model.bounds.vx_m_s)
     is_one = maximum - minimum <= ONE_LABEL * maximum and fastest == model.closing_speed_m_s
-    return is_one and section_laws(model)[0].angles == PLANE
+    return is_one and not section_laws(model)[0].linear_band
 
 
 class Theorem8:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from operator import attrgetter
 
 import numpy as np
@@ -98,8 +97,7 @@ class TruthPair:
 class Approach:
     """Data of one label and velocity that all its motions use.
 
-    `choices` are the axes along which the motions of a pair differ: all at once if the errors of the angle are in a
-    box, one of them in a disc. `motion` is in the middle of the box of starts, without impulses.
+    `motion` is in the middle of the box of starts, without impulses.
     """
 
     def __init__(self, scenario: Scenario, label_m: float, vx_m_s: float) -> None:
@@ -127,21 +125,17 @@ class Approach:
             program = PairProgram(planar, sensors, self._due, self.motion, i)
             # Two axes that are alike have one linear program.
             self._programs.append(next(filter(program.is_like, self._programs), program))
-        every = tuple(range(self.lateral))
-        self.choices = [(i,) for i in every] if model.angle_sensor.is_disc else [every]
 
     def best_pair(self, try_first_before_s: float | None = None) -> TruthPair:
         """Return the best pair over the last common step, by a search that starts at a time before arrival, s."""
         candidates = self.candidates
         if self.scenario.thruster.impulses_s and len(candidates) <= FEW_CANDIDATES:
-            every = [self.pair(step, axes) for axes in self.choices for step in candidates.tolist()]
-            return max(every, key=UNLIMITED)
+            return max(map(self.pair, candidates.tolist()), key=UNLIMITED)
         start = len(candidates) - 1
         if try_first_before_s is not None:
             wanted = (self.motion.arrival_s - try_first_before_s) / self.scenario.set_model.step_s
             start = int(np.abs(candidates - wanted).argmin())
-        pairs = [_climb(partial(self.pair, axes=axes), candidates, start) for axes in self.choices]
-        return max(pairs, key=UNLIMITED)
+        return _climb(self.pair, candidates, start)
 
     @property
     def candidates(self) -> Integers:
@@ -165,13 +159,13 @@ class Approach:
         arms_s = latest_s - given_s
         return float(sizes @ arms_s), reserve.stretch_per_s2 * float(sizes @ arms_s**3)
 
-    def pair(self, last_common_step: int, axes: Sequence[int]) -> TruthPair:
+    def pair(self, last_common_step: int) -> TruthPair:
         """Return the pair with the maximum distance at the end of those with the same measurements up to a step."""
         offset, velocity = np.zeros((2, self.lateral))
         acceleration = np.zeros((self.lateral, self.steps))
-        farthest = {each: each.farthest(last_common_step) for each in {self._programs[i] for i in axes}}
-        for i in axes:
-            offset[i], velocity[i], acceleration[i] = farthest[self._programs[i]]
+        farthest = {each: each.farthest(last_common_step) for each in set(self._programs)}
+        for i, program in enumerate(self._programs):
+            offset[i], velocity[i], acceleration[i] = farthest[program]
         difference = self.motion.difference(offset, velocity, acceleration)
         half_m = 0.5 * float(np.hypot.reduce(difference[: self.lateral, -1]))
         start, sides = 0.5 * np.stack([offset, velocity]), np.array([1.0, -1.0])

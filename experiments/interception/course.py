@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from guidance.thruster import modulus
-from infoset import Convention
 from infoset.arrays import Floats, Integers
 from sim import Outcome, Record, Scenario
 from sim.adversary import WORST_FOUND
@@ -229,13 +228,6 @@ def record_titles(records: Sequence[Record]) -> list[str]:
     if len(records) == 1:
         return titles
     return [f"({chr(ord('a') + index)}) {title}" for index, title in enumerate(titles)]
-
-
-def angle_name(scenario: Scenario, axis: str) -> str:
-    """Return the name of the angle of an axis: a gimbal measures azimuth and elevation."""
-    if scenario.set_model.angle_sensor.convention is Convention.GIMBAL:
-        return {"y": "azimuth α", "z": "elevation α"}[axis]
-    return "line-of-sight angle α"
 
 
 def outcome_title(record: Record) -> str:

@@ -13,7 +13,6 @@ from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
 from experiments.interception.course import (
     Clock,
-    angle_name,
     duration_text,
     kept_steps,
     marks,
@@ -23,7 +22,7 @@ from experiments.interception.course import (
     record_titles,
     true_predicted_misses,
 )
-from infoset import Convention, InformationSet, Section
+from infoset import InformationSet, Section
 from infoset.arrays import Floats, Integers
 from infoset.sensors import SENSORS
 from sim import Record, Scenario
@@ -112,7 +111,6 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
             {
                 "along": f" along {axis}" if scenario.is_spatial else "",
                 "measured_name": _measured_name(scenario, axis),
-                "angle_name": angle_name(scenario, axis),
                 **_axis_data(record, axis, kept),
                 "fired_m_s": [record.steps[index].axes[axis].impulse_m_s for index in fired],
                 "outlines": {
@@ -128,9 +126,6 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
 
 
 def _measured_name(scenario: Scenario, axis: str) -> str:
-    """Return the name of the measured angle of an axis: a gimbal measures azimuth and elevation."""
-    if scenario.set_model.angle_sensor.convention is Convention.GIMBAL:
-        return {"y": "measured azimuth", "z": "measured elevation"}[axis]
     return f"measured angle along {axis}" if scenario.is_spatial else "measured angle"
 
 

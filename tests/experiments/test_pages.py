@@ -28,7 +28,7 @@ from experiments.pursuit import run as pursuit
 from experiments.pursuit.command import Pursuit
 from experiments.pursuit.page import pursuit_page
 from guidance import NoiseKind
-from infoset import Convention, InitialSet, Model, RateSensor, Recovery
+from infoset import InitialSet, Model, RateSensor, Recovery
 from sim import Outcome, Record, fly_one
 from sim.scenario import of_model
 
@@ -84,8 +84,7 @@ def flown(name: str) -> Record:
         return fly_one(replace(scenario, **of_model(sound), rate_sensor=RateSensor(1.0, 2e-6)))
     if name == "space":
         space = load_scenario("asteroid-1997-space")
-        sensor = replace(space.set_model.angle_sensor, convention=Convention.CONE)
-        sound = replace(space.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX, angle_sensor=sensor)
+        sound = replace(space.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
         return fly_one(replace(space, **of_model(sound), rate_sensor=RateSensor(1.0, 2e-6)))
     if name == "game":
         return fly_one(replace(scenario, noise=NoiseKind.GAME))

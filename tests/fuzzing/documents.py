@@ -11,7 +11,7 @@ from experiments.common.problems import EARTH_M3_S2, EARTH_RADIUS_M
 from experiments.pareto.file import TERMINAL
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset.model import InitialSet, Model, Recovery
-from infoset.sensors import Bias, Convention, ErrorShape
+from infoset.sensors import Bias
 from sim import Manoeuvre
 
 Draw = Callable[[st.SearchStrategy[float]], float]
@@ -64,13 +64,8 @@ def _text(value: object) -> str:
 @st.composite
 def _angles_in_space(draw: st.DrawFn, error: float) -> Values:
     """Keys of an angle sensor in space."""
-    convention = draw(st.sampled_from(Convention))
-    shape = draw(st.none() | st.sampled_from(ErrorShape)) if convention is not Convention.CONE else None
-    is_disc = convention is Convention.CONE or shape is ErrorShape.DISC
-    along_y = None if is_disc else draw(st.none() | st.just(0.5 * error))
+    along_y = draw(st.none() | st.just(0.5 * error))
     return {
-        "convention": convention.value,
-        "error_shape": shape and shape.value,
         "error_at_nominal_range_y_rad": along_y,
         "error_at_zero_range_y_rad": along_y,
     }

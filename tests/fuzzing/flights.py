@@ -11,7 +11,6 @@ from guidance import Strategy, Thruster, TieRule
 from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
 from infoset.arrays import Floats
 from infoset.model import Interval
-from infoset.sensors import Convention
 from sim import Body, Results, Scenario, Target
 from sim.draws import Draws, corners, max_number_of_steps
 from sim.engagement import Engagements, Step
@@ -48,12 +47,12 @@ def engagement(
     *,
     error: float = 0.1,
     speed_error: float = 1e-3,
-    convention: Convention | None = None,
+    in_space: bool = False,
     camera: bool = False,
 ) -> Scenario:
     """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step.
 
-    With a convention of its two angles it is in space. The centroid error of a camera is the maximum one.
+    The centroid error of a camera is the maximum one.
     """
     slope = math.tan(angle_rad)
     z, v = range_m * slope, 0.2 * speed_m_s * slope
@@ -68,9 +67,9 @@ def engagement(
         sensor = AngleSensor.camera(step_s, error * angle_rad, 0.001999 * range_m)
     thruster, disturbance = Thruster(10.0 * v, 1e-3 * v, 0.2 * v), 0.01 * slope * speed_m_s**2 / range_m
     along_y = None
-    if convention is not None:
+    if in_space:
         bounds = replace(bounds, y_m=(-0.6 * z, 0.9 * z), vy_m_s=(-0.8 * v, v))
-        sensor, thruster = replace(sensor, convention=convention), replace(thruster, pointing_error_rad=0.01)
+        thruster = replace(thruster, pointing_error_rad=0.01)
         along_y = 0.5 * disturbance
     guaranteed = model is Model.GUARANTEED
     return Scenario(
@@ -112,8 +111,6 @@ def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
 
     states = minimum + (maximum - minimum) * generator.uniform(size=(batch, len(minimum)))
     errors, tie = {"angle": uniform(), "range": uniform((batch, steps))}, uniform()
-    if scenario.set_model.angle_sensor.is_disc:
-        errors["angle"] /= np.maximum(1.0, np.hypot(*errors["angle"]))
     if scenario.rate_sensor is not None:
         errors["rate"] = uniform()
     return Draws(

@@ -44,7 +44,6 @@ from guidance import (
     ZeroEffortMiss,
 )
 from infoset import Model, RangeSensor, RateSensor
-from infoset.sensors import Convention
 from sim import Manoeuvre, Outcome, Scenario, Sun, Target, simulate
 from sim.draws import Draws
 from sim.scenario import of_model
@@ -66,8 +65,6 @@ NEAR = Sun(1e14, 2e6, 0.9)
 """Into which a spacecraft falls within its flight of 1000 s from 1000 km."""
 EXAMPLES = settings(max_examples=8, deadline=None)
 TOLERANCE = 1e-9
-CONVENTIONS = st.none() | st.sampled_from(Convention)
-"""None is an engagement in a plane."""
 
 
 def assert_works(scenario: Scenario, draws: Draws, steps: int | None = None) -> Flight:
@@ -110,9 +107,9 @@ GRID = list(itertools.product(ANGLES_RAD, RANGES_M, SPEEDS_M_S, SECTIONS, STEPS_
 Combination = tuple[float, float, float, int, float]
 
 
-def assert_works_or_is_refused(combination: Combination, model: Model, convention: Convention | None = None) -> bool:
+def assert_works_or_is_refused(combination: Combination, model: Model, in_space: bool = False) -> bool:
     angle_rad, range_m, speed_m_s, sections, step_s = combination
-    make = partial(engagement, angle_rad, range_m, speed_m_s, sections, step_s, model, convention=convention)
+    make = partial(engagement, angle_rad, range_m, speed_m_s, sections, step_s, model, in_space=in_space)
     if 1.1 * range_m / (speed_m_s * (1.0 - 1e-3)) / step_s > 1e5:
         with pytest.raises(ValueError, match="at most 100000 steps"):
             make()
@@ -123,12 +120,10 @@ def assert_works_or_is_refused(combination: Combination, model: Model, conventio
 
 
 @EXAMPLES
-@given(st.sampled_from(GRID), st.sampled_from(Model), CONVENTIONS)
-def test_combinations_work_or_are_refused(
-    combination: Combination, model: Model, convention: Convention | None
-) -> None:
+@given(st.sampled_from(GRID), st.sampled_from(Model), st.booleans())
+def test_combinations_work_or_are_refused(combination: Combination, model: Model, in_space: bool) -> None:
     assume(model is Model.GUARANTEED or combination[0] <= SMALL_ANGLE_RAD)
-    assert_works_or_is_refused(combination, model, convention)
+    assert_works_or_is_refused(combination, model, in_space)
 
 
 @pytest.mark.parametrize("model", list(Model))
@@ -152,9 +147,9 @@ WHOLE_FLIGHTS = [
 
 
 def assert_whole_flight_works(
-    combination: Combination, model: Model, convention: Convention | None = None, *, camera: bool = False
+    combination: Combination, model: Model, in_space: bool = False, *, camera: bool = False
 ) -> None:
-    scenario = engagement(*combination, model, convention=convention, camera=camera)
+    scenario = engagement(*combination, model, in_space=in_space, camera=camera)
     there = assert_works(scenario, numbers(scenario, 1, batch=2))
     assert there.ended
 
@@ -162,13 +157,11 @@ def assert_whole_flight_works(
 @EXAMPLES
 @given(
     st.sampled_from([flight for flight in WHOLE_FLIGHTS if flight[-1] <= 30.0 and flight[3] < 500]),
-    CONVENTIONS,
+    st.booleans(),
     st.booleans(),
 )
-def test_whole_flights_work_however_few_their_steps(
-    combination: Combination, convention: Convention | None, camera: bool
-) -> None:
-    assert_whole_flight_works(combination, Model.GUARANTEED, convention, camera=camera)
+def test_whole_flights_work_however_few_their_steps(combination: Combination, in_space: bool, camera: bool) -> None:
+    assert_whole_flight_works(combination, Model.GUARANTEED, in_space, camera=camera)
 
 
 @pytest.mark.parametrize("range_m", RANGES_M[:-1])
@@ -214,7 +207,7 @@ def engagements(draw_value: st.DrawFn) -> Scenario:
         model,
         error=10.0 ** draw_value(st.floats(-3.0, -0.5)),
         speed_error=draw_value(st.sampled_from([0.0, 1e-6, 1e-2, 0.3])),
-        convention=draw_value(CONVENTIONS),
+        in_space=draw_value(st.booleans()),
     )
     rate = RateSensor(step, 0.1 * angle * speed / range_m)
     nu = scenario.set_model.disturbance_m_s2
@@ -312,12 +305,10 @@ def test_symmetric_miss_in_other_units(model: Model, length: float, time: float,
 @pytest.mark.parametrize("exact", ["z_m", "x_m", "vz_m_s", "vx_m_s", "all"])
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize("sections", [1, 5])
-@pytest.mark.parametrize("convention", [None, *Convention])
-def test_what_is_known_exactly_is_no_trouble(
-    exact: str, model: Model, sections: int, convention: Convention | None
-) -> None:
+@pytest.mark.parametrize("in_space", [False, True])
+def test_what_is_known_exactly_is_no_trouble(exact: str, model: Model, sections: int, in_space: bool) -> None:
     """Sections that are segments and points, labels that are one: the truth is in them up to rounding."""
-    scenario = engagement(1e-3, 1e6, 1e3, sections, 50.0, model, convention=convention)
+    scenario = engagement(1e-3, 1e6, 1e3, sections, 50.0, model, in_space=in_space)
     box = scenario.set_model.bounds
     names = [name for name, ends in vars(box).items() if ends and exact in ("all", name.replace("y", "z"))]
     box = replace(box, **{name: (vars(box)[name][1],) * 2 for name in names})

@@ -1,4 +1,4 @@
-"""Noises in space: on each axis the rules of the plane, in every convention within the bounds of the sensor."""
+"""Noises in space: on each axis the rules of the plane."""
 
 from __future__ import annotations
 
@@ -17,8 +17,6 @@ from guidance.noise import checked_measurements
 from guidance.scripted_noise import errors_made, measure_with_errors
 from infoset import (
     AngleSensor,
-    Convention,
-    ErrorShape,
     ExtremePoints,
     InformationSet,
     InformationSetView,
@@ -39,13 +37,6 @@ BOX = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57
 MODEL = SetModel(
     closing_speed_m_s=58e3, step_s=0.5, bounds=BOX, angle_sensor=SENSOR, disturbance_m_s2=0.005, model=Model.PAPER
 )
-KINDS = [
-    (Convention.PLANE, ErrorShape.BOX),
-    (Convention.PLANE, ErrorShape.DISC),
-    (Convention.GIMBAL, ErrorShape.BOX),
-    (Convention.GIMBAL, ErrorShape.DISC),
-    (Convention.CONE, None),
-]
 
 
 def sight(sensors: dict[str, Sensor], seed: int = 0, step: int = 0, batch: int = BATCH) -> LineOfSight:
@@ -113,15 +104,11 @@ def test_tie_rules_by_axis() -> None:
     assert (upper != lower).all()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_shift_along_one_axis_keeps_the_errors_possible(kind: tuple[Convention, ErrorShape | None]) -> None:
-    """A component of a shifted image with one of a chosen image was 1.22 bounds from the true angles in a disc."""
-    angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
-    seen, view = sight({"angle": angle}), moved(replace(MODEL, angle_sensor=angle))
+def test_a_shift_along_one_axis_keeps_the_errors_possible() -> None:
+    seen, view = sight({"angle": SENSOR}), moved()
     for rules in ((TieRule.UPPER, TieRule.ALTERNATE), (TieRule.RANDOM, TieRule.LOWER)):
         measured = GameNoise(rules, draws(), np.array([1e9])).measure(seen, view)["angle"]
-        error = angle.error(seen, measured)
-        assert (np.hypot(*error) if angle.is_disc else np.abs(error)).max() <= 1.0 + 1e-9
+        assert np.abs(SENSOR.error(seen, measured)).max() <= 1.0 + 1e-9
 
 
 def test_bounds_by_axis_are_used_by_the_game() -> None:
@@ -134,14 +121,10 @@ def test_bounds_by_axis_are_used_by_the_game() -> None:
         assert np.array_equal(measured[number], planar)
 
 
-@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("make", [GameNoise, SwitchingNoise])
-def test_the_game_is_possible_in_every_convention(kind: Any, make: type[GameNoise]) -> None:
-    angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
-    box = replace(SENSOR)
+def test_the_game_is_possible(make: type[GameNoise]) -> None:
     for seed in range(10):
-        seen = sight(all_sensors(angle), seed)
-        view = moved(seed=seed)
+        seen, view = sight(all_sensors(SENSOR), seed), moved(seed=seed)
         noise = make(TieRule.RANDOM, draws(seed))
         measured = checked_measurements(noise.measure(seen, view), seen, noise)
         assert {name: values.shape for name, values in measured.items()} == {
@@ -149,14 +132,9 @@ def test_the_game_is_possible_in_every_convention(kind: Any, make: type[GameNois
             "angle": (2, BATCH),
             "rate": (2, BATCH),
         }
-        error = angle.error(seen, measured["angle"])
-        size = np.hypot(*error) if angle.is_disc else np.abs(error).max(axis=0)
-        assert size.max() <= 1.0 + 1e-9
+        size = np.abs(SENSOR.error(seen, measured["angle"])).max()
         # On the border, as in the plane: the extremes are far outside of the bounds of one measurement.
-        assert size.max() > 0.99
-        in_box = noise.measure(replace(seen, sensors=all_sensors(box)), view)["angle"]
-        wanted = angle.error(seen, angle.of_plane_angles(in_box))
-        np.testing.assert_allclose(error, angle.limited(wanted), atol=1e-9)
+        assert 0.99 < size <= 1.0 + 1e-9
         again = measure_with_errors(seen, errors_made(seen, measured))
         for name, values in again.items():
             np.testing.assert_allclose(values, measured[name], rtol=1e-9, atol=1e-15)
@@ -165,14 +143,11 @@ def test_the_game_is_possible_in_every_convention(kind: Any, make: type[GameNois
 def test_the_game_of_exchanged_axes_is_exchanged() -> None:
     seen, noise, tie = sight(all_sensors(SENSOR)), draws(), (TieRule.UPPER, TieRule.RANDOM)
     other = replace(seen, alpha_rad=seen.alpha_rad[::-1], omega_rad_s=seen.omega_rad_s[::-1])
-    for kind in (KINDS[0], KINDS[1], KINDS[4]):
-        angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
-        one, two = (replace(each, sensors=all_sensors(angle)) for each in (seen, other))
-        measured = GameNoise(tie, noise).measure(one, moved())
-        exchanged = GameNoise(tie[::-1], noise[::-1].copy()).measure(two, moved(exchanged=True))
-        assert np.array_equal(exchanged["angle"], measured["angle"][::-1])
-        assert np.array_equal(exchanged["rate"], measured["rate"][::-1])
-        assert np.array_equal(exchanged["range"], measured["range"])
+    measured = GameNoise(tie, noise).measure(seen, moved())
+    exchanged = GameNoise(tie[::-1], noise[::-1].copy()).measure(other, moved(exchanged=True))
+    assert np.array_equal(exchanged["angle"], measured["angle"][::-1])
+    assert np.array_equal(exchanged["rate"], measured["rate"][::-1])
+    assert np.array_equal(exchanged["range"], measured["range"])
 
 
 class Misses:
@@ -232,17 +207,11 @@ def test_with_one_idle_axis_the_range_is_that_of_the_plane(seed: int, tie: TieRu
     assert ranged(make(tie, draw), Misses(both[0], both[1], ranges), distance) == planar
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_scripted_errors_are_those_of_the_measurements(kind: Any) -> None:
-    angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
-    scripts = {
-        "angle": angle.limited(draws().reshape(2, -1)).reshape(2, BATCH, 2),
-        "rate": draws(6),
-        "range": draws(7)[0],
-    }
+def test_scripted_errors_are_those_of_the_measurements() -> None:
+    scripts = {"angle": draws(), "rate": draws(6), "range": draws(7)[0]}
     view = SimpleNamespace()
     for step in range(2):
-        seen = sight(all_sensors(angle), step=step)
+        seen = sight(all_sensors(SENSOR), step=step)
         for make in (ScriptedNoise, RandomNoise):
             noise = make(scripts)
             measured = checked_measurements(noise.measure(seen, view), seen, noise)  # type: ignore[arg-type]
@@ -259,14 +228,6 @@ def test_extremal_errors_are_the_corners() -> None:
         measured = ScriptedNoise({"angle": errors}).measure(seen, SimpleNamespace())  # type: ignore[arg-type]
         assert np.array_equal(measured["angle"], seen.alpha_rad + SENSOR.bound(seen) * np.array(corner)[:, None])
         assert np.array_equal(measured["rate"], seen.omega_rad_s)
-
-
-@pytest.mark.parametrize("kind", [KINDS[1], KINDS[3], KINDS[4]])
-def test_errors_outside_of_the_disc_are_refused(kind: Any) -> None:
-    angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
-    noise = ScriptedNoise({"angle": np.full((2, BATCH, 1), 0.8)})
-    with pytest.raises(ValueError, match=r"errors\['angle'\] must lie in the unit disc, .* at step 0 .* is 1\.13137"):
-        noise.measure(sight({"angle": angle}), SimpleNamespace())  # type: ignore[arg-type]
 
 
 def test_draws_of_a_wrong_shape_are_refused() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infoset import AngleSensor, Convention, ErrorShape, InitialSet, Model, SetModel, StateBox
+from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 from infoset.section_law import section_laws
 from infoset.section_life import slope_band
@@ -52,11 +52,10 @@ def bands(model: SetModel, measured: Floats, elapsed_m: float) -> Callable[[floa
 
 @settings(deadline=None)
 @given(
-    st.sampled_from(Convention), bounds, bounds, st.none() | st.tuples(st.just(0.0) | bounds, st.just(0.0) | bounds),
+    bounds, bounds, st.none() | st.tuples(st.just(0.0) | bounds, st.just(0.0) | bounds),
     st.tuples(signed, signed), st.tuples(signed, signed), st.booleans(), signed, shares, shares,
 )  # fmt: skip
 def test_bands_contain_the_truth_and_are_convex(
-    convention: Convention,
     at_nominal: float,
     at_zero: float,
     of_y: tuple[float, float] | None,
@@ -67,8 +66,8 @@ def test_bands_contain_the_truth_and_are_convex(
     label_share: float,
     flown: float,
 ) -> None:
-    sensor = AngleSensor(0.5, at_nominal, max(at_zero, 0.3 * at_nominal), 5.8e6, convention=convention)
-    if of_y is not None and convention is not Convention.CONE:
+    sensor = AngleSensor(0.5, at_nominal, max(at_zero, 0.3 * at_nominal), 5.8e6)
+    if of_y is not None:
         at_zero_y = max(of_y[1], 0.3 * of_y[0])
         sensor = replace(sensor, error_at_nominal_range_y_rad=of_y[0], error_at_zero_range_y_rad=at_zero_y)
     # The falling bound must be positive up to the maximum distance.
@@ -79,18 +78,16 @@ def test_bands_contain_the_truth_and_are_convex(
     label, elapsed_m = minimum + label_share * (maximum - minimum), 0.999 * flown * minimum
     x = label - elapsed_m
     true = sight(x * (1.0 + speed * model.speed_error), angles)
-    contain_and_are_convex(model, true, errors_of(sensor, error, extremal), label, elapsed_m)
+    contain_and_are_convex(model, true, errors_of(error, extremal), label, elapsed_m)
 
 
 @settings(deadline=None, max_examples=300)
 @given(
-    st.sampled_from(Convention), st.booleans(), st.floats(-9.0, -1.0), st.floats(-2.0, 5.0), st.floats(0.0, 2.0),
+    st.floats(-9.0, -1.0), st.floats(-2.0, 5.0), st.floats(0.0, 2.0),
     st.tuples(signed, signed), st.tuples(signed, signed), st.booleans(), signed, st.floats(0.0, 0.5), shares,
     st.floats(-3.0, 0.0), shares,
 )  # fmt: skip
 def test_bands_of_a_camera_contain_the_truth_and_are_convex(
-    convention: Convention,
-    disc: bool,
     pixel: float,
     centroid: float,
     threshold: float,
@@ -104,8 +101,7 @@ def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     near: float,
 ) -> None:
     """At all ranges from ten centroid errors up, with the bounds of both axes reached, and a closing speed of 50 %."""
-    shape = ErrorShape.DISC if disc else None
-    sensor = AngleSensor.camera(0.5, 10.0**pixel, 10.0**centroid, convention=convention, error_shape=shape)
+    sensor = AngleSensor.camera(0.5, 10.0**pixel, 10.0**centroid)
     threshold_m = 10.0 ** (centroid + 1.0 + threshold) * (1.0 + 1e-12)
     known = replace(KNOWN, vx_m_s=(-58e3 * (1.0 + speed_error), -58e3 * (1.0 - speed_error)))
     if threshold_m >= 5e6:
@@ -118,15 +114,13 @@ def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     # From the threshold to the start, many of them near the threshold.
     x = threshold_m + (label - threshold_m) * (10.0**far if near < 0.5 else 1e-9 * near)
     true = sight(x * (1.0 + speed * model.speed_error), angles)
-    contain_and_are_convex(model, true, errors_of(sensor, error, extremal), label, label - x)
+    contain_and_are_convex(model, true, errors_of(error, extremal), label, label - x)
 
 
-def errors_of(sensor: AngleSensor, error: tuple[float, float], extremal: bool) -> Floats:
-    """Return errors in units of the bound; extremal ones are corners of the box or points of the disc's rim."""
+def errors_of(error: tuple[float, float], extremal: bool) -> Floats:
+    """Return errors in units of the bound; extremal ones are corners of the box."""
     errors = np.array(error)[:, None]
-    if extremal:
-        errors = np.where(errors < 0.0, -1.0, 1.0) * (np.sqrt(0.5) if sensor.is_disc else 1.0)
-    return sensor.limited(errors)
+    return np.where(errors < 0.0, -1.0, 1.0) if extremal else errors
 
 
 def contain_and_are_convex(model: SetModel, true: Sight, errors: Floats, label: float, elapsed_m: float) -> None:
@@ -145,19 +139,3 @@ def contain_and_are_convex(model: SetModel, true: Sight, errors: Floats, label: 
         rounding = 64.0 * EPS * maximum * (1.0 + steepest)
         assert bend[..., 0].min() >= -rounding
         assert bend[..., 1].max() <= rounding
-
-
-@settings(deadline=None)
-@given(signed, signed, signed)
-def test_a_direction_measured_beyond_a_right_angle_bounds_nothing_that_is_not_true(
-    turn: float, steep: float, other: float
-) -> None:
-    """Both measured angles may pass a right angle, where the cosines of the cone's bounds are negative."""
-    sensor = AngleSensor(0.5, 0.1, 0.1, 5.8e6, convention=Convention.CONE)
-    model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
-    angles = 1.5 + 0.07 * steep, 1.5 + 0.07 * other
-    error = np.array([[np.cos(np.pi * turn)], [np.sin(np.pi * turn)]])
-    label = 5.8e6
-    measured = sensor.measured(sight(label, angles), error)
-    for (lower, upper), slope in zip(bands(model, measured, 0.0)(label), np.tan(angles), strict=True):
-        assert lower - 1e-9 * slope <= slope <= upper + 1e-9 * slope

@@ -9,7 +9,7 @@ import pytest
 
 from guidance import GameNoise, NoiseKind, Situation, TieRule
 from guidance.scripted_noise import ScriptedNoise
-from infoset import Convention, ErrorShape, InitialSet, Model, RateSensor, StateBox
+from infoset import InitialSet, Model, RateSensor, StateBox
 from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.closed_form import worst_shift_m
@@ -114,9 +114,8 @@ def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.Fix
     assert found.truth_kept
 
 
-@pytest.mark.parametrize(("convention", "shape"), [("plane", "box"), ("gimbal", "disc"), ("cone", "disc")])
-def test_with_all_sensors_in_space(convention: str, shape: str, ranging: Scenario) -> None:
-    spatial = in_space(ranging, convention=Convention(convention), error_shape=ErrorShape(shape))
+def test_with_all_sensors_in_space(ranging: Scenario) -> None:
+    spatial = in_space(ranging)
     model = replace(guaranteed(spatial).set_model, sections=9, fewest_sections=3)
     scenario = replace(spatial, rate_sensor=RateSensor(1.5, 1e-4), **of_model(model))
     found = find_worst(scenario, budget=24, seed=2)
@@ -127,8 +126,6 @@ def test_with_all_sensors_in_space(convention: str, shape: str, ranging: Scenari
     assert {name: errors.ndim for name, errors in found.errors.items()} == {"angle": 2, "range": 1, "rate": 2}
     assert all(errors.any() for errors in found.errors.values())
     assert (found.errors["angle"][0] != found.errors["angle"][1]).any()
-    sizes = np.hypot(*found.errors["angle"])
-    assert sizes.max() <= (1.0 + 1e-12 if shape == "disc" else np.sqrt(2.0))
 
 
 @pytest.mark.thorough

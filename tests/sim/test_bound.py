@@ -12,8 +12,6 @@ from experiments import load_scenario
 from guidance import Thruster
 from infoset import (
     AngleSensor,
-    Convention,
-    ErrorShape,
     Model,
     RangeSensor,
     RateSensor,
@@ -219,12 +217,11 @@ COARSE_Y = {"error_at_nominal_range_y_rad": 1e-3, "error_at_zero_range_y_rad": 1
         replace(oblique(-600.0, 300.0), range_sensor=RangeSensor(1.0, 1e-6)),
         replace(oblique(200.0, -300.0, 0.0), rate_sensor=RateSensor(2.0, 1e-4)),
         oblique(-200.0, 100.0, 2.0, **FALLING),
-        in_space(oblique(-200.0, 100.0), convention=Convention.GIMBAL, **FINE, **COARSE_Y),
     ],
-    ids=["range", "rate", "distance", "elevation"],
+    ids=["range", "rate", "distance"],
 )
 def test_far_from_the_axis_measurements_can_be_the_same(scenario: Scenario) -> None:
-    """Terms that are quadratic in the slope: of the distance, of cos^2(alpha) in the rate, and of the elevation."""
+    """Terms that are quadratic in the slope: of the distance and of cos^2(alpha) in the rate."""
     pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
     flight = fly_pair(scenario, pair)
     assert flight.max_error_share <= 1.0
@@ -353,7 +350,7 @@ def test_one_label_and_one_speed(asteroid: Scenario) -> None:
 
 
 @pytest.mark.parametrize(
-    ("last_common_step", "half_m", "correction_m", "disc_m", "box_m"),
+    ("last_common_step", "half_m", "correction_m", "planar_m", "box_m"),
     [
         (192, 92.59, 106.34, 0.0, 24.6),
         (193, 80.75, 79.93, 0.8, 34.3),
@@ -366,21 +363,20 @@ def test_one_label_and_one_speed(asteroid: Scenario) -> None:
     ],
 )
 def test_bounds_in_space_by_the_last_common_step(
-    last_common_step: int, half_m: float, correction_m: float, disc_m: float, box_m: float, asteroid: Scenario
+    last_common_step: int, half_m: float, correction_m: float, planar_m: float, box_m: float, asteroid: Scenario
 ) -> None:
-    """A_s and M_s by an independent linear program, and the bounds for errors in a disc and in a box; no gravity."""
+    """A_s and M_s by an independent linear program, and the bounds in a plane and in space; no gravity."""
     asteroid = replace(asteroid, sun=None)
-    box, disc = in_space(asteroid), in_space(asteroid, error_shape=ErrorShape.DISC)
-    planar, joint, single = (
-        pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step)
-        for scenario in (asteroid, box, disc)
+    box = in_space(asteroid)
+    planar, joint = (
+        pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step) for scenario in (asteroid, box)
     )
     independent_m = max_half_distance_m(asteroid, NOMINAL_LABEL_M, last_common_step)
     assert independent_m == pytest.approx(half_m, abs=0.006)
     minimum = min_share(planar, asteroid)
     assert 0.9999 * minimum * independent_m < 0.5 * planar.apart_m < independent_m * (1.0 + 1e-7)
-    assert planar.correction_m == joint.correction_m == single.correction_m == pytest.approx(correction_m, abs=0.005)
-    assert single.bound_m == planar.bound_m == pytest.approx(disc_m, abs=0.06)
+    assert planar.correction_m == joint.correction_m == pytest.approx(correction_m, abs=0.005)
+    assert planar.bound_m == pytest.approx(planar_m, abs=0.06)
     # Both axes together have a slightly greater velocity across x, and a slightly lesser error bound.
     shares = min_share(joint, box) / minimum
     assert joint.apart_m == pytest.approx(np.sqrt(2.0) * shares * planar.apart_m, rel=1e-9)
@@ -388,20 +384,19 @@ def test_bounds_in_space_by_the_last_common_step(
 
 
 @pytest.mark.parametrize(
-    ("shape", "disturbance_m_s2", "bound_m", "last_common_step"),
-    [(ErrorShape.BOX, 0.005, 42.78, 195), (ErrorShape.DISC, 0.005, 22.63, 196), (ErrorShape.BOX, 4e-10, 41.89, 195)],
+    ("disturbance_m_s2", "bound_m", "last_common_step"), [(0.005, 42.78, 195), (4e-10, 41.89, 195)]
 )
 def test_best_bounds_in_space(
-    shape: ErrorShape, disturbance_m_s2: float, bound_m: float, last_common_step: int, asteroid: Scenario
+    disturbance_m_s2: float, bound_m: float, last_common_step: int, asteroid: Scenario
 ) -> None:
-    """Distances at x = 0 by an independent linear program, with M_s = 38.34 m and 23.17 m.
+    """Distances at x = 0 by an independent linear program, with M_s = 38.34 m.
 
     A_s is less by the minimum error bound, and the cosine is that for the budget of 1000 m/s.
     """
-    scenario = with_disturbance(in_space(asteroid, error_shape=shape), disturbance_m_s2)
+    scenario = with_disturbance(in_space(asteroid), disturbance_m_s2)
     pair = pair_at(scenario, NOMINAL_LABEL_M, -58e3)
     assert pair.last_common_step == last_common_step
-    correction_m = {195: 38.34, 196: 23.17}[last_common_step]
+    correction_m = 38.34
     farther_m = (bound_m + correction_m) * min_share(pair, scenario) - correction_m
     assert pair.bound_m == pytest.approx(farther_m / np.hypot(1.0, 1.0 / 58.0), abs=0.005)
 
@@ -409,26 +404,23 @@ def test_best_bounds_in_space(
 def test_two_measurements_in_space_by_hand() -> None:
     """As in the plane, with V_z within 2 m/s and V_y within 1 m/s, both measurements the same and no impulse left.
 
-    |dv_y| <= 2 m/s: dy(2) = dy(1) + dv_y is at most 2 + 2 = 4 m, with dy(0) = 0; dz(2) is at most 6 m. With errors in a
-    box one of the two is half of |(4, 6)| m from the target at x = 0; in a disc 3 m, along z only. The velocity across
-    x is at most |(1, 2)| m/s, or 2 m/s in a disc, and 1.5 m/s by impulses.
+    |dv_y| <= 2 m/s: dy(2) = dy(1) + dv_y is at most 2 + 2 = 4 m, with dy(0) = 0; dz(2) is at most 6 m. One of the two
+    is half of |(4, 6)| m from the target at x = 0. The velocity across x is at most |(1, 2)| m/s, and 1.5 m/s by
+    impulses.
     """
-    for name, bound_m in (("box", 0.5 * np.hypot(4.0, 6.0)), ("disc", 3.0)):
-        scenario = in_space(toy(vz_m_s=2.0), error_shape=ErrorShape(name))
-        bounds = replace(scenario.set_model.bounds, vy_m_s=(-1.0, 1.0))
-        scenario = replace(scenario, **of_model(replace(scenario.set_model, bounds=bounds)), dispersion=bounds)
-        pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
-        across_m_s = 1.5 + (np.hypot(1.0, 2.0) if name == "box" else 2.0)
-        assert pair.bound_m == pytest.approx(bound_m * cosine(across_m_s), rel=3e-6)
-        assert pair.times_s.tolist() == [0.0, 1.0, 2.0]
-        assert pair.difference_m[:, -1] == pytest.approx([4.0 if name == "box" else 0.0, 6.0], rel=3e-6)
+    scenario = in_space(toy(vz_m_s=2.0))
+    bounds = replace(scenario.set_model.bounds, vy_m_s=(-1.0, 1.0))
+    scenario = replace(scenario, **of_model(replace(scenario.set_model, bounds=bounds)), dispersion=bounds)
+    pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
+    bound_m = 0.5 * np.hypot(4.0, 6.0) * cosine(1.5 + np.hypot(1.0, 2.0))
+    assert pair.bound_m == pytest.approx(bound_m, rel=3e-6)
+    assert pair.times_s.tolist() == [0.0, 1.0, 2.0]
+    assert pair.difference_m[:, -1] == pytest.approx([4.0, 6.0], rel=3e-6)
 
 
-@pytest.mark.parametrize("shape", ErrorShape)
-def test_the_pair_in_space_is_admissible(shape: ErrorShape, asteroid: Scenario) -> None:
+def test_the_pair_in_space_is_admissible(asteroid: Scenario) -> None:
     """The y axis has smaller errors and another box."""
-    smaller = {} if shape is ErrorShape.DISC else {"error_at_nominal_range_y_rad": 1e-4}
-    scenario = in_space(asteroid, error_shape=shape, **smaller)
+    scenario = in_space(asteroid, error_at_nominal_range_y_rad=1e-4)
     bounds = replace(scenario.set_model.bounds, y_m=(500.0, 900.0))
     model = replace(scenario.set_model, bounds=bounds, disturbance_y_m_s2=0.002)
     scenario = replace(scenario, **of_model(model))
@@ -446,12 +438,12 @@ def test_the_pair_in_space_is_admissible(shape: ErrorShape, asteroid: Scenario) 
         assert (np.abs(pair.acceleration_m_s2[i]) <= planar.disturbance_m_s2 * (1.0 + 1e-12)).all()
         apart = np.abs(positions_m[i, 0] - positions_m[i, 1])[common]
         shares.append(apart / (2.0 * planar.angle_sensor.error_bound(ranges[common]) * ranges[common]))
-    size = np.hypot(*shares) if shape is ErrorShape.DISC else np.maximum(*shares)
+    size = np.maximum(*shares)
     assert size.max() == pytest.approx(min_share(pair, scenario), rel=2e-6)
     assert size.max() <= 1.0
     ends = positions_m[:, 0, -1] - positions_m[:, 1, -1]
     assert np.hypot(*ends) == pytest.approx(pair.apart_m)
-    assert np.count_nonzero(ends) == (1 if shape is ErrorShape.DISC else 2)
+    assert np.count_nonzero(ends) == 2
     assert pair.difference_m == pytest.approx(positions_m[:, 0] - positions_m[:, 1], abs=1e-6)
 
 

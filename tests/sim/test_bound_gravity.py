@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from guidance import Thruster
-from infoset import AngleSensor, Convention, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
 from sim import Scenario, Sun
 from sim.bound import lower_bound, pair_at
 from sim.coasting import coasting
@@ -139,12 +139,10 @@ class TrueFlight:
 
 
 def measured(scenario: Scenario, states: Floats) -> dict[str, Floats]:
-    """Return true angles, rates and distances of relative states (n, 6); those of a gimbal as it defines them."""
+    """Return true angles, rates and distances of relative states (n, 6)."""
     x, distance = states[:, 2], np.linalg.norm(states[:, :3], axis=1)
     angles = np.arctan2(states[:, :2], x[:, None])
     rates = (states[:, 3:5] * x[:, None] - states[:, 5:] * states[:, :2]) / (states[:, :2] ** 2 + x[:, None] ** 2)
-    if scenario.set_model.angle_sensor.convention is Convention.GIMBAL:
-        angles[:, 1] = np.arctan2(states[:, 1], np.hypot(x, states[:, 0]))
     chosen = [("y", "z").index(name) for name in scenario.set_model.axes]
     return {"angle": angles[:, chosen], "rate": rates[:, chosen], "range": distance[:, None]}
 
@@ -249,8 +247,8 @@ def strong(strength: float) -> Scenario:
 
 
 def skew() -> Scenario:
-    """In space, with the Sun in no plane of the axes, a gimbal, manoeuvres, rates and ranges; 2 G T^2 = 4 %."""
-    scenario = in_space(strong(6.0), convention=Convention.GIMBAL)
+    """In space, with the Sun in no plane of the axes, manoeuvres, rates and ranges; 2 G T^2 = 4 %."""
+    scenario = in_space(strong(6.0))
     model = replace(scenario.set_model, disturbance_m_s2=1e-8)
     return replace(
         scenario,

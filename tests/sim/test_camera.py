@@ -16,8 +16,6 @@ from guidance import NoiseKind, Situation, Thruster, TieRule
 from infoset import (
     AngleSensor,
     Bias,
-    Convention,
-    ErrorShape,
     InformationSet,
     InitialSet,
     Model,
@@ -298,16 +296,13 @@ def sound(results: Results) -> bool:
         {},
         {"bias": Bias.CONSTANT},
         {"miss_probability": 0.5, "first_image_s": 2400.0, "last_image_s": 90.0},
-        {"convention": Convention.GIMBAL},
-        {"convention": Convention.CONE, "bias": Bias.CONSTANT, "miss_probability": 0.2},
-        {"error_shape": ErrorShape.DISC},
+        {"bias": Bias.CONSTANT, "miss_probability": 0.2},
     ],
 )
 def test_engagements_with_a_camera_keep_the_truth_and_the_bound(noise: NoiseKind, fields: dict[str, Any]) -> None:
     plane = replace(camera_scenario(), noise=noise, tie=TieRule.RANDOM)
-    if not {"convention", "error_shape"} & set(fields):
-        model = replace(plane.set_model, angle_sensor=replace(plane.set_model.angle_sensor, **fields))
-        assert sound(simulate(replace(plane, **of_model(model)), 16))
+    model = replace(plane.set_model, angle_sensor=replace(plane.set_model.angle_sensor, **fields))
+    assert sound(simulate(replace(plane, **of_model(model)), 16))
     assert sound(simulate(in_space(plane, **fields), 16))
 
 
@@ -350,17 +345,16 @@ def steps_of(scenario: Scenario, runs: int = 6, seed: int = 2) -> list[Step]:
     return steps
 
 
-@pytest.mark.parametrize("shape", [None, ErrorShape.BOX, ErrorShape.DISC])
-def test_a_constant_bias_is_a_constant_length(shape: ErrorShape | None) -> None:
+@pytest.mark.parametrize("spatial", [False, True])
+def test_a_constant_bias_is_a_constant_length(spatial: bool) -> None:
     """The error at the distance d is pixel times a draw of the image plus centroid/d times the draw of the run."""
     scenario = camera_scenario(bias=Bias.CONSTANT)
-    if shape is not None:
-        scenario = in_space(scenario, error_shape=shape)
+    scenario = in_space(scenario) if spatial else scenario
     steps = steps_of(scenario)
     draws = draw(scenario, range(6), 2)
     assert draws.bias is not None
     assert np.unique(draws.bias).size == draws.bias.size
-    assert (np.hypot(*draws.bias) if shape is ErrorShape.DISC else np.abs(draws.bias)).max() <= 1.0
+    assert np.abs(draws.bias).max() <= 1.0
     for step in steps[:-10]:
         if "angle" in step.measured:
             error = step.measured["angle"] - step.sight.alpha_rad
@@ -446,7 +440,7 @@ def test_a_flight_without_images_has_no_margin() -> None:
 def test_a_run_with_lost_images_does_not_depend_on_its_batch(spatial: bool) -> None:
     """Ranges and rates of a step whose image is lost cut without the angle."""
     scenario = camera_scenario(miss_probability=0.5, bias=Bias.CONSTANT)
-    scenario = in_space(scenario, convention=Convention.GIMBAL) if spatial else scenario
+    scenario = in_space(scenario) if spatial else scenario
     scenario = replace(scenario, range_sensor=RangeSensor(EVERY_S, 0.01), rate_sensor=RateSensor(EVERY_S, 1e-8))
     together = simulate(scenario, 5)
     assert sound(together)

@@ -11,8 +11,6 @@ from guidance import LineOfSight, Strategy, Thruster, make_strategy
 from guidance.situation import Situation
 from infoset import (
     AngleSensor,
-    Convention,
-    ErrorShape,
     InformationSet,
     InformationSetView,
     RangeSensor,
@@ -34,14 +32,6 @@ SENSOR = AngleSensor(1.0, 0.001, 0.002, 1000.0)
 
 
 METER, RATE = RangeSensor(1.0, 0.1), RateSensor(1.0, 4.0)
-
-
-CONVENTIONS = (
-    (Convention.PLANE, "box"),
-    (Convention.GIMBAL, "box"),
-    (Convention.PLANE, "disc"),
-    (Convention.CONE, "disc"),
-)
 
 
 def sight(step: int, *sensors: Sensor) -> LineOfSight:
@@ -79,29 +69,18 @@ def test_pairs_are_measured_in_the_middle_until_it_is_late(nothing_known: Inform
     assert np.array_equal(honest["rate"], sight(4).omega_rad_s)
 
 
-@pytest.mark.parametrize(("convention", "shape"), CONVENTIONS)
-def test_pairs_in_space_have_one_measurement_with_equal_errors(
-    convention: Convention, shape: str, nothing_known: InformationSetView
-) -> None:
-    sensor = replace(SENSOR, convention=convention, error_shape=ErrorShape(shape))
+def test_pairs_in_space_have_one_measurement_with_equal_errors(nothing_known: InformationSetView) -> None:
     alpha = np.array([[0.3, 0.3012, -0.1, -0.1], [0.2, 0.1991, 0.4, 0.4016]])
-    true = LineOfSight(3, alpha, 10.0 * alpha, np.full(4, 1000.0), {each.name: each for each in (sensor, METER, RATE)})
+    true = LineOfSight(3, alpha, 10.0 * alpha, np.full(4, 1000.0), {each.name: each for each in (SENSOR, METER, RATE)})
     noise = PairNoise(3)
     measured = noise.measure(true, nothing_known)
     assert all((values[..., 0::2] == values[..., 1::2]).all() for values in measured.values())
     assert measured["rate"][:, ::2] == pytest.approx(np.array([[3.006, -1.0], [1.9955, 4.008]]))
-    error = sensor.error(true, measured["angle"])
-    sizes = np.hypot(*error) if shape == "disc" else np.abs(error).max(axis=0)
+    sizes = np.abs(SENSOR.error(true, measured["angle"])).max(axis=0)
     assert sizes[0::2] == pytest.approx(sizes[1::2], rel=1e-6)
     assert noise.max_share == pytest.approx(sizes.max())
-    if convention is Convention.PLANE:
-        assert measured["angle"][:, ::2] == pytest.approx(np.array([[0.3006, -0.1], [0.19955, 0.4008]]))
-        assert sizes[::2] == pytest.approx([0.75, 0.8] if shape == "disc" else [0.6, 0.8])
-    if convention is Convention.CONE:
-        directions = np.array([*np.tan(alpha), np.ones(4)])
-        first, second = (directions[:, i::2] / np.linalg.norm(directions[:, i::2], axis=0) for i in (0, 1))
-        between = 2.0 * np.arcsin(0.5 * np.linalg.norm(first - second, axis=0))
-        assert 0.001 * sizes[::2] == pytest.approx(0.5 * between)
+    assert measured["angle"][:, ::2] == pytest.approx(np.array([[0.3006, -0.1], [0.19955, 0.4008]]))
+    assert sizes[::2] == pytest.approx([0.6, 0.8])
 
 
 def test_only_sensors_that_measure_count(nothing_known: InformationSetView) -> None:
@@ -184,13 +163,12 @@ def random_scenario(number: int) -> Scenario:
 
 
 def random_in_space(number: int) -> Scenario:
-    """A random scenario with a second lateral axis: other bounds, convention and shape of the errors, any Sun."""
+    """A random scenario with a second lateral axis: other bounds, any Sun."""
     scenario, draws = random_scenario(number), np.random.default_rng([2001, number])
-    convention, shape = CONVENTIONS[number % 4]
     model, share = scenario.set_model, draws.uniform(0.3, 1.0, 4)
-    sensor = replace(model.angle_sensor, convention=convention, error_shape=ErrorShape(shape))
-    if shape == "box":
-        sensor = replace(sensor, error_at_nominal_range_y_rad=share[0] * sensor.error_at_nominal_range_rad)
+    sensor = model.angle_sensor
+    assert sensor.error_at_nominal_range_rad is not None
+    sensor = replace(sensor, error_at_nominal_range_y_rad=share[0] * sensor.error_at_nominal_range_rad)
     (minimum, maximum), speed = model.bounds.z_m, share[2] * model.bounds.vz_m_s[1]
     box = replace(model.bounds, y_m=(minimum, share[1] * maximum), vy_m_s=(-speed, speed))
     disturbance = share[3] * model.disturbance_m_s2
@@ -228,26 +206,21 @@ def test_one_of_the_pair_misses_by_the_bound(number: int, make: Callable[[int], 
     check(make(number), make_strategy("symmetric-miss"))
 
 
-@pytest.mark.parametrize(("convention", "shape"), CONVENTIONS)
 @pytest.mark.parametrize("kind", Model)
-def test_one_of_the_pair_misses_by_the_bound_in_the_scenario_of_1997(
-    kind: Model, convention: Convention, shape: str, published_in_space: Scenario
-) -> None:
-    """42.8 m for errors in a box, 22.6 m in a disc, with reserves for slopes of 1/58: the budget by the closing speed.
+def test_one_of_the_pair_misses_by_the_bound_in_the_scenario_of_1997(kind: Model, published_in_space: Scenario) -> None:
+    """42.8 m, with reserves for slopes of 1/58: the budget by the closing speed.
 
     The bound is the cosine times the difference of A, from an independent linear program, and M of impulses. The error
     bound of an angle falls by 0.08/0.15 of its value from x = 0 to the start, so it is less at the true distance, by
-    that share of half the slope squared. The elevation of a gimbal depends on the azimuth, by half the slope squared.
+    that share of half the slope squared.
     """
-    model = published_in_space.set_model
-    sensor = replace(model.angle_sensor, convention=convention, error_shape=ErrorShape(shape))
-    model = replace(model, angle_sensor=sensor, model=kind)
+    model = replace(published_in_space.set_model, model=kind)
     if kind is Model.GUARANTEED:
         model = replace(model, initial_set=InitialSet.BOX)
     scenario = replace(published_in_space, **of_model(model))
     pair = pair_at(scenario, 5801.3e3, -58e3)
-    apart_m, correction_m = (81.12, 38.34) if shape == "box" else (45.80, 23.17)
-    reserve = (0.08 / 0.15 + (convention is Convention.GIMBAL)) * 0.5 / 58.0**2
+    apart_m, correction_m = 81.12, 38.34
+    reserve = 0.08 / 0.15 * 0.5 / 58.0**2
     expected_m = (apart_m * (1.0 - reserve) - correction_m) / np.hypot(1.0, 1.0 / 58.0)
     assert pair.bound_m == pytest.approx(expected_m, abs=0.005)
     flight = fly_pair(scenario, pair)

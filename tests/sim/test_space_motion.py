@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from infoset import Convention, ErrorShape, Model, SetModel
+from infoset import Model, SetModel
 from infoset.arrays import Floats
 from sim import Manoeuvre, Scenario, Sun, Target, simulate
-from sim.draws import Draws, Y, corners, draw, generator, in_disc
+from sim.draws import Draws, Y, corners, draw, generator
 from sim.gravity import max_impulses_m_s, on_board_model, with_gravity
 from sim.kepler import SPACECRAFT, KeplerMotion, sun_and_orbit
 from sim.target import acceleration_m_s2
@@ -293,35 +293,6 @@ def test_the_z_axis_has_the_random_numbers_of_the_plane(ranging: Scenario) -> No
     minimum, maximum = np.transpose([y.z_m, y.vz_m_s])
     fresh = np.stack([generator(8, run, Y).uniform(size=2) for run in range(3)])
     np.testing.assert_array_equal(lateral, minimum + (maximum - minimum) * fresh)
-
-
-@pytest.mark.parametrize(("convention", "shape"), [(Convention.PLANE, ErrorShape.DISC), (Convention.CONE, None)])
-def test_errors_in_a_disc_are_uniform_in_it(
-    convention: Convention, shape: ErrorShape | None, asteroid: Scenario
-) -> None:
-    disc = in_space(asteroid, convention=convention, error_shape=shape)
-    y, z = draw(disc, range(400), 9).errors["angle"].reshape(2, -1)
-    squared, count = y**2 + z**2, y.size
-    assert squared.max() <= 1.0 + 1e-15
-    for sample, mean, variance in (
-        (y, 0.0, 1 / 4),
-        (y**2, 1 / 4, 1 / 8 - 1 / 16),
-        (z**2, 1 / 4, 1 / 8 - 1 / 16),
-        (y * z, 0.0, 1 / 24),
-        (squared, 1 / 2, 1 / 12),
-        (squared**2, 1 / 3, 4 / 45),
-        (np.cos(4.0 * np.arctan2(y, z)), 0.0, 1 / 2),
-        (np.cos(8.0 * np.arctan2(y, z)), 0.0, 1 / 2),
-    ):
-        assert abs(sample.mean() - mean) < 4.0 * np.sqrt(variance / count)
-
-
-def test_the_map_to_the_disc_keeps_exchange_and_mirrors() -> None:
-    square = np.random.default_rng(10).uniform(-1.0, 1.0, (2, 1000))
-    np.testing.assert_array_equal(in_disc(square[::-1]), in_disc(square)[::-1])
-    flip = np.array([[-1.0], [1.0]])
-    np.testing.assert_array_equal(in_disc(flip * square), flip * in_disc(square))
-    np.testing.assert_array_equal(in_disc(np.array([[0.0, 0.5], [0.0, 0.0]])), [[0.0, 0.5], [0.0, 0.0]])
 
 
 def test_results_in_space_have_the_start_along_y_and_the_miss_along_both_axes(spatial: Scenario) -> None:

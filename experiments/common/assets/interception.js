@@ -174,7 +174,7 @@ class Column {
       x: rates,
       y: angles,
       xTitle: `line-of-sight rate \u03c9${this.along}, ${rateUnit[0]}`,
-      yTitle: `${record.angle_name}${this.along}, ${angleUnit[0]}`,
+      yTitle: `line-of-sight angle α${this.along}, ${angleUnit[0]}`,
     });
     const place = ([rate, angle]) => [rate * rateUnit[1], angle * angleUnit[1]];
     const drawn = this.chosen(this.sections);

@@ -32,7 +32,6 @@ from experiments.common.figure_style import (
 )
 from experiments.interception.course import (
     Clock,
-    angle_name,
     duration_text,
     marks,
     outcome_title,
@@ -138,8 +137,7 @@ def _write_titles(row: Sequence[Axes], records: Sequence[Record], titles: Sequen
             continue
         last = next(columns)
         for axes, name in ((first, "y"), (last, "z")):
-            angle = angle_name(record.scenario, name).removesuffix(" α")
-            axes.set_title(f"along {name} ({angle})" if " " not in angle else f"along {name}")
+            axes.set_title(f"along {name}")
         boxes = [axes.get_position() for axes in (first, last)]
         middle = 0.5 * (boxes[1].x1 - boxes[0].x0) / boxes[0].width
         look: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": first.title.get_fontsize()}

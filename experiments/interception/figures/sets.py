@@ -17,7 +17,7 @@ from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from experiments.common.figure_style import INK, MEASURED, WIDTH_MM, new_figure, place_axes, plain, style, width_mm
-from experiments.interception.course import Clock, angle_name, record_titles
+from experiments.interception.course import Clock, record_titles
 from infoset import Section
 from infoset.arrays import Floats
 from sim import AxisStep, Record, StepRecord
@@ -199,7 +199,7 @@ def label_plane(axes: Axes, plane: Plane, letter: str, time: str, in_space: bool
     title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
     axes.set_title(f"{letter}{title}, {time}")
     axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s", labelpad=2.0)
-    axes.set_ylabel(f"{angle_name(plane.record.scenario, plane.axis)}{along}, {angle_unit(axes)}")
+    axes.set_ylabel(f"line-of-sight angle α{along}, {angle_unit(axes)}")
     axes.yaxis.label.set_visible(in_space or is_first)
     axes.tick_params(labelleft=in_space or is_first)
 

@@ -116,7 +116,6 @@ def _summary(
     spatial: dict[str, object] = {}
     if scenario.is_spatial:
         spatial["disturbance_y_m_s2"] = model.axis("y").disturbance_m_s2
-        spatial["error_shape"] = "disc" if model.angle_sensor.is_disc else "box"
     return {
         "disturbance_m_s2": lower.disturbance_m_s2,
         **spatial,
@@ -217,9 +216,6 @@ def _parts(
     for axis in scenario.set_model.axes:
         maximum = scenario.set_model.axis(axis).disturbance_m_s2
         yield f"acceleration of the object along {axis} in these pairs: at most {maximum:.3g} m/s^2"
-    if scenario.is_spatial:
-        shape, axes = ("disc", "one axis") if scenario.set_model.angle_sensor.is_disc else ("box", "both axes")
-        yield f"errors of the angles in a {shape}: the states of a pair differ along {axes}"
     yield from (bounds, "", strategies, "")
     yield from value.lines()
     if any(pair.is_single for pair in lower.pairs):

@@ -22,7 +22,6 @@ from experiments.interception.runs.shared import need_finite, summary_head
 from experiments.interception.scenario_file import scenario_warnings, scenario_with
 from experiments.interception.strategies import own_strategy
 from guidance import NoiseKind
-from infoset import AngleSensor, Convention
 from infoset.sensors import SENSORS
 from sim import AxisStep, Record, StepRecord, fly_one
 from sim.storage.codec import fingerprint
@@ -136,14 +135,11 @@ def _marked(step: StepRecord) -> dict[str, AxisStep]:
 
 
 def _line_of_sight(record: Record, step: StepRecord) -> dict[str, float | None]:
-    """Return the measured values and the true plane angles and rates; a gimbal measures azimuth and elevation."""
-    gimbal = record.scenario.set_model.angle_sensor.convention is Convention.GIMBAL
+    """Return the measured values and the true plane angles and rates."""
     axes, values = _marked(step), {}
     for kind in SENSORS:
         for mark, axis in axes.items():
             name = kind.name + mark * kind.is_lateral
-            if gimbal and kind is AngleSensor:
-                name = {"_y": "azimuth", "_z": "elevation"}[mark]
             values[f"measured_{kind.quantity.replace(kind.name, name)}"] = axis.measured.get(kind.name)
     for quantity, unit in (("angle", "rad"), ("rate", "rad_s")):
         values |= {

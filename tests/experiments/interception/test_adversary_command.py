@@ -13,7 +13,7 @@ from experiments.common.input_file import to_toml
 from experiments.common.screen import number
 from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario, with_model
-from infoset import ErrorShape, Model
+from infoset import Model
 from sim import Scenario
 from sim.adversary import find_worst
 from sim.storage.codec import fingerprint
@@ -119,7 +119,7 @@ def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path)
 
 def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Scenario, tmp_path: Path) -> None:
     file = tmp_path / "space.toml"
-    file.write_text(to_toml(in_space(brief, error_shape=ErrorShape.DISC)))
+    file.write_text(to_toml(in_space(brief)))
     code, out, _ = infoset("adversary", file, "--budget", BUDGET, "--record", "worst.npz", "--json", "worst.json")
     assert code == 0
     assert "initial y, z, x, km" in out

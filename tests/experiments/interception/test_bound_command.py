@@ -17,7 +17,7 @@ from experiments.common.screen import number
 from experiments.interception.figures.bound import draw_bound, ripples
 from experiments.interception.scenario_file import load_scenario
 from guidance import strategy_names
-from infoset import ErrorShape, StateBox
+from infoset import StateBox
 from sim import Scenario
 from sim.bound import LowerBound, lower_bound, pair_at
 from sim.scenario import of_model
@@ -182,10 +182,9 @@ def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path)
     assert infoset(short_file, "--strategies", "patient", "-q", "--budget", 0) == (0, "", "")
 
 
-@pytest.mark.parametrize("shape", ["box", "disc"])
 @pytest.mark.usefixtures("unrendered")
-def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
-    spatial = in_space(short, error_shape=ErrorShape(shape))
+def test_bound_in_space(infoset: Infoset, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
+    spatial = in_space(short)
     file = tmp_path / "space.toml"
     file.write_text(to_toml(spatial))
     options = ("--strategies", "symmetric-miss", "--budget", 1, "--model", "guaranteed", "--out", tmp_path / "results")
@@ -193,16 +192,13 @@ def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, planar: L
     assert code == 0
     found = json.loads((tmp_path / "results" / "results.json").read_text())
     expected = lower_bound(spatial)
-    assert (found["disturbance_y_m_s2"], found["error_shape"]) == (0.005, shape)
+    assert found["disturbance_y_m_s2"] == 0.005
     assert found["lower_bound_m"] == expected.bound_m
-    if shape == "disc":
-        assert expected.bound_m == pytest.approx(planar.bound_m, rel=1e-8)  # gravity differs along y
-    else:
-        assert 1.5 * planar.bound_m < expected.bound_m < 2.0 * planar.bound_m
+    assert 1.5 * planar.bound_m < expected.bound_m < 2.0 * planar.bound_m
     assert found["at_nominal_range"]["bound_m"] == pair_at(spatial, 1745e3, -58e3).bound_m
     apart = [found["reached_at"][f"apart_{axis}_m"] for axis in ("y", "z")]
     assert np.hypot(*apart) == pytest.approx(expected.pair.apart_m)
-    assert apart.count(0.0) == (1 if shape == "disc" else 0)
+    assert 0.0 not in apart
     for flight in found["strategies"][0]["flights"]:
         assert np.hypot(flight["miss_y_m"], flight["miss_z_m"]) == pytest.approx(flight["miss_m"], rel=1e-3)
         assert max(flight["miss_m"]) >= flight["bound_m"] * (1.0 - 1e-4)
@@ -210,8 +206,6 @@ def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, planar: L
     (strategy,) = found["strategies"]
     assert strategy["worst_found_m"] == max(strategy["worst_of_pairs_m"], strategy["worst_of_search_m"])
     assert strategy["worst_found_m"] <= strategy["guaranteed_m"]
-    axes = "one axis" if shape == "disc" else "both axes"
-    assert f"errors of the angles in a {shape}: the states of a pair differ along {axes}" in out
     for axis in ("y", "z"):
         assert f"acceleration of the object along {axis} in these pairs: at most 0.005 m/s^2" in out
     (_, right) = draw_bound(spatial, expected).axes

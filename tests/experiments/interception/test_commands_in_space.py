@@ -15,16 +15,12 @@ import pytest
 from experiments.common.input_file import to_toml
 from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario, with_model
-from infoset import Convention, Model
+from infoset import Model
 from sim import Scenario, simulate
 from tests.experiments.command_line import Command, strict
 from tests.space import in_space
 
-CONVENTIONS = {
-    Convention.PLANE: ["measured_angle_y_rad", "measured_angle_z_rad"],
-    Convention.GIMBAL: ["measured_azimuth_rad", "measured_elevation_rad"],
-    Convention.CONE: ["measured_angle_y_rad", "measured_angle_z_rad"],
-}
+ANGLES = ["measured_angle_y_rad", "measured_angle_z_rad"]
 OF_A_STEP = [
     *("measured_range_m", "measured_rate_y_rad_s", "measured_rate_z_rad_s", "true_angle_y_rad", "true_angle_z_rad"),
     *("true_rate_y_rad_s", "true_rate_z_rad_s"),
@@ -43,30 +39,24 @@ def rows(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
-@pytest.mark.parametrize("convention", Convention)
-def test_the_files_of_engage_name_the_axis(
-    brief: Scenario, tmp_path: Path, infoset: Command, convention: Convention
-) -> None:
-    file = tmp_path / "space.toml"
-    file.write_text(to_toml(in_space(brief, convention=convention)))
+def test_the_files_of_engage_name_the_axis(file: Path, infoset: Command) -> None:
     code, out, err = infoset("engage", file, "--record", "r.npz", "--json", "r.json", "--csv", "r.csv")
     assert (code, err) == (0, "wrote r.json, r.csv, r.npz\n")
     record = load_record("r.npz")
     written = strict(Path("r.json").read_text())
     steps, table = written.pop("steps"), rows(Path("r.csv").read_text())
-    angles = CONVENTIONS[convention]
     assert [*steps[0]] == [
-        *("time_s", *angles, *OF_A_STEP, *IMPULSES),
+        *("time_s", *ANGLES, *OF_A_STEP, *IMPULSES),
         *("predicted_miss_y_m", "predicted_miss_z_m", "sections", "truth_margin_m"),
     ]
     ends = [f"predicted_miss_{axis}_{end}_m" for axis in ("y", "z") for end in ("lower", "upper")]
     assert [*table[0]] == [
-        *("noise", "step", "time_s", *angles, *OF_A_STEP, "true_range_m", *IMPULSES),
+        *("noise", "step", "time_s", *ANGLES, *OF_A_STEP, "true_range_m", *IMPULSES),
         *(*ends, "truth_margin_m", "sections"),
     ]
     for step, row, recorded in zip(steps, table, record.steps, strict=True):
         y, z = recorded.axes.values()
-        assert [step[name] for name in angles] == [y.measured["angle"], z.measured["angle"]]
+        assert [step[name] for name in ANGLES] == [y.measured["angle"], z.measured["angle"]]
         assert [step[name] for name in IMPULSES] == [recorded.impulse_m_s, y.impulse_m_s, z.impulse_m_s]
         misses = [*(y.predicted_miss_m or (None, None)), *(z.predicted_miss_m or (None, None))]
         assert [float(row[end]) if row[end] else None for end in ends] == misses

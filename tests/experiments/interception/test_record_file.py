@@ -21,7 +21,7 @@ from experiments.interception import record_file
 from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario
 from guidance import LineOfSight, NoiseKind, Situation
-from infoset import Convention, InformationSetView, RateSensor
+from infoset import InformationSetView, RateSensor
 from sim import Record, StepRecord, fly_one
 from sim.versions import versions
 from tests.long_steps import with_long_steps
@@ -117,7 +117,6 @@ RECORDS: dict[str, Callable[[], Record]] = {
     "plane": lambda: fly_one(with_long_steps(load_scenario("asteroid-1997")), 1, seed=2**70),
     "game": lambda: fly_one(dataclasses.replace(load_scenario("asteroid-1997-single"), noise=NoiseKind.GAME)),
     "space": lambda: fly_one(in_space(with_rates("asteroid-1997")), 1),
-    "gimbal": lambda: fly_one(in_space(with_rates("asteroid-1997"), convention=Convention.GIMBAL), 1),
     "own strategy": lambda: fly_one(with_long_steps(load_scenario("asteroid-1997")), strategy=Idle()),
     "contradiction": lambda: fly_one(
         dataclasses.replace(load_scenario("asteroid-1997-single"), rate_sensor=RateSensor(1.0, 1e-6)), noise=Outlier()

@@ -19,7 +19,7 @@ from guidance import strategy_names
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Model, SetModel, SetSettings, StateBox
-from infoset.sensors import AngleSensor, Convention, ErrorShape, RangeSensor, RateSensor
+from infoset.sensors import AngleSensor, RangeSensor, RateSensor
 from sim.gravity import on_board_model
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target, of_model
 from sim.storage.codec import fingerprint
@@ -266,14 +266,9 @@ def _boxes(*, is_spatial: bool) -> st.SearchStrategy[StateBox]:
 def _in_space(draw: st.DrawFn, planar: Scenario) -> Scenario:
     """Every value of space, over all that it permits."""
     sensor, model, sun = planar.set_model.angle_sensor, planar.set_model, planar.sun
-    convention, shape = draw(st.sampled_from(Convention)), draw(st.none() | st.sampled_from(ErrorShape))
-    if convention is Convention.CONE and shape is ErrorShape.BOX:
-        shape = None
-    sensor = dataclasses.replace(sensor, convention=convention, error_shape=shape)
-    if not sensor.is_disc:
-        at_zero = draw(st.none() | st.just(0.0) | _floats(0.0, sensor.constant_error_rad))
-        at_nominal = draw(st.none() | _floats(sensor.constant_error_rad, 0.9))
-        sensor = dataclasses.replace(sensor, error_at_zero_range_y_rad=at_zero, error_at_nominal_range_y_rad=at_nominal)
+    at_zero = draw(st.none() | st.just(0.0) | _floats(0.0, sensor.constant_error_rad))
+    at_nominal = draw(st.none() | _floats(sensor.constant_error_rad, 0.9))
+    sensor = dataclasses.replace(sensor, error_at_zero_range_y_rad=at_zero, error_at_nominal_range_y_rad=at_nominal)
     return dataclasses.replace(
         planar,
         sun=sun and dataclasses.replace(sun, elevation_rad=draw(_floats(-0.5 * math.pi, 0.5 * math.pi))),

@@ -11,7 +11,6 @@ from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.common.errors import InputError
 from experiments.common.input_file import read_text, to_toml
 from experiments.interception.scenario_file import load_scenario, scenario_warnings
-from infoset.sensors import Convention, ErrorShape
 from sim import Manoeuvre, Scenario, Target
 from sim.scenario import of_model
 from sim.storage.codec import fingerprint
@@ -67,7 +66,6 @@ def test_the_built_in_scenario_has_the_numbers_of_the_plane_in_both_axes() -> No
     assert replace(space, dispersion=planar.dispersion, **of_model(in_plane), name="", description="") == replace(
         planar, name="", description=""
     )
-    assert load_scenario("asteroid-1997-space", ["angle_sensor.convention=cone"]).set_model.angle_sensor.is_disc
 
 
 def test_every_key_of_space_is_read_and_written() -> None:
@@ -75,8 +73,6 @@ def test_every_key_of_space_is_read_and_written() -> None:
         sun__elevation_deg="-30.0",
         angle_sensor__error_at_nominal_range_y_rad="0.0",
         angle_sensor__error_at_zero_range_y_rad="0.0",
-        angle_sensor__convention='"gimbal"',
-        angle_sensor__error_shape='"box"',
         thruster__pointing_error_rad="0.01",
         information_set__disturbance_y_m_s2="0.006",
     )
@@ -87,7 +83,6 @@ def test_every_key_of_space_is_read_and_written() -> None:
     )
     sensor = scenario.set_model.angle_sensor
     assert (sensor.error_at_nominal_range_y_rad, sensor.error_at_zero_range_y_rad) == (0.0, 0.0)
-    assert (sensor.convention, sensor.error_shape) == (Convention.GIMBAL, ErrorShape.BOX)
     assert (scenario.set_model.disturbance_y_m_s2, scenario.thruster.pointing_error_rad) == (0.006, 0.01)
     assert scenario.sun is not None
     assert scenario.sun.elevation_rad == pytest.approx(-0.5235987755982988)
@@ -167,9 +162,8 @@ def test_settings_reach_the_second_axis(space: Scenario) -> None:
     ]
     scenario = load_scenario("asteroid-1997", settings)
     assert replace(scenario, description=space.description) == space
-    tilted = load_scenario("asteroid-1997", [*settings, "uncertainty.y_km.min=-8", "angle_sensor.convention=cone"])
+    tilted = load_scenario("asteroid-1997", [*settings, "uncertainty.y_km.min=-8"])
     assert tilted.set_model.bounds.y_m == (-8e3, 9e3)
-    assert tilted.set_model.angle_sensor.is_disc
     with pytest.raises(InputError, match="the file has no such interval"):
         load_scenario("asteroid-1997", ["uncertainty.y_km.min=-8"])
 
@@ -189,7 +183,7 @@ def test_sweeps_vary_the_second_axis(space: Scenario) -> None:
     assert [cell.thruster.pointing_error_rad for cell in cells[:2]] == [0.001, 0.002]
     wider = read_text(
         Scenario,
-        spatial(angle_sensor__error_at_zero_range_y_rad="0.0003", angle_sensor__error_shape='"box"'),
+        spatial(angle_sensor__error_at_zero_range_y_rad="0.0003"),
         "mine.toml",
     )
     (_, double) = sweep_cells(wider, sweep_axes("angle_sensor.scale=1:2:2", wider))

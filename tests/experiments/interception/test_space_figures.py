@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from dataclasses import replace
 from io import BytesIO
@@ -24,10 +23,8 @@ from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane,
 from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets, planes_at
-from experiments.interception.page import interception_page
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
-from infoset import Convention
 from sim import Record, Results, Scenario, fly_one, simulate
 from sim.scenario import of_model
 from tests.experiments.command_line import Command
@@ -95,18 +92,6 @@ def test_a_circle_of_a_quantile_does_not_hide_the_radius_of_the_body(results: Re
     assert orders.pop("_radius") > max(orders.values())
     (points,) = [line for line in axes.lines if line.get_label() == "_misses"]
     assert points.get_zorder() > max(orders.values())
-
-
-@pytest.mark.parametrize(
-    ("convention", "names"),
-    [
-        (Convention.GIMBAL, ["measured azimuth", "measured elevation"]),
-        (Convention.CONE, ["measured angle along y", "measured angle along z"]),
-    ],
-)
-def test_the_page_names_the_measured_angles(convention: Convention, names: list[str], brief: Scenario) -> None:
-    text = interception_page([fly_one(in_space(brief, convention=convention))])
-    assert re.findall(r'"measured_name": ?"([^"]*)"', text) == names
 
 
 def test_ellipses_contain_their_share_of_the_runs() -> None:
@@ -385,16 +370,6 @@ def test_the_axis_of_impulses_extends_to_small_impulses(records: list[Record]) -
     maximum = max(step.impulse_m_s for step in records[0].steps)
     assert axes.get_ylim() == pytest.approx((-1.2 * maximum, 1.35 * maximum))
     assert axes.texts[0].get_text() == "maximum impulse ±1000 m/s, beyond the axis"
-
-
-def test_figures_name_the_angles_of_a_gimbal() -> None:
-    record = fly_one(load_scenario("asteroid-1997-space", ["angle_sensor.convention=gimbal"]))
-    labels = [axes.get_ylabel() for axes in draw_sets([record], (8.0,)).axes]
-    assert [label.split(",")[0] for label in labels] == ["azimuth α along y", "elevation α along z"]
-    assert [axes.get_title() for axes in draw_process([record]).axes[:2]] == [
-        "along y (azimuth)",
-        "along z (elevation)",
-    ]
 
 
 def test_process_of_a_long_flight_shows_errors_moduli_and_the_true_miss(records: list[Record]) -> None:
