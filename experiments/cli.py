@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import errno
+import inspect
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
+from importlib import import_module
 from importlib.metadata import version as installed_version
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
-from typer.core import TyperGroup
 
 from experiments.campaigns.command import Campaign, Report, Sweep
-from experiments.common.command import command
-from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
-from experiments.files_command import problems, scenarios
+from experiments.common.errors import InputError, on_a_screen
+from experiments.file_commands import problems, scenarios
 from experiments.interception.command import Adversary, Bound, Compare, Engage, Experiment, Replay
 from experiments.multipoint.command import Multipoint
 from experiments.observer.command import Observe
@@ -24,98 +23,76 @@ from experiments.pursuit.command import Pursuit, PursuitMap
 from experiments.reachability.command import Reach
 from experiments.reproduce import Reproduce
 
-INPUT_ERROR = 2
-_UsageError: Any = typer.BadParameter.__base__
-"""Base of Typer's errors about options and arguments; Typer does not export it."""
-
-TOOLS = "Tools"
-COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
-    "Interception": [
-        (Experiment, "interception.runs.experiment", "experiment asteroid-1997 --runs 50 --out results"),
-        (Engage, "interception.runs.engage", "engage asteroid-1997-single --noise both --out figures"),
-        (Compare, "interception.runs.compare", "compare --strategies patient,symmetric-miss --out results"),
-        (Bound, "interception.runs.bound", "bound asteroid-1997 --strategies patient --out results"),
-        (
-            Adversary,
-            "interception.runs.adversary",
-            "adversary --strategy symmetric-miss --budget 2000 --record worst.npz",
-        ),
-        (Replay, "interception.runs.replay", "replay flight-random.npz flight-game.npz --html flights.html"),
-    ],
-    "Campaigns of interceptions": [
-        (Campaign, "campaigns.run_campaign", "campaign --noise mixed --runs 100000 --out runs"),
-        (
-            Sweep,
-            "campaigns.run_sweep",
-            "sweep --set body.radius_m=80 --vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8 "
-            "--runs 100 --until decided --out sensors",
-        ),
-        (Report, "campaigns.run_report", "report runs --out figures"),
-    ],
-    "Rendezvous": [
-        (Pursuit, "pursuit.run", "pursuit geo-pursuit --certify --feedback coast --out results"),
-        (
-            PursuitMap,
-            "pursuit.map",
-            "pursuit-map geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map",
-        ),
-        (Reach, "reachability.run", "reach rendezvous-2021 --select energy,vertices --replan --out reach"),
-        (Pareto, "pareto.run", "pareto pareto-2008 --prefer x_m=0,z_m=50 --out figures"),
-        (Multipoint, "multipoint.run", "multipoint service-3 --order best --times best --out figures"),
-    ],
-    "Set-membership estimation": [(Observe, "observer.run", "observe vehicle --smooth --out results")],
-    TOOLS: [(Reproduce, "reproduced_numbers", "reproduce --paper pareto --json numbers.json")],
-}
-"""By panel of the help: options, module of the run in `experiments`, and example, whose first word is the name."""
-
-
-class _Root(TyperGroup):
-    """Reports an error as one message without a traceback."""
-
-    def make_context(self, info_name: str | None, args: list[str], *rest: Any, **options: Any) -> Any:
-        is_bare = not args  # the error is then the help
-        try:
-            return super().make_context(info_name, args, *rest, **options)
-        except _UsageError as error:
-            if is_bare:
-                raise
-            raise _ended(_usage_message(error), INPUT_ERROR) from None
-        except KeyboardInterrupt:
-            raise _ended("interrupted", INTERRUPTED) from None
-
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            return super().invoke(ctx)
-        except InputError as error:
-            raise _ended(f"error: {error}", INPUT_ERROR) from None
-        except _UsageError as error:
-            raise _ended(_usage_message(error), INPUT_ERROR) from None
-        except MemoryError as error:
-            raise _ended(_out_of_memory(error), INPUT_ERROR) from None
-        except OSError as error:
-            if error.errno == errno.EPIPE:  # the reader of a pipe has closed it: no error
-                raise
-            where = f"{error.filename}: " if error.filename is not None else ""
-            reason = error.strerror or error
-            raise _ended(f"error: {where}{reason}; check the disk and its permissions", INPUT_ERROR) from None
-        except KeyboardInterrupt as interrupt:
-            raise _ended("interrupted" + "".join(map(str, interrupt.args)), INTERRUPTED) from None
-
-
 app = typer.Typer(
     name="infoset",
-    cls=_Root,
     epilog="Example: infoset experiment --runs 50 --out results",
     no_args_is_help=True,
-    rich_markup_mode=None,  # plain help: the text has 45 of 80 columns, in a table of Rich 20
+    rich_markup_mode=None,  # plain help: its text has 45 of 80 columns, in a table of Rich 20
     pretty_exceptions_enable=False,
 )
-for panel, rows in COMMANDS.items():
-    for options, run, example in rows:
-        register = app.command(example.split()[0], rich_help_panel=panel, epilog=f"Example: infoset {example}")
-        register(command(options, f"experiments.{run}"))
-app.add_typer(scenarios, rich_help_panel=TOOLS)
-app.add_typer(problems, rich_help_panel=TOOLS)
+RUNS: dict[type, str] = {}
+"""The module in `experiments` whose function ``run`` takes the options, by the class of the options."""
+
+
+def _add(name: str, options: type, run: str, *, example: str) -> None:
+    """Add a command.
+
+    The fields of the dataclass `options`, declared with ``Annotated[type, typer.Option(...)]``, are its options and
+    arguments, and its docstring is the help; the first sentence stands in the list of commands. The module `run` is
+    imported when the command runs, so that ``--help`` does not wait for it.
+    """
+    RUNS[options] = f"experiments.{run}"
+    hints = get_type_hints(options, include_extras=True)
+
+    def command(**values: Any) -> None:
+        try:
+            import_module(RUNS[options]).run(options(**values))
+        except KeyboardInterrupt as interrupt:
+            typer.echo("interrupted" + "".join(map(str, interrupt.args)), err=True)
+            raise
+
+    parameters = inspect.signature(options).parameters.values()
+    command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [parameter.replace(annotation=hints[parameter.name]) for parameter in parameters]
+    )
+    command.__annotations__ = hints
+    app.command(name, help=options.__doc__, epilog=f"Example: infoset {name} {example}")(command)
+
+
+_add("experiment", Experiment, "interception.runs.experiment", example="asteroid-1997 --runs 50 --out results")
+_add("engage", Engage, "interception.runs.engage", example="asteroid-1997-single --noise both --out figures")
+_add("compare", Compare, "interception.runs.compare", example="--strategies patient,symmetric-miss --out results")
+_add("bound", Bound, "interception.runs.bound", example="asteroid-1997 --strategies patient --out results")
+_add(
+    "adversary",
+    Adversary,
+    "interception.runs.adversary",
+    example="--strategy symmetric-miss --budget 2000 --record worst.npz",
+)
+_add("replay", Replay, "interception.runs.replay", example="flight-random.npz flight-game.npz --html flights.html")
+_add("campaign", Campaign, "campaigns.run_campaign", example="--noise mixed --runs 100000 --out runs")
+_add(
+    "sweep",
+    Sweep,
+    "campaigns.run_sweep",
+    example="--set body.radius_m=80 --vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8 --runs 100 "
+    "--until decided --out sensors",
+)
+_add("report", Report, "campaigns.run_report", example="runs --out figures")
+_add("pursuit", Pursuit, "pursuit.run", example="geo-pursuit --certify --feedback coast --out results")
+_add(
+    "pursuit-map",
+    PursuitMap,
+    "pursuit.map",
+    example="geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map",
+)
+_add("reach", Reach, "reachability.run", example="rendezvous-2021 --select energy,vertices --replan --out reach")
+_add("pareto", Pareto, "pareto.run", example="pareto-2008 --prefer x_m=0,z_m=50 --out figures")
+_add("multipoint", Multipoint, "multipoint.run", example="service-3 --order best --times best --out figures")
+_add("observe", Observe, "observer.run", example="vehicle --smooth --out results")
+_add("reproduce", Reproduce, "reproduced_numbers", example="--paper pareto --json numbers.json")
+app.add_typer(scenarios)
+app.add_typer(problems)
 
 
 def _show_version(wanted: bool) -> None:
@@ -127,8 +104,7 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def infoset(
     version: Annotated[
-        bool,
-        typer.Option("--version", metavar="", callback=_show_version, is_eager=True, help="Show the version and exit."),
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Simulate interceptions guided by information sets, and solve rendezvous and pursuit problems.
@@ -139,7 +115,7 @@ def infoset(
 
 @cache
 def commands() -> Any:
-    """Return the commands as Click runs them; cached because building them takes 0.05 s."""
+    """Return the commands as Typer runs them; cached because building them takes 0.05 s."""
     return typer.main.get_command(app)
 
 
@@ -149,24 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     It always raises `SystemExit`: 0 done, 1 a published number disagrees, 2 wrong input, 130 interrupted.
     """
     try:
-        commands()(args=None if arguments is None else list(arguments), prog_name="infoset")
-    except MemoryError as error:
-        typer.echo(_out_of_memory(error), err=True)
-        sys.exit(INPUT_ERROR)
-
-
-def _out_of_memory(error: MemoryError) -> str:
-    reason = f" ({error})" if error.args else ""
-    return f"error: Not enough memory{reason}. Free some memory and run it again."
-
-
-def _usage_message(error: Any) -> str:
-    """Return the message of an error about options and arguments, in one line and with the command that has help."""
-    message = " ".join(error.format_message().split()).rstrip(".")
-    command = error.ctx.command_path if error.ctx else "infoset COMMAND"
-    return f"error: {message[:1].lower()}{message[1:]}{'' if message.endswith('?') else ';'} see {command} --help"
-
-
-def _ended(message: str, code: int) -> typer.Exit:
-    typer.echo(on_a_screen(message), err=True)
-    return typer.Exit(code)
+        commands()(args=arguments, prog_name="infoset")
+    except (InputError, OSError, MemoryError) as error:
+        typer.echo(on_a_screen(f"error: {str(error) or 'not enough memory'}"), err=True)
+        sys.exit(2)

@@ -12,7 +12,7 @@ from experiments.common.options import Json, Overwrite, Quiet
 
 @dataclass(frozen=True)
 class Reproduce:
-    """Compute every number of the five papers, and print it with the published number.
+    """Compare every published number with the computed one.
 
     Each number has a verdict: agreed, misprint (with the correct number and the reason), explained by another model
     (with the number of this model), or not explained (with the attempted explanations). The exit code is 1 if a number

@@ -10,8 +10,8 @@ def scenario_names() -> tuple[str, ...]:
 
 
 def scenario_text(name: str) -> str:
-    return built_in(name, [SCENARIO], "no built-in scenario").text
+    return built_in(name, [SCENARIO]).text
 
 
 def problem_text(name: str) -> str:
-    return built_in(name, PROBLEMS, "no built-in problem").text
+    return built_in(name, PROBLEMS).text

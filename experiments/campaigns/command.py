@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
@@ -35,16 +35,6 @@ Shown = Annotated[
 ]
 
 
-_WORKERS: dict[str, Any] = {"metavar": "W", "min": 1, "max": MAX_WORKERS}
-_SOME_WORKERS = 4
-"""Number in a message about a wrong number of workers."""
-
-
-def _execution(text: str, *names: str, **options: Any) -> Any:
-    """Return an option in the panel of the execution."""
-    return typer.Option(*names, rich_help_panel="Execution", help=text, **options)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Flight:
     """Options of a campaign and of a sweep."""
@@ -68,41 +58,50 @@ class Flight:
     overwrite: Overwrite = False
     quiet: Quiet = False
     resume: Annotated[
-        bool, _execution("Continue the campaign in DIR; if DIR is empty, start a new one.", "--resume")
+        bool, typer.Option("--resume", help="Continue the campaign in DIR; if DIR is empty, start a new one.")
     ] = False
     chunk: Annotated[
         int | None,
-        _execution(
-            "Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
+        typer.Option(
             metavar="N",
             min=1,
             max=MAX_AT_ONCE,
+            help="Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
         ),
     ] = None
     workers: Annotated[
-        int | None, _execution("Number of threads on this machine. Default: one per core.", **_WORKERS), _SOME_WORKERS
+        int | None,
+        typer.Option(
+            metavar="W", min=1, max=MAX_WORKERS, help="Number of threads on this machine. Default: one per core."
+        ),
     ] = None
     processes: Annotated[
         int | None,
-        _execution("Number of processes on this machine, instead of threads; faster for long campaigns.", **_WORKERS),
-        _SOME_WORKERS,
+        typer.Option(
+            metavar="W",
+            min=1,
+            max=MAX_WORKERS,
+            help="Number of processes on this machine, instead of threads; faster for long campaigns.",
+        ),
     ] = None
     dask: Annotated[
         str | None,
-        _execution(
-            "Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786.", metavar="ADDRESS"
+        typer.Option(
+            metavar="ADDRESS",
+            help="Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786.",
         ),
     ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign(Flight):
-    """Simulate a campaign: thousands of runs, stored in DIR in shards (files of many runs).
+    """Simulate a campaign: thousands of runs, stored in a folder.
 
-    A shard is written as soon as its runs are complete. After any interruption, the same command with --resume
-    continues the campaign; with a greater --runs it extends the campaign. The numbers depend only on the scenario, the
-    seed and the run, not on workers, shards or interruptions. Run K with a noise is the same engagement as in:
-    infoset engage DIR/scenario.toml --noise NOISE --seed SEED --run K. To see the results: infoset report DIR.
+    The runs are stored in DIR in shards (files of many runs). A shard is written as soon as its runs are complete.
+    After any interruption, the same command with --resume continues the campaign; with a greater --runs it extends the
+    campaign. The numbers depend only on the scenario, the seed and the run, not on workers, shards or interruptions.
+    Run K with a noise is the same engagement as in: infoset engage DIR/scenario.toml --noise NOISE --seed SEED --run K.
+    To see the results: infoset report DIR.
     """
 
     until: Annotated[
@@ -123,7 +122,7 @@ class Campaign(Flight):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep(Flight):
-    """Simulate a scenario with many values of its keys, to find those that meet a requirement.
+    """Find the values of a scenario's keys that meet a requirement.
 
     For example, to find which sensor and which engine hit a body of a given size. Each combination of values is a cell.
     It meets the requirement, does not meet it, or is undecided. All cells have the same initial states and random
@@ -131,8 +130,8 @@ class Sweep(Flight):
     and a figure for each noise: lines for one key, maps for two keys.
 
     Forms of --vary: KEY=FROM:TO:COUNT, equal spacing; KEY=log:FROM:TO:COUNT, logarithmic spacing;
-    KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.min or KEY.max, an end of a pair;
-    angle_sensor.scale, a factor of all error bounds of a sensor. For example: --vary angle_sensor.scale=1:8:8 --vary
+    KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.min or KEY.max, an end of a pair; angle_sensor.scale, a
+    factor of all error bounds of a sensor. For example: --vary angle_sensor.scale=1:8:8 --vary
     thruster.max_impulse_m_s=2.5:20:8.
     """
 
@@ -169,13 +168,13 @@ class Sweep(Flight):
 
 @dataclass(frozen=True)
 class Report(FileOptions):
-    """Report on a campaign or a sweep, complete or not, from its stored files.
+    """Report on a stored campaign or sweep.
 
-    For a campaign: quantiles with 95 % confidence intervals, outcomes of the runs, correlation of the miss with the
-    initial state, and the ten worst runs, each with the command that simulates it again; with --out, figures of the
-    distributions, of the convergence of the quantiles, and of the miss against the initial state. For a sweep: the
-    values that meet the requirement; with --out, the table and the figures. --require and --show are for sweeps.
-    Without --out or --json no file is written.
+    The campaign or sweep may be incomplete. For a campaign: quantiles with 95 % confidence intervals, outcomes of the
+    runs, correlation of the miss with the initial state, and the ten worst runs, each with the command that simulates
+    it again; with --out, figures of the distributions, of the convergence of the quantiles, and of the miss against the
+    initial state. For a sweep: the values that meet the requirement; with --out, the table and the figures. --require
+    and --show are for sweeps. Without --out or --json no file is written.
     """
 
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep.")]

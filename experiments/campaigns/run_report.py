@@ -20,7 +20,6 @@ from experiments.campaigns.samples import (
 from experiments.campaigns.sweep_report import SweepReport, default_requirement, figure_names, quantile_options
 from experiments.campaigns.sweep_table import TABLE, sweep_table
 from experiments.common.errors import InputError
-from experiments.common.file_kinds import use_of_file
 from experiments.common.input_file import to_toml
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import (
@@ -64,7 +63,7 @@ def _figures(folder: CampaignFolder) -> Sequence[str]:
 def _read(options: Report) -> CampaignFolder:
     path = options.folder
     if path.is_file():
-        raise InputError(f"{path}: {use_of_file(path) or 'is a file; name the folder of a campaign or of a sweep'}")
+        raise InputError(f"{path}: is a file; name the folder of a campaign or of a sweep")
     if not path.is_dir():
         raise InputError(f"{path}: there is no such folder; name the folder of infoset campaign or infoset sweep")
     folder = CampaignFolder.read(path)

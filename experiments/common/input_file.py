@@ -23,18 +23,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_ori
 from pydantic import ValidationError
 
 from experiments.common.errors import InputError, nearest, shown
-from experiments.common.file_kinds import (
-    LONGEST_LINE,
-    MAX_FILE_BYTES,
-    SCENARIO,
-    ZIP,
-    built_in,
-    built_in_names,
-    kind_of,
-    read_input,
-    taken_by,
-    use_of_content,
-)
+from experiments.common.file_kinds import SCENARIO, built_in, built_in_names, kind_of, taken_by
 from experiments.common.units import quantity_and_unit, si_factor
 from infoset.limits import LONGEST_DESCRIPTION
 from sim.storage.codec import adapter
@@ -48,6 +37,10 @@ _IS_MISSING = "is missing"
 _UNTRAPPED = Context(prec=60, traps=[])
 """Products beyond the range of decimal numbers are infinite, which is refused as any infinite value."""
 _MAX_FAULTS = 50
+MAX_FILE_BYTES = 100_000
+"""Size of the largest TOML file that is read."""
+LONGEST_LINE = 1000
+"""Longest line of a TOML file: the parser's time grows as the square of the length of a dotted key."""
 
 
 class KeyField(NamedTuple):
@@ -102,11 +95,26 @@ def read_text(owner: type[Kind], text: str, source: str, settings: Sequence[str]
 
 def source_of(name_or_path: str | os.PathLike[str], kinds: Collection[str]) -> tuple[str, str]:
     """Return the text of a built-in file of these kinds or of a file of the user, and its name for messages."""
-    given, noun = os.fspath(name_or_path), SCENARIO if SCENARIO in kinds else "problem"
+    given = os.fspath(name_or_path)
     is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and Path(given).name == given
     if is_name and (given in built_in_names(kinds) or not os.path.lexists(given)):
-        return built_in(given, kinds, f"no file and no built-in {noun}").text, f"{given} (built in)"
-    return _text_of_file(given, noun), given
+        return built_in(given, kinds).text, f"{given} (built in)"
+    try:
+        return read_input(Path(given), MAX_FILE_BYTES).decode("utf-8-sig"), given
+    except UnicodeDecodeError:
+        raise InputError(f"{given}: is not text in UTF-8; save it as UTF-8") from None
+
+
+def read_input(file: Path, max_bytes: int) -> bytes:
+    """Return the content of a file of the user; `InputError` if it has more than `max_bytes`, or cannot be read."""
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(max_bytes + 1)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+    if len(content) > max_bytes:
+        raise InputError(f"{file}: has more than {max_bytes} bytes")
+    return content
 
 
 def kind_name(owner: type) -> str:
@@ -317,19 +325,6 @@ def _scaled(value: Any, factor: Decimal) -> Any:
     if isinstance(value, bool) or not isinstance(value, int | Decimal):
         return value
     return value if isinstance(value, int) and factor == 1 else float(_UNTRAPPED.multiply(Decimal(value), factor))
-
-
-def _text_of_file(path: str, noun: str) -> str:
-    """Return the text of a file of the user; raise `InputError` if it is not a text."""
-    remedy = f"check the path, or see `infoset {noun}s list` for the built-in names"
-    content = read_input(Path(path), f"{noun} file", MAX_FILE_BYTES, remedy)
-    if content.startswith(ZIP):
-        raise InputError(f"{path}: {use_of_content(content)}")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}: is not UTF-8 text (line {line}); save it as UTF-8") from None
 
 
 def parse(text: str, source: str) -> dict[str, Any]:

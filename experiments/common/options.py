@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from experiments.common.errors import InputError, nearest, shortened, shown
+from experiments.common.errors import InputError, nearest, shown
 
 
 def _page_path(path: Path | None) -> Path | None:
     if path is not None and path.suffix != ".html":
-        raise InputError(f"--html: {path} must end in .html; for example --html page.html")
+        raise typer.BadParameter(f"{path} must end in .html")
     return path
 
 
@@ -44,7 +43,7 @@ Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for figures and results; created if needed.")
 ]
 Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints JSON only.")]
-AsJson = Annotated[bool, typer.Option("--json", metavar="", help="Print JSON.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write a table as CSV; - prints CSV only.")]
 TrajectoryCsv = Annotated[
     Path | None,
@@ -63,13 +62,11 @@ Html = Annotated[
 ]
 Overwrite = Annotated[
     bool,
-    typer.Option("--overwrite", metavar="", help="Replace existing files, and write into a folder that is not empty."),
+    typer.Option("--overwrite", help="Replace existing files."),
 ]
 Quiet = Annotated[
     bool,
-    typer.Option(
-        *("--quiet", "-q"), metavar="", callback=_silence_the_compile_notice, help="Print no progress and no tables."
-    ),
+    typer.Option("--quiet", "-q", callback=_silence_the_compile_notice, help="Print no progress and no tables."),
 ]
 
 
@@ -90,26 +87,3 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
     guess = nearest(name, valid)
     hint = f"did you mean {guess}? " if guess else ""
     raise InputError(f"{option}: there is no {shown(name)}; {hint}choose one of: {', '.join(valid)}")
-
-
-def read_number(
-    option: str, kind: type[int] | type[float], text: Any, *, minimum: float | None, maximum: float | None, example: str
-) -> Any:
-    """Return the number in a text; raise `InputError`, with an example, if it is none or outside the limits.
-
-    A value of `kind`, which is the default of the option, is returned unchanged.
-    """
-    if not isinstance(text, str):
-        return text
-    quoted = shortened(text)
-    try:
-        value = kind(text)
-    except ValueError:
-        value, quoted = math.nan, f'"{quoted}"'
-    if not math.isfinite(value):
-        problem = "a whole number" if kind is int else "a finite number"
-    elif (minimum is None or value >= minimum) and (maximum is None or value <= maximum):
-        return value
-    else:
-        problem = f"at least {minimum:g}" if maximum is None else f"from {minimum:g} to {maximum:.10g}"
-    raise InputError(f"{option}: must be {problem}, found {quoted}; for example {example}")

@@ -1,4 +1,4 @@
-"""Files that commands write: checked before the work, written completely or not at all."""
+"""Files that commands write: no file is replaced unasked, each is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import contextlib
 import csv
 import io
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from enum import Enum
@@ -16,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from experiments.common.errors import InputError, on_a_screen
-from sim.storage.files import replace_file, temporary_beside
+from experiments.common.errors import InputError
+from experiments.common.screen import say
+from sim.storage.files import replace_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from sim import HitEstimate, Results
 
 STDOUT = "-"
-
 Cell = str | int | float | bool | None
 
 
@@ -40,7 +39,6 @@ class Output:
         self.files = files
         self.written: list[Path] = []
         self._overwrite = overwrite
-        self._replaces = overwrite
 
     @property
     def stdout_taken(self) -> bool:
@@ -54,19 +52,17 @@ class Output:
     def save(self, name: str, content: str | bytes, option: str | None = None) -> None:
         """Write a file of the folder under its name, and the file of an option with the same content."""
         if self.folder is not None:
-            self._write(self.folder / name, content, self._replaces)
+            self._write(self.folder / name, content)
         if option is not None:
             self.deliver(option, content)
 
     def deliver(self, option: str, content: str | bytes) -> None:
         """Write the file of an option, or print it on stdout, if the option was given."""
         file = self.files.get(option)
-        if file is None:
-            return
-        if str(file) == STDOUT:
+        if file is not None and str(file) == STDOUT:
             typer.echo(content, nl=False)
-        else:
-            self._write(file, content, self._overwrite)
+        elif file is not None:
+            self._write(file, content)
 
     def figure(self, name: str, figure: Figure) -> None:
         """Write a figure into the folder, as PDF and PNG."""
@@ -74,7 +70,7 @@ class Output:
 
         if self.folder is not None:
             for kind, content in figure_bytes(figure):
-                self._write(self.folder / f"{name}.{kind}", content, self._replaces)
+                self._write(self.folder / f"{name}.{kind}", content)
 
     def draw(self, names: Sequence[str], figures: Iterable[Figure | None], progress: Callable[[float], None]) -> None:
         """Write figures under their names, each as soon as it is drawn; None is a figure that a result lacks."""
@@ -85,15 +81,15 @@ class Output:
 
     def enter(self, folder: Path, *names: str) -> None:
         """Continue in a folder into which another function has written these files; files there are replaced."""
-        self.folder, self._replaces = folder, True
+        self.folder, self._overwrite = folder, True
         self.written += [folder / name for name in names]
 
     def add(self, file: Path) -> None:
         """List a file that another function has written."""
         self.written.append(file)
 
-    def _write(self, file: Path, content: str | bytes, overwrite: bool) -> None:
-        write_file(file, content, overwrite=overwrite)
+    def _write(self, file: Path, content: str | bytes) -> None:
+        write_file(file, content, overwrite=self._overwrite)
         self.written.append(file)
 
 
@@ -101,67 +97,52 @@ class Output:
 def output_of(
     options: Any, names: Sequence[str] = (), files: Mapping[str, Path | None] | None = None
 ) -> Iterator[Output]:
-    """Check every file that a command will write before the work begins, and list them on stderr at the end.
+    """Yield the output of a command, and list the written files on stderr at the end.
 
-    The files `names` are written into the folder of ``--out``, which is created; if the work fails, it is removed again
-    as long as it is empty. Single files are those of ``--json``, ``--csv`` and ``--html``, and further ones by the
-    option that names them; the path ``-`` is stdout, which only one may be. Raise `InputError` if a file cannot be
-    written, or would replace an existing one without ``--overwrite``.
+    Parameters
+    ----------
+    options : dataclass
+        Options of the command. Single files are those of ``--json``, ``--csv`` and ``--html``.
+    names : sequence of str
+        Files that the command writes into the folder of ``--out``.
+    files : mapping of str to Path
+        Further single files, by the option that names them.
+
+    Raises
+    ------
+    InputError
+        Before the work, if a file exists and ``--overwrite`` is not given, or two files have the same path.
     """
-    folder = options.out if names else None
     given = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")} | dict(files or {})
     single = {option: path for option, path in given.items() if path is not None}
-    printed = [option for option, path in single.items() if str(path) == STDOUT]
-    if len(printed) > 1:
-        raise InputError(f"{' and '.join(printed)} cannot both be printed on stdout; name a file for one of them")
-    wanted = [("", folder / name) for name in names] if folder is not None else []
-    wanted += [(option, path) for option, path in single.items() if option not in printed]
-    created: list[Path] = []
-    owners: dict[Path, str] = {}
-    try:
-        if folder is not None:
-            _make_folder(folder, options.overwrite, created)
-        for option, path in wanted:
-            _check_file(path, options.overwrite)
-            owner = f"the file of {option}" if option else "a file of --out"
-            if (other := owners.setdefault(path.resolve(), owner)) != owner:
-                raise InputError(f"{option}: {path} is also {other}; choose another name")
-        opened = Output(folder, single, options.overwrite)
-        yield opened
-    finally:
-        for path in reversed(created):
-            with contextlib.suppress(OSError):
-                path.rmdir()
-    if opened.written and not options.quiet:
-        typer.echo(on_a_screen("\n".join(_listed(opened.written))), err=True)
+    folder = options.out if names else None
+    paths = [*single.values(), *(folder / name for name in names if folder is not None)]
+    for number, path in enumerate(paths):
+        if path in paths[:number]:
+            raise InputError(f"{path}: is given twice; choose another name for one of the two files")
+        if str(path) != STDOUT:
+            _check_new(path, options.overwrite)
+    output = Output(folder, single, options.overwrite)
+    yield output
+    if output.written and not options.quiet:
+        for parent in dict.fromkeys(file.parent for file in output.written):
+            written = ", ".join(file.name for file in output.written if file.parent == parent)
+            say(f"wrote {written}" + (f" in {parent}" if parent != Path() else ""), options.quiet)
 
 
-def _listed(files: Sequence[Path]) -> Iterator[str]:
-    """Return a line for each folder, with the files written into it."""
-    for folder in dict.fromkeys(file.parent for file in files):
-        names = ", ".join(file.name for file in files if file.parent == folder)
-        yield f"wrote {names}" + (f" in {folder}" if folder != Path() else "")
-
-
-def _check_file(file: Path, overwrite: bool) -> None:
-    """Check that a file can be written, by creating a temporary file in its folder."""
-    with _reporting(file):
-        _check_name(file, overwrite)
-        probe = temporary_beside(file)
-        try:
-            probe.touch(exist_ok=False)
-        finally:
-            probe.unlink(missing_ok=True)
+def _check_new(file: Path, overwrite: bool) -> None:
+    if file.exists() and not (overwrite and file.is_file()):
+        raise InputError(f"{file}: exists already; choose another name, or give --overwrite to replace a file")
 
 
 def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> None:
-    """Write a file completely or not at all; text is written as UTF-8.
+    """Write a file completely or not at all, text as UTF-8, and create its folder if needed.
 
-    `InputError` if it cannot be written, is a link, or exists and `overwrite` is false.
+    `InputError` if the file exists and `overwrite` is false.
     """
-    with _reporting(file):
-        _check_name(file, overwrite)
-        replace_file(file, content.encode() if isinstance(content, str) else content)
+    _check_new(file, overwrite)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(file, content.encode() if isinstance(content, str) else content)
 
 
 def library_version() -> str:
@@ -212,48 +193,3 @@ def _cell(value: Cell) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value) if isinstance(value, float) else str(value)
-
-
-def _check_name(file: Path, overwrite: bool) -> None:
-    """Raise `InputError` if a file cannot have this name."""
-    if file.is_dir():
-        raise InputError(f"{file}: is a folder; name a file in it, for example {file / 'new-file'}")
-    if os.path.lexists(file):
-        if file.is_symlink():
-            raise InputError(f"{file}: is a link, and links are not followed; remove it, or choose another name")
-        if not file.is_file():
-            raise InputError(f"{file}: exists already and is no ordinary file; choose another name")
-        if not overwrite:
-            raise InputError(f"{file}: exists already; choose another name, or give --overwrite to replace it")
-    if not file.parent.is_dir():
-        raise InputError(f"{file}: there is no folder {file.parent}; make it first")
-    with contextlib.suppress(FileNotFoundError):
-        file.lstat()  # raises OSError if the name is too long
-
-
-def _make_folder(folder: Path, overwrite: bool, created: list[Path]) -> None:
-    """Create a folder if needed, and append the created folders to a list, the outermost first."""
-    with _reporting(folder):
-        if os.path.lexists(folder) and not folder.is_dir():
-            raise InputError(f"{folder}: is a file, not a folder; choose another name for the output folder")
-        for parent in reversed([parent for parent in (folder, *folder.parents) if not parent.exists()]):
-            created.append(parent)  # before it exists, because an interrupt may come between
-            parent.mkdir()
-        if not overwrite and next(folder.iterdir(), None) is not None:
-            raise InputError(
-                f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
-            )
-
-
-@contextlib.contextmanager
-def _reporting(path: Path) -> Iterator[None]:
-    """Turn an error of the file system into an `InputError` with the path and the reason."""
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(
-            f"{path}: cannot be written: {reason}; choose a folder in which you have write permission"
-        ) from None

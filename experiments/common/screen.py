@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import typer
-from rich.cells import cell_len
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -20,10 +19,6 @@ from sim.statistics import level_name, shows
 BeginProgress = Callable[[str], Callable[[float], None]]
 Part = str | Text | Table
 """A line or a table of a result on the screen."""
-_GAP = 2
-"""Width of the space between the columns of a table."""
-_NARROWEST_TEXT = 12
-"""Width to which texts in a table are wrapped before the table is divided; no word is divided."""
 LINE_EVERY_S = 30.0
 """Time between two lines of progress in a log."""
 NOT_FINITE = (
@@ -51,24 +46,18 @@ def say_warnings(warnings: Iterable[str], quiet: bool, notes: Iterable[str] = ()
         say(f"warning: {warning}", quiet)
 
 
-def table_console(stdout_taken: bool) -> Console:
-    """Return the console for tables and lines: stdout, or stderr if a file is printed on stdout."""
-    return Console(stderr=stdout_taken, highlight=False, markup=False, emoji=False)
-
-
 def show(parts: Iterable[Part], quiet: bool, *, stdout_taken: bool = False) -> None:
-    """Print a result, unless `quiet`: lines, which the terminal wraps, and tables of `number_table`."""
+    """Print lines, which the terminal wraps, and tables on stdout, or on stderr if a file is printed on stdout."""
     if not quiet:
-        print_parts(table_console(stdout_taken), parts)
-
-
-def print_parts(console: Console, parts: Iterable[Part]) -> None:
-    """Print lines, which the terminal wraps, and tables of `number_table`."""
-    for part in parts:
-        if isinstance(part, Table):
-            _print_table(console, part)
-        else:
-            console.print(part, soft_wrap=True)
+        console = Console(stderr=stdout_taken, highlight=False, markup=False, emoji=False)
+        for part in parts:
+            if isinstance(part, Table):
+                for column in part.columns:  # no word and no number is divided: a line may be longer than the screen
+                    words = [word for cell in (column.header, *column.cells) for word in str(cell).split()]
+                    column.min_width = max(map(len, words), default=0)
+                console.print(part, crop=False)
+            else:
+                console.print(part, soft_wrap=True)
 
 
 def number_table(*titles: str, left: int = 1) -> Table:
@@ -77,36 +66,6 @@ def number_table(*titles: str, left: int = 1) -> Table:
     for title in titles[left:]:
         table.add_column(title, justify="right")
     return table
-
-
-def _print_table(console: Console, table: Table) -> None:
-    """Print a table; if the screen is too narrow, print it in parts, each with the columns of text.
-
-    No number is cut or wrapped: texts are wrapped, and a part has as many columns of numbers as fit, and at least one.
-    """
-    cells = [[str(cell) for cell in (column.header, *column.cells)] for column in table.columns]
-    widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) + _GAP for column in cells]
-    left = [index for index, column in enumerate(table.columns) if column.justify != "right"]
-    for index in left:
-        words = [cell_len(word) for cell in cells[index] for word in cell.split()]
-        widths[index] = min(widths[index], max(_NARROWEST_TEXT, *words, 0) + _GAP)
-    parts: list[list[int]] = []
-    used = room = console.width + _GAP - sum(widths[index] for index in left)
-    for index in sorted(set(range(len(widths))) - set(left)):
-        used += widths[index]
-        if used > room:
-            parts.append([])
-            used = widths[index]
-        parts[-1].append(index)
-    for number, numbers in enumerate(parts):
-        part = Table(box=None, pad_edge=False)
-        chosen = sorted([*left, *numbers])
-        for index in chosen:
-            column = table.columns[index]
-            part.add_column(column.header, justify=column.justify, no_wrap=index not in left and widths[index] <= room)
-        for row in zip(*(table.columns[index].cells for index in chosen), strict=True):
-            part.add_row(*row)
-        console.print(*([""] if number else []), part, sep="\n")
 
 
 @contextlib.contextmanager
@@ -119,7 +78,7 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
         yield lambda _name: lambda _done: None
         return
     if not sys.stderr.isatty():
-        yield _progress_lines()
+        yield _progress_lines
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
@@ -131,25 +90,16 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
         yield begin
 
 
-def _progress_lines() -> BeginProgress:
-    """Return the function of `progress_bar` for a log: a line with all unfinished parts every `LINE_EVERY_S`."""
-    shares: dict[str, float] = {}
+def _progress_lines(name: str) -> Callable[[float], None]:
     last_s = time.monotonic()
 
-    def begin(name: str) -> Callable[[float], None]:
-        shares[name] = 0.0
+    def progress(done: float) -> None:
+        nonlocal last_s
+        if time.monotonic() - last_s >= LINE_EVERY_S:
+            last_s = time.monotonic()
+            say(f"{name}: {100.0 * done:.0f} %", quiet=False)
 
-        def progress(done: float) -> None:
-            nonlocal last_s
-            shares[name] = done
-            if time.monotonic() - last_s >= LINE_EVERY_S:
-                last_s = time.monotonic()
-                parts = ", ".join(f"{part} {100.0 * share:.0f} %" for part, share in [*shares.items()] if share < 1.0)
-                say(f"progress: {parts}", quiet=not parts)
-
-        return progress
-
-    return begin
+    return progress
 
 
 def number(value: float | None) -> str:

@@ -77,10 +77,11 @@ RecordFile = Annotated[
 
 @dataclass(frozen=True)
 class Experiment(FileOptions):
-    """Simulate many runs of four cases (curves): random or game noise, without or with the range sensor.
+    """Simulate many runs with random noise and with game noise.
 
-    Game noise is measurement errors chosen against the guidance. Run K starts from the same state in all four cases,
-    and is the same engagement as in: infoset engage --run K. Without --out, --json or --csv no file is written.
+    There are four cases (curves): random or game noise, without or with the range sensor. Game noise is measurement
+    errors chosen against the guidance. Run K starts from the same state in all four cases, and is the same engagement
+    as in: infoset engage --run K. Without --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -98,10 +99,10 @@ class Experiment(FileOptions):
 
 @dataclass(frozen=True)
 class Engage(FileOptions):
-    """Simulate one engagement and show its result; with --noise both, one with each kind of noise.
+    """Simulate one engagement.
 
-    Run K has exactly the same numbers as run K of infoset experiment with the same seed.
-    Without --out, --json, --csv or --record no file is written.
+    With --noise both, there is one with each kind of noise. Run K has exactly the same numbers as run K of infoset
+    experiment with the same seed. Without --out, --json, --csv or --record no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -127,12 +128,11 @@ class Engage(FileOptions):
 
 @dataclass(frozen=True)
 class Compare(FileOptions):
-    """Compare strategies by miss and spent impulse, with random noise and with game noise.
+    """Compare guidance strategies by miss and spent impulse.
 
-    Run K has the same initial state and the same random errors for all strategies. Game noise is simulated with each
-    of its four tie rules, and a run is represented by the worst of the four. Run K is the same engagement as in:
-    infoset engage --model guaranteed --run K.
-    Without --out, --json or --csv no file is written.
+    Run K has the same initial state and the same random errors for all strategies. Game noise is simulated with each of
+    its four tie rules, and a run is represented by the worst of the four. Run K is the same engagement as in: infoset
+    engage --model guaranteed --run K. Without --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -149,14 +149,15 @@ class Compare(FileOptions):
 
 @dataclass(frozen=True)
 class Bound(FileOptions):
-    """Compute a lower bound of the guaranteed miss of all strategies, and simulate the pairs of states that prove it.
+    """Compute a lower bound of the guaranteed miss.
 
-    Two true states whose measurements are equal until some step receive equal impulses until that step, so at least
-    one of them misses. The bound is the maximum miss, the minimum distance of the flight, that such pairs prove. In
-    space, the two states differ along both axes if the errors of the angles are in a box, and along one axis if they
-    are in a disc. Each strategy is simulated with these pairs, and in the searches of infoset adversary. Where range
-    and closing speed are known and there is no gravity, the bound is the value of the game up to a reserve, which is
-    printed; otherwise the minimum of the maximum misses found is. Without --out or --json no file is written.
+    It holds for all strategies. The pairs of states that prove the bound are simulated. Two true states whose
+    measurements are equal until some step receive equal impulses until that step, so at least one of them misses. The
+    bound is the maximum miss, the minimum distance of the flight, that such pairs prove. In space, the two states
+    differ along both axes if the errors of the angles are in a box, and along one axis if they are in a disc. Each
+    strategy is simulated with these pairs, and in the searches of infoset adversary. Where range and closing speed are
+    known and there is no gravity, the bound is the value of the game up to a reserve, which is printed; otherwise the
+    minimum of the maximum misses found is. Without --out or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -177,7 +178,7 @@ class Bound(FileOptions):
 
 @dataclass(frozen=True)
 class Adversary(FileOptions):
-    """Search for the initial state, the measurement errors and the target that give the maximum miss of a strategy.
+    """Search for the engagement with the maximum miss.
 
     The search covers all initial states that the scenario allows, all errors within their bounds and, in the model
     guaranteed, targets that accelerate at the bound of the model. Two misses of the worst engagement are printed: the
@@ -213,7 +214,10 @@ class Adversary(FileOptions):
 
 @dataclass(frozen=True)
 class Replay:
-    """Show records of `infoset engage --record` without simulating again: page, animations, figures."""
+    """Show records of engagements: page, animation, figures.
+
+    Records are written by infoset engage --record. Nothing is simulated again.
+    """
 
     records: Annotated[
         list[Path], typer.Argument(metavar="A.npz [B.npz]", help="One record, or two records to show side by side.")

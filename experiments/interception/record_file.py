@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from experiments.common.errors import InputError, on_a_screen
-from experiments.common.file_kinds import ZIP, read_input, use_of_content
+from experiments.common.input_file import read_input
 from experiments.common.output import write_file
 from infoset import ConvexPolygons, Section
 from infoset.limits import MAXIMUM
@@ -125,7 +125,7 @@ def load_record(path: str | os.PathLike[str]) -> Record:
     `InputError` if the file is not a record, or is damaged.
     """
     file = Path(path)
-    content = read_input(file, "record", MAX_FILE_BYTES, REMEDY, only_ordinary=True)
+    content = read_input(file, MAX_FILE_BYTES)
     try:
         arrays = _read_arrays(content)
         header = from_json(Header, json.loads(arrays["header"].tobytes()))
@@ -134,8 +134,7 @@ def load_record(path: str | os.PathLike[str]) -> Record:
         return _to_record(header, arrays)
     except (ValueError, RecursionError) as error:
         reason = on_a_screen(str(error)[:LONGEST_REASON])
-    use = None if content.startswith(ZIP) else use_of_content(content)
-    raise InputError(f"{file}: {use or f'is not a readable record: {reason}; {REMEDY}'}")
+    raise InputError(f"{file}: is not a readable record: {reason}; {REMEDY}")
 
 
 def _to_arrays(record: Record) -> Arrays:

@@ -12,10 +12,11 @@ from experiments.common.options import FileOptions, Html, ProblemName, Settings,
 
 @dataclass(frozen=True)
 class Multipoint(FileOptions):
-    """Visit several moving targets with minimum energy, by flybys or rendezvous.
+    """Visit several moving targets with minimum energy.
 
-    With --order best and --times given, the times of the file are kept and the targets are exchanged: the target that
-    is visited first has the earliest time. Without --out, --json, --csv or --html no file is written.
+    Each target is visited by a flyby or a rendezvous. With --order best and --times given, the times of the file are
+    kept and the targets are exchanged: the target that is visited first has the earliest time. Without --out, --json,
+    --csv or --html no file is written.
 
     Axes: with orbit_rate_rad_s, x radially outward, y along the motion, z along the orbit's normal; otherwise inertial.
     """

@@ -23,11 +23,11 @@ class Errors(Enum):
 
 @dataclass(frozen=True)
 class Observe(FileOptions):
-    """Compute the sets of states of a linear system that agree with its measurements.
+    """Compute the sets of states that agree with measurements.
 
-    The system is x+ = A x + B u + c + w with w in a set W, and y = C x + v with v within bounds. The sets are exact up
-    to rounding, and contain the true state if w and v are in their sets. The measurements are in a CSV file or in the
-    problem file; otherwise they are simulated.
+    The linear system is x+ = A x + B u + c + w with w in a set W, and y = C x + v with v within bounds. The sets are
+    exact up to rounding, and contain the true state if w and v are in their sets. The measurements are in a CSV file or
+    in the problem file; otherwise they are simulated.
 
     Without --out, --json, --csv or --html no file is written.
     """

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.common.errors import InputError, shown
-from experiments.common.file_kinds import read_input
+from experiments.common.input_file import read_input
 from experiments.observer.command import MAX_STEPS, Errors
 from experiments.observer.file import ObserverProblem
 from infoset import Zonotope
@@ -105,7 +105,7 @@ def read_csv(file: Path, outputs: int, inputs: int) -> Data:
     """
     names = [f"y{number}" for number in range(1, outputs + 1)] + [f"u{number}" for number in range(1, inputs + 1)]
     form = f"the header must be {','.join(names)}, and each row has their numbers; an empty cell of y is missing"
-    content = read_input(file, "data file", MAX_CSV_BYTES, form)
+    content = read_input(file, MAX_CSV_BYTES)
     try:
         table = list(csv.reader(content.decode("utf-8-sig").rstrip().splitlines()))
     except (UnicodeDecodeError, csv.Error) as error:

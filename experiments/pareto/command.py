@@ -12,11 +12,12 @@ from experiments.common.options import FileOptions, Html, ProblemName, Settings,
 
 @dataclass(frozen=True)
 class Pareto(FileOptions):
-    """Find a meeting of several craft that is Pareto-optimal: no craft can save energy unless another one uses more.
+    """Find a Pareto-optimal meeting of several craft.
 
-    Each craft moves with minimum energy. The excess of a craft is its cost minus the cost of its cheapest meeting. The
-    meeting minimizes the group loss, which is the weighted sum of the excesses. Other choices of the meeting, the
-    coalitions and the bound on the control are also evaluated.
+    Pareto-optimal means that no craft can save energy unless another one uses more. Each craft moves with minimum
+    energy. The excess of a craft is its cost minus the cost of its cheapest meeting. The meeting minimizes the group
+    loss, which is the weighted sum of the excesses. Other choices of the meeting, the coalitions and the bound on the
+    control are also evaluated.
 
     Without --out, --json, --csv or --html no file is written.
 

@@ -12,11 +12,11 @@ from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed
 
 @dataclass(frozen=True)
 class Pursuit(FileOptions):
-    """Solve the game of two spacecraft in which the pursuer minimizes the time of capture and the evader maximizes it.
+    """Solve the game of a pursuing and an evading spacecraft.
 
-    Each capture has a certificate (a list of checks). The result is called a saddle point only if no check fails. The
-    check with the longest computation, a search in all directions, is made with --certify only.
-    Without --out, --json, --csv or --html no file is written.
+    The pursuer minimizes the time of capture, and the evader maximizes it. Each capture has a certificate (a list of
+    checks). The result is called a saddle point only if no check fails. The check with the longest computation, a
+    search in all directions, is made with --certify only. Without --out, --json, --csv or --html no file is written.
 
     Axes: inertial, z along the planet's axis. Figures and pages also show the pursuer relative to the evader: x
     radially outward, y along the motion, z along the orbit's normal (Hill's).
@@ -63,10 +63,11 @@ class Pursuit(FileOptions):
 
 @dataclass(frozen=True)
 class PursuitMap(FileOptions):
-    """Solve a game on a grid of two parameters: phase_deg (lead of the evader), thrust_ratio, mass_ratio, or any key.
+    """Solve a pursuit game on a grid of two parameters.
 
-    The solution of a point starts from those of its neighbours; some points are solved from scratch as a check. A
-    point without a certified solution has no capture time. Without --out, --json or --csv no file is written.
+    A parameter is phase_deg (lead of the evader), thrust_ratio, mass_ratio, or any key of the file. The solution of a
+    point starts from those of its neighbours; some points are solved from scratch as a check. A point without a
+    certified solution has no capture time. Without --out, --json or --csv no file is written.
     """
 
     problem: ProblemName = "geo-pursuit"

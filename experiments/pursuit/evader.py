@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from experiments.common.errors import InputError
-from experiments.common.file_kinds import read_input
+from experiments.common.input_file import read_input
 from experiments.common.options import choice
 from rendezvous.pursuit_evasion import Policy, RandomSteering, Script, Steering
 
@@ -38,7 +38,7 @@ def evader_policy(name: str, seed: int) -> EvaderPolicy:
 
 def _script(path: Path) -> Script:
     """Read a script: lines of time_s,policy."""
-    content = read_input(path, "script", MAX_SCRIPT_BYTES, _EXAMPLE)
+    content = read_input(path, MAX_SCRIPT_BYTES)
     times_s, policies = [], []
     try:
         for time_s, policy in csv.reader(content.decode("utf-8").splitlines()):

@@ -12,11 +12,11 @@ from experiments.common.options import FileOptions, Html, ProblemName, Seed, Set
 
 @dataclass(frozen=True)
 class Reach(FileOptions):
-    """Compute all optimal controls of a rendezvous under constraints, and its reachable sets.
+    """Compute reachable sets and optimal controls of a rendezvous.
 
-    The results are the minimum terminal norm, the forward sets, the tube of all optimal trajectories, and the set of
-    all optimal controls. Selected optimal controls are simulated on the linear and on the nonlinear model. Without
-    --out, --json, --csv or --html no file is written.
+    The rendezvous has constraints. The results are the minimum terminal norm, the forward sets, the tube of all optimal
+    trajectories, and the set of all optimal controls. Selected optimal controls are simulated on the linear and on the
+    nonlinear model. Without --out, --json, --csv or --html no file is written.
 
     Axes: x radially outward, y along the motion, z along the orbit's normal (Hill's), at the passive craft.
     """

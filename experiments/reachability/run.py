@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.common.errors import InputError
-from experiments.common.options import choice, read_number
+from experiments.common.errors import InputError, input_errors
+from experiments.common.options import choice
 from experiments.common.problem_command import ProblemCommand
 from experiments.common.screen import BeginProgress
 from experiments.reachability.command import Reach
@@ -107,9 +107,10 @@ def _selection(text: str) -> tuple[list[str], int]:
         name, _, digits = part.strip().partition(":")
         name = choice("--select", name, [*SINGLE, VERTICES, SAMPLES])
         if name == SAMPLES:
-            count = read_number(
-                f"--select {SAMPLES}", int, digits, minimum=1, maximum=MAX_SAMPLES, example="--select samples:20"
-            )
+            with input_errors(f"--select {SAMPLES}"):
+                count = int(digits)
+            if not 1 <= count <= MAX_SAMPLES:
+                raise InputError(f"--select {SAMPLES}: must be between 1 and {MAX_SAMPLES}, found {count}")
         names.append(name)
     return names, count
 

@@ -1,3 +1,5 @@
+"""The command line: help, messages, exit codes and files, with the commands `experiment`, `engage` and `replay`."""
+
 from __future__ import annotations
 
 import csv
@@ -9,17 +11,16 @@ import signal
 import subprocess
 import sys
 import time
-from itertools import chain, product
+from itertools import product
 from pathlib import Path
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 import pytest
 
-from experiments.cli import COMMANDS
-from experiments.common.command import LOADING
-from experiments.common.errors import InputError
-from experiments.common.options import FileOptions
-from experiments.common.output import output_of, to_csv, to_json, write_file
+from experiments.cli import RUNS, commands
+from experiments.common import screen
+from experiments.common.errors import on_a_screen
+from experiments.common.output import to_csv, to_json, write_file
 from experiments.interception.scenario_file import load_scenario
 from infoset import kernels
 from sim import Scenario, simulate
@@ -31,17 +32,8 @@ from tests.experiments.command_line import Command
 pytestmark = pytest.mark.usefixtures("unrendered")
 
 CURVE_KEYS = [
-    "published_curve",
-    "noise",
-    "range_sensor",
-    "miss_m",
-    "impulse_m_s",
-    "guaranteed_miss_m",
-    "outcome",
-    "set_emptied",
-    "truth_kept",
-    "truth_margin_m",
-    "phi_held",
+    *("published_curve", "noise", "range_sensor", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome"),
+    *("set_emptied", "truth_kept", "truth_margin_m", "phi_held"),
 ]
 OUTCOMES = {"arrived", "set-empty", "budget-spent", "diverged"}
 
@@ -54,66 +46,75 @@ def test_version(infoset: Command) -> None:
     assert infoset("--version") == (0, f"infoset {versions()['infoset']}\n", "")
 
 
-@pytest.mark.parametrize("command", [[], ["experiment"], ["engage"], ["replay"], ["scenarios"]])
-def test_help_has_an_example(command: list[str], infoset: Command) -> None:
-    code, out, _ = infoset(*command, "--help")
+def test_the_list_of_commands_fits_80_columns(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert infoset()[0] == 2
+    code, out, _ = infoset("--help")
+    listed = out.partition("Commands:")[2]
     assert code == 0
-    assert "Example: infoset" in out
-
-
-@pytest.mark.parametrize(
-    ("command", "arguments"),
-    [("scenarios show", "{NAME}"), ("scenarios new", "{FILE}"), ("problems new", "{FILE}")],
-)
-def test_help_names_the_arguments(command: str, arguments: str, infoset: Command) -> None:
-    code, out, _ = infoset(*command.split(), "--help")
-    assert code == 0
-    assert f"Usage: infoset {command} [OPTIONS] {arguments}" in out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["zzz"], "error: no such command 'zzz'; see infoset --help\n"),
-        (["--zzz"], "error: no such option: --zzz; see infoset --help\n"),
-        (["experiment", "--zzz"], "error: no such option: --zzz; see infoset experiment --help\n"),
-        (["scenarios", "zzz"], "error: no such command 'zzz'; see infoset scenarios --help\n"),
-        (["campaign"], "error: missing option '--runs'; see infoset campaign --help\n"),
-        (["experiment", "--runs"], "error: option '--runs' requires an argument; see infoset COMMAND --help\n"),
-        (
-            ["experiment", "--runs", "many"],
-            'error: --runs: must be a whole number, found "many"; for example --runs 50\n',
-        ),
-    ],
-)
-def test_what_the_command_does_not_know(arguments: list[str], message: str, infoset: Command) -> None:
-    assert infoset(*arguments) == (2, "", message)
-
-
-@pytest.mark.parametrize("arguments", [["replay"], ["reach", "rendezvous-2021", "second"], ["experimnt"]])
-def test_mistakes_in_a_command_line_are_one_line(arguments: list[str], infoset: Command) -> None:
-    message = infoset.refused(*arguments)
-    assert message.count("\n") == 1
-    assert "see infoset" in message
-
-
-def test_the_bare_command_prints_its_help(infoset: Command) -> None:
-    code, out, err = infoset()
-    assert (code, out) == (2, "")
-    assert "Usage: infoset" in err
+    assert "..." not in listed
+    for name, command in commands().commands.items():
+        assert name in listed
+        assert "Example: infoset" in infoset(name, "--help")[1]
+        for inner in getattr(command, "commands", {}):
+            assert "Example: infoset" in infoset(name, inner, "--help")[1]
 
 
 def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_draws() -> None:
-    heavy = ["numpy", "numba", "pydantic", "matplotlib", "scipy", "shapely", "infoset", "sim"]
+    heavy = ["numpy", "numba", "pydantic", "matplotlib", "scipy", "shapely", "rich", "infoset", "sim"]
     drawing = ["matplotlib", "PIL", "scipy.stats"]
     code = (
-        "import importlib, sys; from experiments.cli import COMMANDS; "
+        "import importlib, sys; from experiments.cli import RUNS; "
         f"print([name for name in {heavy} if name in sys.modules]); "
-        "[importlib.import_module(f'experiments.{module}') for rows in COMMANDS.values() for _, module, _ in rows]; "
+        "[importlib.import_module(module) for module in RUNS.values()]; "
         f"print([name for name in {drawing} if name in sys.modules])"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.split() == ["[]", "[]"]
+
+
+def test_the_run_of_every_command_takes_its_options() -> None:
+    for options, module in RUNS.items():
+        hints = get_type_hints(importlib.import_module(module).run)
+        assert hints in ({"options": options, "return": type(None)}, {"options": Any, "return": type(None)})
+
+
+@pytest.mark.parametrize(
+    ("line", "part"),
+    [
+        ("zzz", "No such command 'zzz'"),
+        ("experiment --zzz", "No such option: --zzz"),
+        ("campaign", "Missing option '--runs'"),
+        ("replay", "Missing argument"),
+        ("experiment --runs many", "'--runs'"),
+        ("experiment --runs 0", "'--runs'"),
+        ("experiment --seed -1", "'--seed'"),
+        ("pursuit --delay-s nan", "'--delay-s'"),
+        ("engage --noise gmae", "'random', 'game', 'both'"),
+        ("pareto --html page.pdf", "page.pdf must end in .html"),
+        ("experiment --strategy symetric-miss", "did you mean symmetric-miss?"),
+        ("experiment --strategy [red]", 'there is no "[red]"'),
+        ("experiment --sections 4", "fewest_sections"),
+        ("engage asteroid-1997-single --range-sensor", "[range_sensor]"),
+        ("engage asteroid-1996", "did you mean"),
+        ("experiment no/such.toml", "no/such.toml: cannot be read: No such file"),
+        ("experiment .", "error: .: cannot be read: Is a directory"),
+        ("engage --record flight", "must end in .npz"),
+        ("engage --json - --csv -", "is given twice"),
+        ("engage --json x --csv x", "is given twice"),
+        ("engage --json out/results.json --out out", "is given twice"),
+        ("engage --json .", ".: exists already"),
+        ("engage --csv /dev/null --overwrite", "/dev/null: exists already"),
+        (f"engage --json {'n' * 300}", "File name too long"),
+    ],
+)
+def test_what_is_wrong_is_one_message_before_the_work(
+    line: str, part: str, infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim.parallel.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("experiments.interception.runs.engage.fly_one", lambda *_: pytest.fail("began to work"))
+    assert part in " ".join(infoset.refused(*line.split()).split())
+    assert names_in(tmp_path) == []
 
 
 def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
@@ -154,15 +155,7 @@ def test_experiment_prints_json_alone_and_the_table_beside_it(infoset: Command, 
 def test_table_of_the_experiment(infoset: Command, brief_file: Path, tmp_path: Path) -> None:
     code, out, _ = infoset("experiment", "--runs", 2)
     assert code == 0
-    for part in (
-        "p10",
-        "p50",
-        "p90",
-        "p99",
-        "impulse, m/s",
-        "the paper's Phi (not a bound here), m",
-        "  + range sensor",
-    ):
+    for part in ("p10", "p99", "impulse, m/s", "the paper's Phi (not a bound here), m", "  + range sensor"):
         assert part in out
     assert out.count("true state inside the set at every step: ") == 4
     assert "miss within the bound Phi" not in out
@@ -172,10 +165,6 @@ def test_table_of_the_experiment(infoset: Command, brief_file: Path, tmp_path: P
     )
     assert names_in(tmp_path) == []
     assert "paper, one run" not in infoset("experiment", brief_file, "--runs", 1)[1]
-
-
-def test_quiet_experiment_prints_nothing(infoset: Command, brief_file: Path) -> None:
-    assert infoset("experiment", brief_file, "--runs", 1, "-q") == (0, "", "")
 
 
 def test_without_a_range_sensor_there_are_two_curves_and_it_is_said(infoset: Command) -> None:
@@ -200,15 +189,8 @@ def test_experiment_into_a_folder(infoset: Command, tmp_path: Path) -> None:
     beside = tmp_path / "beside.csv"
     code, _, _ = infoset("experiment", "--runs", 2, "--out", folder, "--csv", beside, "--tie", "lower", "--sections", 9)
     assert code == 0
-    assert names_in(folder) == [
-        "figure-4-distributions.pdf",
-        "figure-4-distributions.png",
-        "figure-corridor.pdf",
-        "figure-corridor.png",
-        "results.csv",
-        "results.json",
-        "scenario.toml",
-    ]
+    drawn = [f"figure-{name}.{kind}" for name in ("4-distributions", "corridor") for kind in ("pdf", "png")]
+    assert names_in(folder) == [*drawn, "results.csv", "results.json", "scenario.toml"]
     found = json.loads((folder / "results.json").read_text())
     flown = load_scenario(folder / "scenario.toml")
     assert (flown.tie.value, flown.set_model.sections) == ("lower", 9)
@@ -259,21 +241,11 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     assert (found["run"], found["seed"], found["noise"], found["range_sensor"]) == (0, 0, "random", True)
     assert found["outcome"] in OUTCOMES
     steps = found["steps"]
-    assert all(
-        list(step)
-        == [
-            *(
-                "time_s",
-                "measured_angle_rad",
-                "measured_range_m",
-                "measured_rate_rad_s",
-                "true_angle_rad",
-                "true_rate_rad_s",
-            ),
-            *("impulse_m_s", "predicted_miss_m", "sections", "truth_margin_m"),
-        ]
-        for step in steps
-    )
+    columns = [
+        *("time_s", "measured_angle_rad", "measured_range_m", "measured_rate_rad_s", "true_angle_rad"),
+        *("true_rate_rad_s", "impulse_m_s", "predicted_miss_m", "sections", "truth_margin_m"),
+    ]
+    assert all(list(step) == columns for step in steps)
     assert [step["time_s"] for step in steps[:3]] == [0.0, 0.5, 1.0]
     first, last = steps[0], steps[-1]
     lower, upper = first["predicted_miss_m"]
@@ -300,18 +272,9 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
     arguments = ["engage", "asteroid-1997-single", "--noise", "both"]
     code, out, _ = infoset(*arguments, "--out", folder, "--record", record, "--csv", steps)
     assert code == 0
+    drawn = [f"figure-{name}.{kind}" for name in ("2-process", "3-sets", "approach") for kind in ("pdf", "png")]
     assert names_in(folder) == [
-        "figure-2-process.pdf",
-        "figure-2-process.png",
-        "figure-3-sets.pdf",
-        "figure-3-sets.png",
-        "figure-approach.pdf",
-        "figure-approach.png",
-        "record-game.npz",
-        "record-random.npz",
-        "results.json",
-        "scenario.toml",
-        "steps.csv",
+        *(*drawn, "record-game.npz", "record-random.npz", "results.json", "scenario.toml", "steps.csv")
     ]
     for part in ("4.3", "244.7", "9.5", "521.7", "paper", "arrived", "the paper's Phi (not a bound here), m"):
         assert part in out
@@ -339,74 +302,6 @@ def test_figures_of_a_record_are_those_of_its_flight(infoset: Command, brief_fil
     assert (again / "figure-3-sets.png").read_bytes() == (folder / "figure-3-sets.png").read_bytes()
 
 
-def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
-    assert infoset("engage", "--record", "a.npz", "-q") == (0, "", "")
-    assert names_in(tmp_path) == ["a.npz"]
-    code, out, err = infoset("replay", "a.npz")
-    assert code == 0
-    assert "asteroid-1997" in out
-    assert "--out DIR writes the figures" in err
-    assert names_in(tmp_path) == ["a.npz"]
-    assert "one record or two records" in infoset.refused("replay", "a.npz", "a.npz", "a.npz")
-    assert "there is no such file" in infoset.refused("replay", "b.npz", "--out", "out")
-    assert names_in(tmp_path) == ["a.npz"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["experiment", "--runs", "0"], ["--runs: must be from 1 to 10000000, found 0; for example --runs 50"]),
-        (["experiment", "--runs", "-3"], ["--runs: must be from 1 to 10000000, found -3; for example --runs 50"]),
-        (["experiment", "--runs", "abc"], ['--runs: must be a whole number, found "abc"; for example --runs 50']),
-        (["experiment", "--sections", "3.5"], ['--sections: must be a whole number, found "3.5"; for example']),
-        (["pursuit", "--delay-s", "nan"], ["--delay-s: must be a finite number, found nan; for example --delay-s 0.0"]),
-        (["experiment", "--runs", "10000001"], ["--runs", " to 10000000, found "]),
-        (["experiment", "--runs", "9" * 100], ["--runs", " to 10000000, found "]),
-        (["experiment", "--seed", "-1"], ["--seed", "must be at least 0, found -1; for example --seed 0"]),
-        (["engage", "--seed", "-1"], ["--seed", "must be at least 0, found -1; for example --seed 0"]),
-        (["engage", "--run", "-1"], ["--run", "must be from 0 to "]),
-        (["engage", "--run", "9" * 30], ["--run", " to 9999999, found "]),
-        (["experiment", "--strategy", "symetric-miss"], ["--strategy", "did you mean symmetric-miss?"]),
-        (["experiment", "--strategy", "[red]"], ["--strategy", "[red]", "choose one of"]),
-        (
-            ["engage", "--model", "papr"],
-            ["--model", 'there is no "papr"; did you mean paper? choose one of: paper, guaranteed'],
-        ),
-        (["engage", "--tie", "uper"], ["--tie", 'there is no "uper"; did you mean upper? choose one of: upper, lower']),
-        (
-            ["engage", "--noise", "gmae"],
-            ["--noise", 'there is no "gmae"; did you mean game? choose one of: random, game, both'],
-        ),
-        (["experiment", "--sections", "4"], ["--sections", "from 5", "fewest_sections", "found 4"]),
-        (["experiment", "--sections", "100001"], ["--sections", "found 100001"]),
-        (["engage", "asteroid-1997-single", "--range-sensor"], ["--range-sensor", "[range_sensor]", "relative_error"]),
-        (["engage", "asteroid-1996"], ["asteroid-1996", "did you mean"]),
-        (["experiment", "no/such.toml"], ["no/such.toml"]),
-        (["experiment", "."], ["."]),
-        (["engage", "--record", "flight"], ["--record", "must end in .npz"]),
-        (["engage", "--json", "-", "--csv", "-"], ["--json and --csv", "stdout"]),
-        (["engage", "--json", "x", "--csv", "x"], ["--csv", "also the file of --json"]),
-        (["engage", "--json", "out/results.json", "--out", "out"], ["--json", "also a file of --out"]),
-        (["engage", "--json", "missing/x.json"], ["there is no folder missing"]),
-        (["engage", "--json", ""], ["is a folder"]),
-        (["engage", "--json", "n" * 300], ["cannot be written"]),
-        (["engage", "--csv", "/dev/null", "--overwrite"], ["no ordinary file"]),
-        (["engage", "--out", "/dev/null"], ["is a file"]),
-        (["engage", "--out", "/dev/null/x"], ["cannot be written"]),
-        (["engage", "--out", "n" * 300], ["cannot be written"]),
-    ],
-)
-def test_what_is_wrong_is_said_before_the_work(
-    arguments: list[str], parts: list[str], infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("sim.parallel.simulate", lambda *_: pytest.fail("began to work"))
-    monkeypatch.setattr("experiments.interception.runs.engage.fly_one", lambda *_: pytest.fail("began to work"))
-    message = infoset.refused(*arguments)
-    for part in parts:
-        assert part in message
-    assert names_in(tmp_path) == []
-
-
 @pytest.mark.parametrize(
     ("option", "name"), [("--json", "x.json"), ("--csv", "x.csv"), ("--record", "x.npz"), ("--out", "x")]
 )
@@ -427,69 +322,6 @@ def test_nothing_is_replaced_unless_told(
     assert names_in(tmp_path) == [name]
 
 
-def test_a_record_of_either_noise_is_not_replaced(infoset: Command, tmp_path: Path) -> None:
-    (tmp_path / "x-game.npz").write_text("precious")
-    message = infoset.refused("engage", "--noise", "both", "--record", tmp_path / "x.npz")
-    assert "x-game.npz" in message
-    assert names_in(tmp_path) == ["x-game.npz"]
-
-
-def test_a_folder_that_may_not_be_written_is_found_before_the_work(
-    infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(*_: object, **__: object) -> None:  # chmod does not stop root
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr("sim.parallel.simulate", lambda *_: pytest.fail("began to work"))
-    with monkeypatch.context() as patched:
-        patched.setattr(Path, "mkdir", refuse)
-        message = infoset.refused("experiment", "--out", "out")
-    assert message.startswith("error: out: cannot be written: Permission denied")
-    assert names_in(tmp_path) == []
-
-
-def test_a_folder_made_for_work_that_failed_is_taken_away(tmp_path: Path) -> None:
-    def work() -> None:
-        with output_of(FileOptions(out=tmp_path / "a" / "b"), ["x"]):
-            assert (tmp_path / "a" / "b").is_dir()
-            raise RuntimeError("no")
-
-    with pytest.raises(RuntimeError, match="no"):
-        work()
-    assert names_in(tmp_path) == []
-
-
-@pytest.mark.parametrize("target", ["file", "folder", "nothing"])
-@pytest.mark.parametrize("asked", ["--out out", "--json out/results.json", "--csv out/results.json"])
-def test_no_link_is_followed(asked: str, target: str, infoset: Command, brief_file: Path, tmp_path: Path) -> None:
-    elsewhere = tmp_path / "elsewhere"
-    if target == "file":
-        elsewhere.write_text("precious")
-    elif target == "folder":
-        elsewhere.mkdir()
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "results.json").symlink_to(elsewhere)
-    before = names_in(tmp_path)
-    message = infoset.refused("experiment", brief_file, "--runs", 1, "--overwrite", *asked.split())
-    assert "out/results.json: is a " in message
-    assert names_in(tmp_path) == before
-    assert (tmp_path / "out" / "results.json").is_symlink()
-    assert names_in(tmp_path / "out") == ["results.json"]
-    if target == "file":
-        assert elsewhere.read_text() == "precious"
-
-
-def test_a_link_is_not_written_through(tmp_path: Path) -> None:
-    target, link = tmp_path / "target", tmp_path / "link"
-    target.write_text("old")
-    link.symlink_to(target)
-    with pytest.raises(InputError, match="is a link, and links are not followed; remove it, or choose another name"):
-        write_file(link, "new", overwrite=True)
-    assert link.is_symlink()
-    assert target.read_text() == "old"
-    assert names_in(tmp_path) == ["link", "target"]
-
-
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -497,7 +329,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
     file = tmp_path / "x"
     file.write_text("old")
     monkeypatch.setattr(Path, "replace", fail)
-    with pytest.raises(InputError, match="No space left on device"):
+    with pytest.raises(OSError, match="No space left on device"):
         write_file(file, "new", overwrite=True)
     assert file.read_text() == "old"
     assert names_in(tmp_path) == ["x"]
@@ -558,29 +390,22 @@ def test_a_reader_that_leaves_is_no_error() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_interrupt_of_a_process(tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "experiments", "experiment", "--runs", "100000", "--out", "out"],
+        [sys.executable, "-m", "experiments", "campaign", "--runs", "1000000", "--out", "out"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
     try:
         deadline = time.monotonic() + 120
-        while not (tmp_path / "out").exists() and time.monotonic() < deadline:
+        while not (tmp_path / "out" / "manifest.json").exists() and time.monotonic() < deadline:
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
     finally:
         process.kill()
     assert (process.returncode, out) == (130, b"")
-    assert err.decode().splitlines()[-1] == "interrupted"
+    assert err.decode().splitlines()[-1].startswith("interrupted; the stored runs are complete")
     assert b"Traceback" not in err
-    assert names_in(tmp_path) == []
-
-
-def test_the_run_of_every_command_takes_its_options() -> None:
-    for options, module, _ in chain.from_iterable(COMMANDS.values()):
-        run = importlib.import_module(f"experiments.{module}").run
-        assert get_type_hints(run) == {"options": options, "return": type(None)}
 
 
 @pytest.mark.parametrize(
@@ -604,9 +429,31 @@ def test_no_99_percent_quantile_of_two_runs(command: list[str], infoset: Command
     assert float(median) <= float(worst)
 
 
-def test_a_terminal_shows_that_modules_are_loaded(monkeypatch: pytest.MonkeyPatch, infoset: Command) -> None:
-    """The second before the first progress bar is not silent on a terminal, and leaves no trace."""
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    err = infoset("engage", "no-such-scenario")[2]
-    assert err.startswith(f"{LOADING}\r{' ' * len(LOADING)}\rerror: ")
-    assert LOADING not in infoset("engage", "no-such-scenario", "-q")[2]
+def test_a_message_keeps_its_lines_and_its_letters() -> None:
+    assert on_a_screen("läuft:\n  Ü – 標\x1b[31m\r\u202e") == "läuft:\n  Ü – 標?[31m??"
+
+
+def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(screen, "LINE_EVERY_S", 0.0)
+    with screen.progress_bar(quiet=False) as begin:
+        begin("patient")(0.5)
+    assert capsys.readouterr().err == "patient: 50 %\n"
+
+
+def test_no_digit_of_a_table_is_lost_on_a_narrow_screen(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "20")
+    table = screen.number_table("craft", "m", "m/s")
+    table.add_row("first", "123456789012", "3.25")
+    screen.show([table], quiet=False)
+    assert capsys.readouterr().out.split() == ["craft", "m", "m/s", "first", "123456789012", "3.25"]
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device", "k.nbi"), MemoryError("Unable to allocate")])
+def test_errors_of_the_system_are_messages(error: Exception, infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("experiments.file_commands.built_in", fail)
+    assert infoset.refused("scenarios", "show", "dart-2022") == f"error: {error}\n"

@@ -9,12 +9,10 @@ from pathlib import Path
 import pytest
 
 from experiments import load_scenario
-from experiments.common import screen
 from experiments.interception.scenario_file import scenario_warnings
 from guidance import Thruster
 from sim.closed_form import possible_miss_of
 from sim.scenario import of_model
-from tests.built_in import problem_text, scenario_text
 from tests.experiments.command_line import Command
 
 
@@ -36,15 +34,6 @@ def test_a_schedule_without_impulses_names_the_key_to_change(thruster: dict[str,
         engine.impulse_steps(100.0, 10.0)
 
 
-@pytest.mark.parametrize("noun", ["scenarios", "problems"])
-def test_a_new_file_is_printed_on_stdout(noun: str, infoset: Command, tmp_path: Path) -> None:
-    """It was written into a file called '-'."""
-    code, out, err = infoset(noun, "new", "-", *(("--like", "service-2") if noun == "problems" else ()))
-    assert (code, err) == (0, "")
-    assert out == (problem_text("service-2") if noun == "problems" else scenario_text("own-scenario"))
-    assert not [*tmp_path.iterdir()]
-
-
 def test_an_image_window_between_two_measurements_has_a_warning() -> None:
     scenario = load_scenario("dart-2022", ["angle_sensor.first_image_s=308", "angle_sensor.last_image_s=302"])
     (line,) = scenario_warnings(scenario)
@@ -57,14 +46,6 @@ def test_the_closed_form_is_not_that_of_a_camera_that_loses_images() -> None:
     lossy = replace(scenario.set_model.angle_sensor, miss_probability=0.5)
     with pytest.raises(ValueError, match="loses no image"):
         possible_miss_of(replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=lossy))))
-
-
-def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(screen, "LINE_EVERY_S", 0.0)
-    with screen.progress_bar(quiet=False) as begin:
-        first, _ = begin("patient"), begin("kalman")
-        first(0.5)
-    assert capsys.readouterr().err == "progress: patient 50 %, kalman 0 %\n"
 
 
 LONG_STEPS = ("--set", "step_s=30", "--set", "angle_sensor.period_s=30")

@@ -19,8 +19,8 @@ from hypothesis.errors import NoSuchExample
 
 from experiments.cli import main
 from experiments.common.errors import InputError
-from experiments.common.file_kinds import MAX_FILE_BYTES, PROBLEMS, SCENARIO
-from experiments.common.input_file import keys_of, read_text
+from experiments.common.file_kinds import PROBLEMS, SCENARIO
+from experiments.common.input_file import MAX_FILE_BYTES, keys_of, read_text
 from experiments.common.units import quantity_and_unit
 from sim import Scenario
 

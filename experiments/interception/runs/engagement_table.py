@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from experiments.common.errors import InputError
-from experiments.common.options import read_number
+from experiments.common.errors import InputError, input_errors
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
 from experiments.interception.published import SINGLE, printed_single_runs
@@ -91,8 +91,11 @@ def read_times(text: str | None, folder: Path | None) -> tuple[float, ...]:
     parts = text.split(",")
     if len(parts) > MAX_TIMES:
         raise InputError(f"--times: at most {MAX_TIMES} times fit in a figure, found {len(parts)}; omit some")
-    example = "--times 0.5,40,90"
-    return tuple(read_number("--times", float, part, minimum=0.0, maximum=None, example=example) for part in parts)
+    with input_errors("--times", "; for example --times 0.5,40,90"):
+        times_s = tuple(map(float, parts))
+        if not all(0.0 <= time_s < math.inf for time_s in times_s):
+            raise ValueError(f"times must be finite and at least 0, found {text}")
+    return times_s
 
 
 def need_times(text: str | None, times_s: Sequence[float], records: Sequence[Record]) -> None:

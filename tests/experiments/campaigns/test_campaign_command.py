@@ -161,7 +161,6 @@ def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -
         (["--until", "miss_m"], "--until: must be a quantity, a quantile and a width"),
         (["--dask", "localhost"], "--dask: no Dask scheduler answers at localhost"),
         (["--dask", "tcp://h:1", "--workers", 2], "cannot be combined; give only one of them"),
-        (["--json", "missing/x.json"], "there is no folder missing"),
         (["--out", "brief.toml"], "brief.toml: is a file, not a folder"),
         (["--out", "."], "is not empty, and contains no campaign"),
         (["--out", "/dev/null/x"], "/dev/null/x"),

@@ -126,15 +126,6 @@ def test_what_cannot_be_reported(what: str, parts: list[str], infoset: Infoset, 
     assert not (tmp_path / "report").exists()
 
 
-def test_nothing_is_replaced_unless_told(infoset: Infoset, folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "report").mkdir()
-    (tmp_path / "report" / "notes.txt").write_text("precious")
-    code, _, err = infoset("report", folder, "--out", "report")
-    assert code == 2
-    assert "is not empty" in err
-    assert [each.name for each in (tmp_path / "report").iterdir()] == ["notes.txt"]
-
-
 PLANE = ("z_km", "x_km", "vz_km_s", "vx_km_s")
 
 

@@ -194,12 +194,10 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
     [
         (["--vary", "thruster.budget=1:2:2"], ["did you mean thruster.budget_m_s?"]),
         (["--vary", "thruster.max_impulse_m_s=0.01:5:3"], ["brief with thruster.max_impulse_m_s = 0.01"]),
-        (["--runs", 0], ["--runs", "must be from 1 to "]),
         (["--require", "miss_m 10"], ["--require: must be hit>=SHARE or QUANTITY pLEVEL<BOUND, for example"]),
         (["--vary", "thruster.max_impulse_m_s=1_0:20:2"], ["must be a number, found"]),
         (["--show", "miss_m p99,fuel p50"], ["--show: there is no quantity fuel"]),
         (["--show", ",".join(f"miss_m p{each}" for each in range(1, 20))], ["--show: at most 8"]),
-        (["--noise", "loud"], ["--noise"]),
         (["--dask", "nowhere"], ["--dask"]),
         (["--runs", 300_000], ["6 cells of 300000 runs are 1800000 engagements", "give --yes"]),
     ],

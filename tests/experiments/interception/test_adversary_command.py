@@ -185,7 +185,7 @@ def test_the_worst_in_a_folder_as_engage_writes_it(infoset: Command, tmp_path: P
     assert fingerprint(load_scenario(tmp_path / "worst" / "scenario.toml")) == found["scenario_hash"]
     code, _, err = infoset("adversary", *options)
     assert code == 2
-    assert "worst: is not empty" in err
+    assert "exists already" in err
 
 
 def test_quiet_prints_nothing(infoset: Command) -> None:
@@ -197,15 +197,10 @@ def test_quiet_prints_nothing(infoset: Command) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--budget", "0"], "must be from 1 to "),
-        (["--budget", "-5"], "must be from 1 to "),
-        (["--seed", "-1"], "must be at least 0, found -1; for example --seed 0"),
         (["--record", "worst.txt"], "--record: worst.txt must end in .npz"),
         (["--record", "there.npz"], "there.npz: exists already; choose another name, or give --overwrite"),
         (["--json", "there.npz"], "there.npz: exists already"),
-        (["--json", "nowhere/out.json"], "there is no folder nowhere"),
         (["--strategy", "symetric-miss"], '--strategy: there is no "symetric-miss"; did you mean symmetric-miss?'),
-        (["--model", "papers"], 'there is no "papers"; did you mean paper? choose one of: paper, guaranteed'),
         (["asteroid-1998"], "asteroid-1998"),
         (["asteroid-1997-single", "--range-sensor"], "has no [range_sensor]"),
     ],

@@ -214,17 +214,6 @@ def test_bound_in_space(infoset: Infoset, short: Scenario, planar: LowerBound, t
     assert half == pytest.approx(0.5 * expected.pair.apart_m)
 
 
-@pytest.mark.usefixtures("known")
-def test_no_name_and_no_digit_is_cut_at_60_columns(
-    infoset: Infoset, short_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "60")
-    code, out, _ = infoset(short_file, "--budget", 1)
-    assert code == 0
-    assert "…" not in out
-    assert all(name in out for name in strategy_names())
-
-
 def test_help_has_an_example(infoset: Infoset) -> None:
     code, out, _ = infoset("--help")
     assert code == 0
@@ -237,11 +226,6 @@ def test_help_has_an_example(infoset: Infoset) -> None:
         (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
         (["--strategies", "patent"], ["--strategies", "did you mean patient?"]),
         (["--strategies", "patient,patient"], ["named twice"]),
-        (["--budget", -1], ["--budget", "must be from 0 to "]),
-        (["--model", "papr"], ["--model", 'there is no "papr"; did you mean paper? choose one of: paper, guaranteed']),
-        (["--json", "missing/x.json"], ["there is no folder missing"]),
-        (["--out", "/dev/null"], ["is a file"]),
-        (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
     ],
 )
 def test_what_is_wrong_is_said_before_the_work(

@@ -3,7 +3,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -22,7 +21,6 @@ from infoset import Model
 from sim import Scenario, simulate
 from sim.storage.codec import fingerprint
 from sim.versions import versions
-from tests.experiments.command_line import Command
 
 TWO = ("--strategies", "symmetric-miss,patient")
 LEVELS = ["p10", "p50", "p90", "p99", "max"]
@@ -136,13 +134,8 @@ def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Pat
         (["--strategies", "patient,,"], ["--strategies", "choose one of"]),
         (["--strategies", ""], ["--strategies", "choose one of"]),
         (["--strategies", "patient,patient"], ["patient is named twice"]),
-        (["--runs", "0"], ["--runs", "must be from 1 to "]),
-        (["--seed", "-1"], ["--seed"]),
-        (["--model", "papr"], ["--model", 'there is no "papr"; did you mean paper? choose one of: paper, guaranteed']),
         (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
         (["asteroid-1997-single", "--range-sensor"], ["--range-sensor", "[range_sensor]"]),
-        (["--json", "-", "--csv", "-"], ["--json and --csv"]),
-        (["--json", "missing/x.json"], ["there is no folder missing"]),
     ],
 )
 def test_what_is_wrong_is_said_before_the_work(
@@ -172,17 +165,6 @@ def test_help_has_an_example(infoset: Infoset) -> None:
     code, out, _ = infoset("--help")
     assert code == 0
     assert "Example: infoset compare" in out
-
-
-def test_interrupted(infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("sim.parallel.simulate", interrupt)
-    code, out, err = infoset("--out", "out")
-    # Before it, perhaps, that kernels are compiled.
-    assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.fixture(scope="module")
@@ -246,24 +228,3 @@ def test_the_radius_of_the_body_is_a_line_with_a_label(compared: list[Comparison
     (legend,) = figure.legends
     assert radii == [1, 1, 0, 0]
     assert legend.get_texts()[-1].get_text() == "body radius, 1 m: a smaller miss is a hit"
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "compare FILE --strategies symmetric-miss,patient --runs 2 --set body.radius_m=5",
-        "experiment FILE --runs 2",
-        "engage FILE --noise both",
-        "adversary FILE --budget 4",
-        "adversary FILE --budget 20 --model paper",
-    ],
-)
-def test_no_number_is_cut_or_wrapped_at_60_columns(
-    line: str, brief_file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "60")
-    code, out, _ = Command(capsys)(*(brief_file if word == "FILE" else word for word in line.split()))
-    assert code == 0
-    assert "…" not in out
-    assert not re.search(r"\(\d+$|^ *%\)|\d\.$", out, re.MULTILINE)

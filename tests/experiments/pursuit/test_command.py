@@ -149,7 +149,7 @@ def test_a_map(infoset: Command) -> None:
     ("arguments", "told"),
     [
         (["pursuit", "--feedback", "costa"], "did you mean coast"),
-        (["pursuit", "--feedback", "gone.csv"], "gone.csv: there is no such file"),
+        (["pursuit", "--feedback", "gone.csv"], "gone.csv: cannot be read: No such file"),
         (["pursuit", "--runs", "5"], "need a policy of the evader"),
         (["pursuit-map", "--x", "phase=-1:1:3"], "did you mean phase_deg"),
         (["pursuit-map", "--x", "phase_deg=-1:1"], "KEY=FROM:TO:N"),

@@ -91,9 +91,8 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Command) -> None:
     [
         (["--select", "enrgy"], "did you mean energy?"),
         (["--select", ""], "--select: "),
-        (["--select", "samples"], "--select samples: must be a whole number"),
-        (["--select", "samples:0"], "must be from 1 to 1000"),
-        (["--route", "exakt"], "--route: "),
+        (["--select", "samples"], "--select samples: invalid literal"),
+        (["--select", "samples:0"], "must be between 1 and 1000"),
         (["rendezvous-16-periods", "--route", "exact"], "--route exact: for thrust in a ball"),
         (["approach-cone", "--select", "vertices"], "choose for example --select samples:20"),
         ([CASES / "s2_2_68.toml"], "a convex program was not solved to 1e-07: relative gap"),

@@ -1,0 +1,123 @@
+"""The commands `infoset scenarios` and `infoset problems`, which list, show, copy and check files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from experiments.common.errors import InputError
+from experiments.common.file_kinds import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files, kind_of, taken_by
+from experiments.common.options import AsJson, Overwrite, Quiet
+
+BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
+FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
+Like = Annotated[str, typer.Option("--like", metavar="NAME", help="The built-in file to copy.")]
+NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
+
+
+def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
+    """Return the commands for the files of a noun, scenario or problem; `example` is a built-in name."""
+    name = f"infoset {noun}s"
+    kinds = [SCENARIO] if noun == SCENARIO else [*PROBLEMS]
+    app = typer.Typer(
+        name=f"{noun}s",
+        help=f"List, show, check and create {noun} files.\n\n{of_what} Without a command, list the built-in {noun}s.",
+        epilog=f"Example: {name} new mine.toml --like {example}",
+    )
+
+    @app.callback(invoke_without_command=True)
+    def default(context: typer.Context) -> None:
+        if context.invoked_subcommand is None:
+            list_files()
+
+    @app.command("list", help=f"List the built-in {noun}s.", epilog=f"Example: {name} list --json")
+    def list_files(json: AsJson = False, quiet: Quiet = False) -> None:
+        _print_list([file for file in built_in_files().values() if file.kind in kinds], json, quiet)
+
+    @app.command(help=f"Print a built-in {noun} file.", epilog=f"Example: {name} show {example} > mine.toml")
+    def show(name: BuiltInName) -> None:
+        typer.echo(built_in(name, kinds).text, nl=False)
+
+    @app.command(
+        help=f"Copy a built-in {noun} file, to be changed.", epilog=f"Example: {name} new mine.toml --like {example}"
+    )
+    def new(file: NewFile, like: Like = example, overwrite: Overwrite = False, quiet: Quiet = False) -> None:
+        from experiments.common.output import STDOUT, write_file
+
+        text = built_in(like, kinds).text
+        if str(file) == STDOUT:
+            typer.echo(text, nl=False)
+            return
+        write_file(file, text, overwrite=overwrite)
+        if not quiet:
+            typer.echo(f"wrote {file}, a copy of {like}; change it, then: {name} check {file}", err=True)
+
+    @app.command(
+        help=f"Check a {noun} file. The exit code is 2 if it has errors; all are listed.",
+        epilog=f"Example: {name} check mine.toml",
+    )
+    def check(file: FileName, json: AsJson = False, quiet: Quiet = False) -> None:
+        _print_check(file, kinds, json, quiet)
+
+    return app
+
+
+def _print_list(files: Sequence[BuiltIn], json: bool, quiet: bool) -> None:
+    """List built-in files: as JSON, as names alone, or as a table."""
+    from experiments.common.output import to_json
+    from experiments.common.screen import number_table, show
+
+    has_kinds = any(file.kind != SCENARIO for file in files)
+    names = ("name", *(["kind"] if has_kinds else []), "description")
+    rows = [{name: getattr(file, name) for name in names} for file in files]
+    if json:
+        typer.echo(to_json(rows), nl=False)
+    elif quiet:
+        typer.echo("\n".join(file.name for file in files))
+    else:
+        table = number_table(*names, left=len(names))
+        for row in rows:
+            table.add_row(*row.values())
+        show([table], quiet)
+
+
+def _print_check(file: str, kinds: Sequence[str], json: bool, quiet: bool) -> None:
+    """Check a file of one of these kinds; print its name, fingerprint and warnings."""
+    from experiments.common.output import library_version, to_json
+    from experiments.common.screen import say_warnings
+    from experiments.interception.scenario_file import load_scenario, scenario_warnings
+    from sim.storage.codec import fingerprint
+
+    if SCENARIO in kinds:
+        read: Any = load_scenario(file)
+        head, warnings = {"scenario_hash": fingerprint(read)}, scenario_warnings(read)
+    else:
+        problem = PROBLEMS[_problem_kind(file)]
+        read = getattr(import_module(f"experiments.{problem.folder}.file"), problem.loader)(file)
+        head, warnings = {"kind": read.kind, "problem_hash": fingerprint(read)}, []
+    if json:
+        typer.echo(to_json({"version": library_version(), "name": read.name, **head, "warnings": warnings}), nl=False)
+    elif not quiet:
+        typer.echo(f"ok  {read.name}  {fingerprint(read)}")
+    say_warnings(warnings, quiet or json)
+
+
+def _problem_kind(file: str) -> str:
+    """Return the kind of a problem file; raise `InputError` if it has none."""
+    from experiments.common.input_file import parse, source_of
+
+    text, source = source_of(file, PROBLEMS)
+    kind = kind_of(parse(text, source))
+    if kind is None:
+        raise InputError(f"{source}: kind: must be one of {', '.join(PROBLEMS)}; write it above the first table")
+    if kind == SCENARIO:
+        raise InputError(f"{source}: {taken_by(kind)}")
+    return kind
+
+
+scenarios = _commands(SCENARIO, "A scenario is an interception.", "own-scenario")
+problems = _commands("problem", "A problem is one of rendezvous, pursuit or estimation.", "service-2")

@@ -1,0 +1,128 @@
+"""`infoset scenarios` and `infoset problems`, and files of another kind."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.common.errors import InputError
+from experiments.common.file_kinds import PROBLEMS, SCENARIO, built_in_files
+from experiments.common.input_file import read_input, read_text, to_toml
+from experiments.interception.scenario_file import load_scenario
+from sim.storage.codec import fingerprint
+from tests.built_in import scenario_text
+from tests.experiments.command_line import Command
+from tests.fuzzing.subjects import text_files
+
+FILES = built_in_files()
+MINE = {"scenarios": "own-scenario", "problems": "service-2"}
+
+
+@pytest.mark.parametrize("noun", MINE)
+def test_the_list_has_every_built_in_file(noun: str, infoset: Command) -> None:
+    files = [file for file in FILES.values() if (file.kind == SCENARIO) == (noun == "scenarios")]
+    names = [file.name for file in files]
+    code, out, err = infoset(noun)
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines()[1:] if not line.startswith(" ")] == names
+    assert infoset(noun, "list", "--quiet") == (0, "\n".join(names) + "\n", "")
+    found = json.loads(infoset(noun, "list", "--json")[1])
+    assert [(row["name"], row["description"]) for row in found] == [(file.name, file.description) for file in files]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_built_in_file_is_shown_copied_checked_and_written_again(name: str, infoset: Command) -> None:
+    file = FILES[name]
+    noun = "scenarios" if file.kind == SCENARIO else "problems"
+    assert infoset(noun, "show", name) == (0, file.text, "")
+    assert infoset(noun, "new", "-", "--like", name)[:2] == (0, file.text)
+    assert infoset(noun, "new", "mine.toml", "--like", name)[0] == 0
+    assert Path("mine.toml").read_text(encoding="utf-8") == file.text
+    owner = text_files()[file.kind].owner
+    value: Any = read_text(owner, file.text, name)
+    assert read_text(owner, to_toml(value), "written") == value
+    assert infoset(noun, "check", "mine.toml")[:2] == (0, f"ok  {name}  {fingerprint(value)}\n")
+    found = json.loads(infoset(noun, "check", "mine.toml", "--json")[1])
+    assert (found["name"], found.get("kind", SCENARIO)) == (name, file.kind)
+    assert infoset(noun, "check", name, "--quiet") == (0, "", "")
+
+
+@pytest.mark.parametrize("noun", MINE)
+def test_a_file_is_replaced_only_if_asked(noun: str, infoset: Command) -> None:
+    file = Path("mine.toml")
+    file.write_text("precious")
+    assert "--overwrite" in infoset.refused(noun, "new", file)
+    assert file.read_text() == "precious"
+    assert infoset(noun, "new", file, "--overwrite")[0] == 0
+    assert file.read_text() == FILES[MINE[noun]].text
+
+
+def test_warnings_of_a_check(infoset: Command, tmp_path: Path) -> None:
+    file = tmp_path / "wide.toml"
+    file.write_text(scenario_text("asteroid-1997").replace("z_km = [-1.0, 1.0]", "z_km = [-12.0, 1.0]"))
+    code, out, err = infoset("scenarios", "check", file)
+    assert (code, out[:4]) == (0, "ok  ")
+    assert err.startswith("warning: dispersion.z_m reaches 2000 m below uncertainty.z_m")
+    assert len(json.loads(infoset("scenarios", "check", file, "--json")[1])["warnings"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("scenarios show asteroid-1996", 'no built-in scenario is called "asteroid-1996"; did you mean "asteroid-1997'),
+        ("problems new mine.toml --like pareto-2009", 'is called "pareto-2009"; did you mean "pareto-2008"?'),
+        ("problems check asteroid-1997", "asteroid-1997: this is a scenario; use infoset engage asteroid-1997"),
+        ("scenarios new file/mine.toml", "File exists"),
+        ("scenarios check binary", "is not text in UTF-8"),
+        ("problems check empty", "kind: must be one of pareto-encounter, multipoint"),
+        ("problems check odd", "kind: must be one of"),
+        ("problems check broken", "is not valid TOML"),
+        ("replay empty", "empty: is not a readable record"),
+        ("report empty", "empty: is a file"),
+    ],
+)
+def test_what_is_wrong_is_one_message(line: str, message: str, infoset: Command) -> None:
+    contents = {"file": b"", "empty": b"", "binary": b"\x93NUMPY\xff\x00", "odd": b"kind = [1]", "broken": b"kind = "}
+    for name, content in contents.items():
+        Path(name).write_bytes(content)
+    arguments = [f"./{word}" if word in contents else word for word in line.split()]
+    assert message in infoset.refused(*arguments)
+
+
+def test_all_faults_of_a_file_are_listed_one_a_line(infoset: Command) -> None:
+    text = FILES["service-2"].text.replace("1.13e-3", '"fast"').replace("time_s = 1500.0", "time = 1500.0")
+    Path("bad.toml").write_text(text)
+    code, out, err = infoset("problems", "check", "bad.toml")
+    assert (code, out) == (2, "")
+    assert sorted(line.split(": ")[-2] for line in err.splitlines()) == ["orbit_rate_rad_s", "target.#1.time"]
+
+
+def test_a_file_of_another_kind_is_one_message_with_its_command(infoset: Command) -> None:
+    commands = {**{problem.command: kind for kind, problem in PROBLEMS.items()}, "engage": SCENARIO}
+    for command, taken in commands.items():
+        for name in ("asteroid-1997", "service-3", "pareto-2008"):
+            file = FILES[name]
+            Path("mine.toml").write_text(file.text)
+            right = "engage" if file.kind == SCENARIO else PROBLEMS[file.kind].command
+            what = "a scenario" if file.kind == SCENARIO else f"a problem of kind {file.kind}"
+            if taken != file.kind:
+                for given, path in ((name, name), ("mine.toml", "FILE")):
+                    message = infoset.refused(command, given)
+                    assert message == f"error: {given}: this is {what}; use infoset {right} {path}\n"
+
+
+def test_no_more_than_the_limit_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "x.toml"
+    file.write_bytes(b"x" * 10)
+    assert read_input(file, 10) == b"x" * 10
+    with pytest.raises(InputError, match="has more than 9 bytes"):
+        read_input(file, 9)
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="the system has no such device")
+def test_an_endless_device_is_read_to_the_limit_only() -> None:
+    with pytest.raises(InputError, match="/dev/zero: has more than 100000 bytes"):
+        load_scenario("/dev/zero")
