@@ -132,7 +132,9 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
                 axes.tick_params(labelleft=axes is row[0])
                 axes.set_title(f"({next(letter)}) {column.noise} noise")
                 separate_labels(axes)
-            row[0].set_ylabel("\n".join(["miss, m", *filter(None, [beyond("runs", [column.miss_m], 1.04 * limit)])]))
+            row[0].set_ylabel(
+                "\n".join(["miss, m", *filter(None, [beyond("runs", [column.miss_m], row[0].get_ylim()[1])])])
+            )
         most = max(column.miss_m.size for column in columns)
         runs = f"runs (at most {MAX_POINTS} drawn)" if most > MAX_POINTS else "runs"
         handles = [Line2D([], [], linestyle="", marker=".", color=LIMIT, label=runs)]

@@ -76,38 +76,48 @@ def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
 
 
 def subplots(
-    height_mm: float,
-    rows: int = 1,
-    columns: int = 1,
-    *,
-    count: int | None = None,
-    width_mm: float = WIDTH_MM,
-    **grid: Any,
+    height_mm: float, rows: int = 1, columns: int = 1, *, width_mm: float = WIDTH_MM, **grid: Any
 ) -> tuple[Figure, NDArray[Any]]:
     """Return a new figure and its axes, shape (rows, columns).
 
-    With `count`, only the first axes stay, and the array is flat. `grid` are arguments of
-    `matplotlib.figure.Figure.subplots`, as ``sharex="col"``.
+    `grid` are arguments of `matplotlib.figure.Figure.subplots`, as ``sharex="col"``.
     """
     figure = new_figure(height_mm, width_mm)
-    figure.set_layout_engine("constrained")
-    axes = np.asarray(figure.subplots(rows, columns, squeeze=False, **grid))
-    if count is None:
-        return figure, axes
-    for unused in axes.flat[count:]:
+    return figure, np.asarray(figure.subplots(rows, columns, squeeze=False, **grid))
+
+
+def first_panels(grid: NDArray[Any], count: int) -> list[Axes]:
+    """Return the first axes of a grid, row by row, and remove the others."""
+    for unused in grid.flat[count:]:
         unused.remove()
-    return figure, axes.flat[:count]
+    return [*grid.flat[:count]]
+
+
+def label_axes(axes: Any, titles: Sequence[str]) -> None:
+    """Write the titles of two or three axes, with a few ticks each and room around what is drawn."""
+    for name, title in zip("xyz", titles, strict=False):
+        getattr(axes, f"set_{name}label")(title, labelpad=-2.0 if len(titles) > 2 else None)
+    axes.locator_params(nbins=5)
+    axes.margins(0.08)
+    if len(titles) > 2:
+        axes.tick_params(pad=-2.0)
 
 
 def letters(panels: Iterable[Axes], titles: Sequence[str] = ()) -> None:
-    """Write (a), (b) ... and the titles, if any, above axes."""
-    for number, axes in enumerate(panels):
-        axes.set_title(" ".join([f"({chr(ord('a') + number)})", *titles[number : number + 1]]), loc="left")
+    """Write (a), (b) ... above axes, with their titles if there are any; no letter above a single one."""
+    every = [*panels]
+    for number, axes in enumerate(every):
+        letter = [f"({chr(ord('a') + number)})"] if len(every) > 1 else []
+        axes.set_title(" ".join([*letter, *titles[number : number + 1]]), loc="left")
 
 
-def legend_below(figure: Figure, handles: Sequence[Any], columns: int, **more: Any) -> None:
-    """Draw the legend of a figure below its axes."""
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
+def legend_below(figure: Figure, columns: int, **more: Any) -> None:
+    """Draw the legend of a figure below its axes: everything drawn in them that has a label, once."""
+    handles: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, **more)
 
 
 def plain(text: str) -> str:

@@ -55,12 +55,10 @@ class Clock:
         """Return a time of a step as text."""
         if not self.counts_down:
             return f"t = {time_s:g} s"
-        left_s = record.scenario.nominal_arrival_s - time_s
-        if abs(left_s) < min_to_go_s(record.scenario):
+        to_go_s = record.scenario.nominal_arrival_s - time_s
+        if abs(to_go_s) < min_to_go_s(record.scenario):
             return "at the nominal arrival"
-        return (
-            f"{duration_text(left_s)} before arrival" if left_s > 0.0 else f"{-left_s:.3g} s after the nominal arrival"
-        )
+        return f"{duration_text(to_go_s)} to go" if to_go_s > 0.0 else f"{-to_go_s:.3g} s after the nominal arrival"
 
 
 def min_to_go_s(scenario: Scenario) -> float:

@@ -5,13 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from experiments.common.figure_style import IMPULSE, INK, MEASURED, SET_EDGE, SET_FILL, TRUTH, figure_grid, plain, style
+from experiments.common.figure_style import (
+    IMPULSE,
+    INK,
+    MEASURED,
+    SET_EDGE,
+    SET_FILL,
+    TRUTH,
+    legend_below,
+    plain,
+    style,
+    subplots,
+)
 from experiments.observer.report import Report, times
 from infoset import Estimate
 from infoset.arrays import Floats
@@ -29,21 +40,20 @@ def draw_all(report: Report) -> Iterator[Figure | None]:
 def draw_bounds(report: Report) -> Figure:
     """Draw the bounds of each state and their distance against time, with the true state of a simulation."""
     names = report.problem.names
-    figure, grid = figure_grid(24.0 + 34.0 * len(names), len(names), 2, (18.0, 4.0, 11.0, 9.0), (17.0, 5.0))
+    figure, grid = subplots(30.0 + 38.0 * len(names), len(names), 2, sharex=True)
     time, title = times(report)
     (lower, upper), smoothed = _ends(report.estimates), report.smoothed and _ends(report.smoothed)
     dashed: dict[str, Any] = {"color": MEASURED, "linewidth": 0.9, "linestyle": (0, (4, 1.5))}
     missing = np.isnan(report.data.measured).all(axis=1)
-    for index, (name, panel, width) in enumerate(zip(names, grid[::2], grid[1::2], strict=True)):
+    for index, (name, (panel, width)) in enumerate(zip(map(plain, names), grid, strict=True)):
         panel.fill_between(time, lower[:, index], upper[:, index], color=SET_FILL, label="possible states")
         for ends in (lower, upper):
             panel.plot(time, ends[:, index], color=SET_EDGE, linewidth=0.8)
         width.plot(time, upper[:, index] - lower[:, index], color=SET_EDGE)
         if smoothed:
             first, last = smoothed[0][:, index], smoothed[1][:, index]
-            panel.plot(time, first, label="with later measurements", **dashed)
-            panel.plot(time, last, **dashed)
-            width.plot(time, last - first, **dashed)
+            for axes, values in ((panel, first), (panel, last), (width, last - first)):
+                axes.plot(time, values, label="with later measurements", **dashed)
         if report.data.states is not None:
             panel.plot(time, report.data.states[:, index], color=TRUTH, linewidth=1.1, label="true state")
         if missing.any():
@@ -51,21 +61,21 @@ def draw_bounds(report: Report) -> Figure:
             low = np.full(missing.sum(), 0.02)
             panel.plot(time[missing], low, transform=panel.get_xaxis_transform(), **mark)
         if report.contradicted:
-            _mark_contradiction(panel, report, f"no state from step {int(report.inconsistency.step)} on")
-            _mark_contradiction(width, report)
-        panel.set_ylabel(plain(name))
-        panel.margins(x=0.01)
-        width.set_ylabel(f"width of {plain(name)}")
-        width.margins(x=0.01, y=0.05)
+            empty = time[[estimate.is_empty for estimate in report.estimates]]
+            hatched: dict[str, Any] = {"facecolor": "none", "edgecolor": IMPULSE, "hatch": "////", "alpha": 0.35}
+            for axes in (panel, width):
+                axes.axvspan(empty[0], time[-1], linewidth=0.0, **hatched)
+                label = f"no state from step {int(report.inconsistency.step)} on"
+                axes.axvline(empty[0], color=IMPULSE, label=label)
+        panel.set_ylabel(name)
+        width.set_ylabel(f"width of {name}")
         width.set_ylim(bottom=0.0)
-        for axes in (panel, width):
-            axes.tick_params(labelbottom=index == len(names) - 1)
-            if report.problem.system.step_s is None:
-                axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    for axes in grid[-2:]:
+    for axes in grid[-1]:
         axes.set_xlabel(title)
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper center", ncols=5, columnspacing=1.2)
+        axes.margins(x=0.01)
+        if report.problem.system.step_s is None:
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    legend_below(figure, 3)
     return figure
 
 
@@ -74,33 +84,20 @@ def _ends(estimates: Sequence[Estimate]) -> list[Floats]:
     return [np.array([getattr(estimate, end) for estimate in estimates]) for end in ("lower", "upper")]
 
 
-def _mark_contradiction(panel: Axes, report: Report, label: str | None = None) -> None:
-    """Mark the steps without a possible state."""
-    time, _ = times(report)
-    empty = time[[estimate.is_empty for estimate in report.estimates]]
-    panel.axvspan(empty[0], time[-1], facecolor="none", edgecolor=IMPULSE, hatch="////", linewidth=0.0, alpha=0.35)
-    panel.axvline(empty[0], color=IMPULSE, linewidth=1.2, label=label)
-
-
 @style()
 def draw_sets(report: Report) -> Figure:
     """Draw the sets of two states, the first ones light and the last ones dark, at most 60 of them."""
-    figure, (panel,) = figure_grid(110.0, 1, 1, (18.0, 6.0, 12.0, 8.0), (0.0, 0.0))
+    figure, ((panel,),) = subplots(115.0)
     shown = [estimate for estimate in report.estimates if not estimate.is_empty]
     shown = shown[:: -(-len(shown) // _MAX_OUTLINES)] if shown else []
     outlines = [estimate.polygons.polygon() for estimate in shown]
-    edges = [str(shade) for shade in np.linspace(0.75, 0.2, len(outlines))]
-    fill = PolyCollection(outlines, facecolors=SET_FILL, edgecolors=edges, linewidths=0.8, alpha=0.55)
-    panel.add_collection(fill)
+    edges = mpl.colormaps["Greys"](np.linspace(0.3, 0.9, len(outlines)))
+    panel.add_collection(PolyCollection(outlines, facecolors=SET_FILL, edgecolors=edges, linewidths=0.8, alpha=0.55))
     if outlines:
         panel.update_datalim(np.vstack(outlines))
-        title = f"possible states, from step {shown[0].step} (light) to step {shown[-1].step} (dark)"
-        panel.set_title(title, loc="left")
+        panel.set_title(f"possible states, from step {shown[0].step} (light) to step {shown[-1].step} (dark)")
     if report.data.states is not None:
-        states = report.data.states
-        panel.plot(
-            states[:, 0], states[:, 1], color=TRUTH, marker=".", markersize=3.0, linewidth=0.7, label="true state"
-        )
+        panel.plot(*report.data.states.T, color=TRUTH, marker=".", markersize=3.0, linewidth=0.7, label="true state")
         panel.legend(loc="best")
     panel.autoscale_view()
     panel.set(xlabel=plain(report.problem.names[0]), ylabel=plain(report.problem.names[1]))

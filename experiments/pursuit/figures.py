@@ -8,23 +8,31 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from experiments.common.display_units import M_PER_KM, length_unit, time_unit
-from experiments.common.figure_style import IMPULSE, LIMIT, MEASURED, TRUTH, figure_grid, new_figure, style
+from experiments.common.figure_style import (
+    BOUND,
+    IMPULSE,
+    LIMIT,
+    MEASURED,
+    TRUTH,
+    label_axes,
+    legend_below,
+    letters,
+    new_figure,
+    style,
+    subplots,
+)
 from experiments.common.hill_axes import AXIS_TITLES, INERTIAL_TITLES
 from experiments.pursuit.report import Report, thrust_angles
 from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict, history, orbital_axes
 
-PURSUER: dict[str, Any] = {"color": TRUTH, "linestyle": "-"}
-EVADER: dict[str, Any] = {"color": MEASURED, "linestyle": (0, (5, 1.5))}
-_WIDE: dict[str, Any] = {"linewidth": 2.8}
-"""The pursuer's path stays visible where the evader's dashes cover it."""
-_START: dict[str, Any] = {"marker": "o", "markersize": 4.0, "linestyle": "none"}
+PURSUER: dict[str, Any] = {"color": TRUTH, "linestyle": "-", "label": "pursuer"}
+EVADER: dict[str, Any] = {"color": MEASURED, "linestyle": (0, (5, 1.5)), "label": "evader"}
+_START: dict[str, Any] = {"marker": "o", "markersize": 4.0, "linestyle": "none", "label": "start"}
 _STAR: dict[str, Any] = {"marker": "*", "markersize": 9.0, "color": IMPULSE, "linestyle": "none"}
-_LEVEL: dict[str, Any] = {"color": LIMIT, "linewidth": 0.8, "linestyle": "--"}
 
 _ARROWS, _ARROW_LENGTH, _MIN_HEIGHT = 14, 0.17, 0.15
 
@@ -44,36 +52,28 @@ def draw_orbits(sampled: History) -> Figure:
     """Draw both paths in space with arrows of thrust, and projected along the planet's axis."""
     size_m = float(np.abs(sampled.pursuer.position_m).max())
     unit, per_m = length_unit(size_m)
-    figure = new_figure(height_mm=88.0)
-    space: Any = figure.add_axes((-0.02, 0.0, 0.54, 1.0), projection="3d")
-    flat = figure.add_axes((0.63, 0.18, 0.35, 0.74))
-    _draw_path(space, flat, sampled.pursuer, per_m, {**_WIDE, **PURSUER, "label": "pursuer"})
-    _draw_path(space, flat, sampled.evader, per_m, {**EVADER, "label": "evader"})
+    figure = new_figure(100.0)
+    panels = figure.subplot_mosaic("ab", width_ratios=[1.0, 1.3], per_subplot_kw={"b": {"projection": "3d"}})
+    flat = panels["a"]
+    space: Any = panels["b"]
+    # The pursuer's path stays visible where the evader's dashes cover it.
+    for player, look in ((sampled.pursuer, {"linewidth": 2.8, **PURSUER}), (sampled.evader, EVADER)):
+        _draw_path(space, flat, player, per_m, look)
     end = sampled.evader.position_m[-1] * per_m
     for axes, point in ((space, end), (flat, end[:2])):
         axes.plot(*point[:, None], label="capture", **_STAR)
+    flat.plot(0.0, 0.0, marker="+", color=LIMIT, markersize=7.0, linestyle="none", label="planet's centre")
+    flat.set_aspect("equal", adjustable="datalim")
     low, high = space.get_zlim()
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), _MIN_HEIGHT * size_m * per_m)
+    titles = [f"{title}, {unit}" for title in INERTIAL_TITLES]
+    label_axes(space, titles)
+    label_axes(flat, titles[:2])
     space.set_zlim(middle - half, middle + half)
-    for name, title in zip("xyz", INERTIAL_TITLES, strict=True):
-        getattr(space, f"set_{name}label")(f"{title}, {unit}", labelpad=-4.0)
-        getattr(space, f"{name}axis").set_major_locator(_few_ticks())
-    space.tick_params(pad=-2.0, labelsize=6.5)
-    space.set_box_aspect((1.0, 1.0, 0.6), zoom=0.88)
+    space.set_box_aspect((1.0, 1.0, 0.6), zoom=0.85)
     space.view_init(elev=28.0, azim=-62.0)
-    space.set_title("(a) paths and thrust", y=0.91)
-    flat.plot([0.0], [0.0], marker="+", color=LIMIT, markersize=7.0, linestyle="none", label="planet's centre")
-    flat.margins(0.12)
-    flat.set_aspect("equal", adjustable="box", anchor="C")
-    flat.xaxis.set_major_locator(_few_ticks())
-    flat.set(xlabel=f"{INERTIAL_TITLES[0]}, {unit}", ylabel=f"{INERTIAL_TITLES[1]}, {unit}")
-    flat.set_title("(b) seen along the planet's axis")
-    handles, _ = flat.get_legend_handles_labels()
-    handles[2:2] = [Line2D([], [], color=LIMIT, label="start", **_START)]
-    if sampled.pursuer.thrust_direction.any() or sampled.evader.thrust_direction.any():
-        arrow: dict[str, Any] = {"marker": r"$\rightarrow$", "markersize": 11.0, "linestyle": "none"}
-        handles[2:2] = [Line2D([], [], color=LIMIT, markeredgewidth=0.3, label="thrust", **arrow)]
-    figure.legend(handles=handles, loc="lower center", ncols=len(handles))
+    letters([flat, space], ["seen along the planet's axis", "paths and thrust (arrows)"])
+    legend_below(figure, 5)
     return figure
 
 
@@ -85,21 +85,18 @@ def draw_relative(sampled: History) -> Figure:
     relative = np.einsum("nij,nj->ni", orbital_axes(evader.position_m, evader.velocity_m_s), offset)
     length, per_m = length_unit(float(np.abs(relative).max()))
     offset, relative = offset * per_m, relative * per_m
-    figure, (plane, side, distance) = figure_grid(66.0, 1, 3, (15.0, 4.0, 12.0, 8.0), (17.0, 0.0))
-    for axes, column, title in (
-        (plane, 0, "(a) pursuer relative to the evader"),
-        (side, 2, "(b) out of the orbital plane"),
-    ):
+    figure, (panels,) = subplots(75.0, 1, 3)
+    for axes, column in zip(panels, (0, 2), strict=False):
         axes.plot(relative[:, 1], relative[:, column], **PURSUER)
-        axes.plot(relative[0, 1], relative[0, column], color=TRUTH, label="start", **_START)
+        axes.plot(relative[0, 1], relative[0, column], color=TRUTH, **_START)
         axes.plot(0.0, 0.0, label="evader", **_STAR)
-        axes.set(xlabel=f"{AXIS_TITLES[1]}, {length}", ylabel=f"{AXIS_TITLES[column]}, {length}", title=title)
-        axes.xaxis.set_major_locator(_few_ticks())
-    plane.legend(loc="best")
+        label_axes(axes, [f"{AXIS_TITLES[1]}, {length}", f"{AXIS_TITLES[column]}, {length}"])
     time, unit = _times(sampled.time_s)
-    distance.plot(time, np.linalg.norm(offset, axis=1), **PURSUER)
-    distance.set(xlabel=f"time, {unit}", ylabel=f"distance, {length}", title="(c) distance")
-    distance.set_ylim(bottom=0.0)
+    panels[2].plot(time, np.linalg.norm(offset, axis=1), **PURSUER)
+    panels[2].set(xlabel=f"time, {unit}", ylabel=f"distance, {length}")
+    panels[2].set_ylim(bottom=0.0)
+    letters(panels, ["in the orbital plane", "out of the orbital plane", "distance"])
+    legend_below(figure, 3)
     return figure
 
 
@@ -107,23 +104,19 @@ def draw_relative(sampled: History) -> Figure:
 def draw_control(sampled: History) -> Figure:
     """Draw the thrust directions in the orbital frame of each craft, and the switching functions."""
     time, unit = _times(sampled.time_s)
-    figure, (inside, outside, switching) = figure_grid(66.0, 1, 3, (16.0, 4.0, 12.0, 8.0), (16.0, 0.0))
-    for name, player, look in (("pursuer", sampled.pursuer, PURSUER), ("evader", sampled.evader, EVADER)):
-        if not player.thrust_direction.any():
-            continue
-        in_plane, out_of_plane = np.degrees(thrust_angles(player)).T
-        inside.plot(time, in_plane, label=name, **look)
-        outside.plot(time, out_of_plane, label=name, **look)
-        switching.plot(time, player.switching, label=name, **look)
-    inside.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1.0, 1.5, 3.0, 4.5, 9.0, 10.0]))
-    inside.set(ylabel="angle from along-track to radial, deg", title="(a) thrust in the orbital plane")
-    outside.yaxis.set_major_locator(_few_ticks())
-    outside.set(ylabel="angle out of plane, deg", title="(b) thrust out of plane")
-    switching.set_ylim(bottom=0.0)
-    switching.set(ylabel="switching function / initial value", title="(c) full thrust if positive")
-    for axes in (inside, outside, switching):
-        axes.set_xlabel(f"time, {unit}")
-    switching.legend(loc="best")
+    figure, (panels,) = subplots(75.0, 1, 3)
+    for player, look in ((sampled.pursuer, PURSUER), (sampled.evader, EVADER)):
+        if player.thrust_direction.any():
+            in_plane, out_of_plane = np.degrees(thrust_angles(player)).T
+            for axes, values in zip(panels, (in_plane, out_of_plane, player.switching), strict=True):
+                axes.plot(time, values, **look)
+    panels[0].yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1.0, 1.5, 3.0, 4.5, 9.0, 10.0]))
+    panels[2].set_ylim(bottom=0.0)
+    labels = ("from along-track to radial, deg", "out of plane, deg", "switching function / first value")
+    for axes, label in zip(panels, labels, strict=True):
+        axes.set(xlabel=f"time, {unit}", ylabel=label)
+    letters(panels, ["thrust in the plane", "thrust out of plane", "full thrust if positive"])
+    legend_below(figure, 2)
     return figure
 
 
@@ -139,47 +132,49 @@ def draw_distance(solution: Solution) -> Figure:
     curve = solution.curve
     time, unit = _times(curve.duration_s)
     radius = solution.game.capture_radius_m / M_PER_KM
-    dots: dict[str, Any] = {"marker": "o", "markersize": 2.2, "color": TRUTH}
-    figure, (left, right) = figure_grid(66.0, 1, 2, (15.0, 4.0, 12.0, 8.0), (20.0, 0.0))
-    left.plot(time, curve.distance_m / M_PER_KM, **dots)
-    left.axhline(radius, **_LEVEL)
-    if solution.verdict is Verdict.CAPTURED:
-        left.plot(time[-1], radius, zorder=5, clip_on=False, **_STAR)
-    left.set(ylabel="distance $l(T)$ at the end, km", title=f"(a) {solution.verdict.value}")
-    right.plot(time, curve.min_curvature, **dots)
-    right.set(ylabel="smallest curvature of $h_P - h_E + l$", title="(b) saddle point if positive")
-    for axes in (left, right):
-        axes.set_ylim(bottom=0.0)
+    figure, (panels,) = subplots(75.0, 1, 2)
+    for axes, values in zip(panels, (curve.distance_m / M_PER_KM, curve.min_curvature), strict=True):
+        axes.plot(time, values, marker="o", markersize=2.2, color=TRUTH)
         axes.set_xlabel(f"duration $T$, {unit}")
+    panels[0].axhline(radius, label="capture radius", **BOUND)
+    if solution.verdict is Verdict.CAPTURED:
+        panels[0].plot(time[-1], radius, zorder=5, clip_on=False, label="capture", **_STAR)
+    panels[0].set_ylabel("distance $l(T)$ at the end, km")
+    panels[1].set_ylabel("min. curvature of $h_P - h_E + l$")
+    for axes in panels:
+        axes.set_ylim(bottom=0.0)
+    letters(panels, [solution.verdict.value, "saddle point if positive"])
+    legend_below(figure, 2)
     return figure
 
 
 @style()
 def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
     """Draw the capture times that the plans predict, and the distance, or the capture times of several simulations."""
-    figure, (left, right) = figure_grid(66.0, 1, 2, (15.0, 4.0, 12.0, 8.0), (18.0, 0.0))
+    figure, (panels,) = subplots(75.0, 1, 2)
+    left, right = panels
     look: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.5} if len(flights) > 1 else {"marker": "o", "markersize": 2.0}
     unit, per_s = time_unit(float(np.ptp(flights[0].planned_s)))
     for flight in flights[:100]:
         left.plot(flight.planned_s * per_s, flight.predicted_s * per_s, color=TRUTH, **look)
     if solution.capture is not None:
-        left.axhline(solution.capture.time_s * per_s, label="both players optimal", **_LEVEL)
-        left.legend(loc="best")
-    left.set(xlabel=f"time of the plan, {unit}", ylabel=f"predicted capture, {unit}", title="(a) predictions")
+        left.axhline(solution.capture.time_s * per_s, label="capture if both players are optimal", **BOUND)
+    left.set(xlabel=f"time of the plan, {unit}", ylabel=f"predicted capture, {unit}")
     if len(flights) == 1:
         (flight,) = flights
         time = np.append(flight.planned_s, flight.time_s) * per_s
-        right.plot(time, np.append(flight.distances_m, flight.distance_m) / M_PER_KM, **PURSUER)
+        right.plot(time, np.append(flight.distances_m, flight.distance_m) / M_PER_KM, color=TRUTH)
+        right.set(xlabel=f"time, {unit}", ylabel="distance, km")
         right.set_ylim(bottom=0.0)
-        title = f"(b) {flight.ended.value} at {flight.time_s:.1f} s"
-        right.set(xlabel=f"time, {unit}", ylabel="distance, km", title=title)
+        title = f"{flight.ended.value} at {flight.time_s:.1f} s"
     else:
         times = np.sort([flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]) * per_s
         if len(times):
             right.step(times, np.arange(1, len(times) + 1) / len(flights), where="post", color=TRUTH)
-        right.set_ylim(0.0, 1.02)
-        title = f"(b) {len(times)} of {len(flights)} captured"
-        right.set(xlabel=f"capture time, {unit}", ylabel="share of simulations captured", title=title)
+        right.set(xlabel=f"capture time, {unit}", ylabel="share of simulations captured", ylim=(0.0, 1.02))
+        title = f"{len(times)} of {len(flights)} captured"
+    letters(panels, ["predictions", title])
+    legend_below(figure, 1)
     return figure
 
 
@@ -202,7 +197,3 @@ def _draw_path(space: Any, flat: Axes, player: PlayerHistory, per_m: float, look
 def _times(seconds: Floats) -> tuple[Floats, str]:
     unit, per_s = time_unit(float(np.ptp(seconds)) if len(seconds) else 0.0)
     return seconds * per_s, unit
-
-
-def _few_ticks() -> MaxNLocator:
-    return MaxNLocator(nbins=4)

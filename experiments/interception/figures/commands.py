@@ -30,7 +30,7 @@ def draw_experiment(scenario: Scenario, curves: Sequence[Curve], courses: Sequen
     yield draw_corridor(curves, courses)
     for noise in NoiseKind if scenario.is_spatial else ():
         clouds = [
-            cloud(f"{noise.value} noise, {'with' if curve.range_sensor else 'no'} range sensor", [curve.results])
+            cloud(f"{noise.value} noise,\n{'with' if curve.range_sensor else 'no'} range sensor", [curve.results])
             for curve in curves
             if curve.noise is noise
         ]

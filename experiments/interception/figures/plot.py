@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import INK, SET_EDGE, figure_grid, style
+from experiments.common.figure_style import CURVE_LOOKS
 from experiments.common.screen import some_runs
-from experiments.interception.figures.distributions import draw_band
+from experiments.interception.figures.distributions import Sample, draw_samples
 from experiments.interception.figures.process import draw_process
-from sim import Record, Results, empirical_distribution
+from sim import Record, Results
 
 
 def plot(results: Results | Record | Sequence[Record]) -> Figure:
@@ -24,13 +24,4 @@ def plot(results: Results | Record | Sequence[Record]) -> Figure:
     """
     if not isinstance(results, Results):
         return draw_process([results] if isinstance(results, Record) else results)
-    with style():
-        figure, (left, right) = figure_grid(75.0, 1, 2, (14.0, 4.0, 12.0, 7.0), (9.0, 0.0))
-        panels = ((left, "miss, m", results.miss_m), (right, "impulse spent, m/s", results.impulse_m_s))
-        for axes, label, sample in panels:
-            found = empirical_distribution(sample)
-            draw_band(axes, found.values, found.lower, found.upper, SET_EDGE)
-            axes.plot(found.values, found.probability, drawstyle="steps-post", color=INK)
-            axes.set_xlabel(label)
-        left.set_ylabel(f"share of {some_runs(len(results))}")
-    return figure
+    return draw_samples([Sample(some_runs(len(results)), CURVE_LOOKS[1], results.miss_m, results.impulse_m_s)])

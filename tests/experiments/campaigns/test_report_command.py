@@ -147,15 +147,15 @@ def test_the_axis_has_room_for_the_guarantee_or_says_what_is_beyond() -> None:
     assert "random noise: guaranteed miss" in [text.get_text() for text in legend.get_texts()]
     tailed = replace(drawn, guaranteed_miss_m=np.append(np.linspace(10.0, 20.0, 39), 9e4))
     (miss, _) = draw_campaign_distributions([tailed]).axes
-    assert miss.get_xlabel().split("\n")[1:] == ["dotted beyond the axis: 1 of 40"]
+    assert miss.get_xlabel().split("\n")[1:] == ["guaranteed misses beyond the axis: 1 of 40"]
 
 
 def test_the_radius_of_the_body_is_a_line_with_a_label() -> None:
     figure = draw_campaign_distributions([replace(columns("random", 40), radius_m=0.5), columns("game", 40)])
     miss, impulse = figure.axes
-    (line,) = [each for each in miss.lines if each.get_label() == "_radius"]
+    (line,) = [each for each in miss.lines if str(each.get_label()).startswith("body radius")]
     assert float(np.asarray(line.get_xdata())[0]) == 0.5
-    assert not [each for each in impulse.lines if each.get_label() == "_radius"]
+    assert not [each for each in impulse.lines if str(each.get_label()).startswith("body radius")]
     (legend,) = figure.legends
     assert legend.get_texts()[-1].get_text() == "body radius, 0.5 m: a smaller miss is a hit"
 

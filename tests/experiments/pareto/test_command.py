@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
 from experiments.pareto.file import load_pareto
-from rendezvous.pareto import analyse_coalitions, solve_encounter, sweep_meeting_time, total_impulse
+from rendezvous.pareto import solve_encounter, sweep_meeting_time
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command, strict
 
@@ -195,21 +196,18 @@ def test_many_craft_have_no_list_of_coalitions(infoset: Command, mine: Callable[
     assert strict(Path("found.json").read_text())["coalitions"] == {}
 
 
-def test_figures_say_what_they_show() -> None:
+def test_figures_draw_the_numbers_of_the_solution() -> None:
     solution = solve_encounter(load_pareto("pareto-2008").encounter)
-    space, *planes = draw_trajectories(solution).axes[::-1]
-    assert [each.get_xlabel() for each in planes] == ["x (radial), m", "y (along-track), m", "y (along-track), m"]
-    assert [each.get_ylabel() for each in planes] == ["z (normal), m", "z (normal), m", "x (radial), m"]
-    assert space.get_xlabel() == "x (radial), m"
+    axes = draw_trajectories(solution).axes
+    titles = {"x": "x (radial), m", "y": "y (along-track), m", "z": "z (normal), m"}
+    assert [each.get_xlabel() for each in axes] == [titles[name] for name in "yxyx"]
+    assert [each.get_ylabel() for each in axes] == [titles[name] for name in "xyzz"]
     controls = draw_controls(solution, 1.0).axes
     assert [each.get_ylabel() for each in controls][2:] == ["$u_z$ (normal), m/s$^2$", "$|u|$, m/s$^2$"]
     sweep = sweep_meeting_time(solution.encounter, [20.0, 30.0, 40.0])
     front = draw_front(solution, {"min_group_loss": solution.point}, sweep).axes
-    assert front[0].get_xlabel() == "x of the meeting, m"
     (hull,) = front[0].patches
     corners = np.asarray(hull.get_path().vertices)[:-1]
     assert {tuple(each) for each in corners} == {tuple(each) for each in solution.ideals}
-    impulses = [total_impulse(solution.plan(index)) for index in range(3)]
-    bars = draw_costs(solution, analyse_coalitions(solution), impulses).axes[0]
-    heights = [each.get_height() for each in bars.patches]  # type: ignore[attr-defined]
+    heights = [each.get_height() for each in draw_costs(solution).axes[0].patches if isinstance(each, Rectangle)]
     np.testing.assert_allclose(heights[3:], solution.excess())

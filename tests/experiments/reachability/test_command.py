@@ -192,18 +192,16 @@ def test_a_bound_is_one_number_or_one_for_each_axis() -> None:
 def test_figures_show_sets_members_and_ranges() -> None:
     report = COMMAND.report(Reach(select="energy,l1,norms"))
     positions, velocities, planes, controls = draw_all(report)
-    assert "nonlinear" in positions.legends[0].get_texts()[0].get_text()
+    assert positions.axes[0].get_xlabel() == "x (radial), m"
     assert velocities.axes[0].get_xlabel() == "$v_x$ (radial), m/s"
     along = ["y (along-track), m"] * 2 + ["$v_y$ (along-track), m/s"] * 2
     assert [each.get_xlabel() for each in planes.axes] == along
     across = ["x (radial), m", "z (normal), m", "$v_x$ (radial), m/s", "$v_z$ (normal), m/s"]
     assert [each.get_ylabel() for each in planes.axes] == across
     # The minimum sum of norms is the minimum L1 here, and is drawn once.
-    assert [each.get_text() for each in planes.legends[0].get_texts()][2:] == [
-        "start",
-        "terminal state of minimum norm",
-        "tube at t",
-    ]
+    names = [each.get_text() for each in planes.legends[0].get_texts()]
+    members = [f"minimum {name}, {model}" for name in ("energy", "L1") for model in ("nonlinear", "linear")]
+    assert names == [*(f"tube at t = {t}" for t in (1, 2, 3)), *members, "start", "terminal state of minimum norm"]
     assert len(controls.axes) == 3
     assert shown_times(4) == [1, 2, 3]
     assert shown_times(64) == [1, 13, 26, 38, 51, 63]

@@ -1,0 +1,94 @@
+"""What figures of the interception share: lines of levels, the time before the arrival, and its events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullFormatter
+
+from experiments.common.figure_style import EVENT, HALO, INK
+from experiments.interception.course import duration_text, marks, min_to_go_s
+from sim import Scenario
+
+RADIUS: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
+"""Line of the radius of the body."""
+GUARANTEE: dict[str, Any] = {"color": "#2f6b3a", "linestyle": (0, (7, 1.5)), "linewidth": 1.4}
+"""Line of the guaranteed miss."""
+BODY_FILL = "#f0e6d8"
+"""Colour of the disc of the body."""
+MAX_VECTORS = 2000
+"""Number of points above which they are pixels in the PDF file."""
+
+_TICKS_S = (0.01, 1.0, 60.0, 3600.0, 86400.0)
+_MORE_TICKS_S = (0.1, 10.0, 600.0, 21600.0, 864000.0)
+"""Ticks of the time before the arrival, and those that have a label only in a short flight."""
+_LONG = 1000.0
+"""Ratio of the first and the last time from which a flight is long."""
+
+
+def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) -> None:
+    """Draw the guaranteed miss and the radius of the body, if they are known, as horizontal lines."""
+    if guaranteed_m:
+        axes.axhline(guaranteed_m, label="guaranteed miss Φ", **GUARANTEE)
+    if radius_m:
+        axes.axhline(radius_m, label=f"body radius, {radius_m:g} m", **RADIUS)
+
+
+def draw_body(axes: Axes, half_m: float, guaranteed_m: float | None, radius_m: float | None) -> None:
+    """Draw the B-plane of axes that extend by `half_m` around the centre of the body: disc, guaranteed miss, labels."""
+    if radius_m is not None and radius_m <= half_m:
+        fill = axes.fill(*ring(radius_m), facecolor=BODY_FILL, zorder=0.5, label=f"body radius, {radius_m:g} m")
+        fill[0].set(edgecolor=INK, linestyle=RADIUS["linestyle"])
+    if guaranteed_m is not None and guaranteed_m <= half_m:
+        axes.plot(*ring(guaranteed_m), label="guaranteed miss Φ", zorder=3.1, **GUARANTEE)
+    centre: dict[str, Any] = {"color": INK, "marker": "+", "markersize": 7.0, "linestyle": "none", "zorder": 4.0}
+    axes.plot(0.0, 0.0, markeredgewidth=1.1, label="centre of the body", **centre)
+    axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal", xlabel="miss along y, m")
+    axes.set_ylabel("miss along z, m")
+    for one in (axes.xaxis, axes.yaxis):
+        one.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+
+
+def ring(radius: float) -> Any:
+    """Return points of a circle around the origin, shape (2, 181)."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    return radius * np.array([np.cos(turn), np.sin(turn)])
+
+
+def draw_impulses(axes: Axes, times: Any, sizes: Any, **look: Any) -> None:
+    """Draw the impulses that are not zero as bars."""
+    given = sizes != 0.0
+    axes.vlines(times[given], 0.0, sizes[given], rasterized=bool(given.sum() > MAX_VECTORS), **look)
+
+
+def count_down(column: Sequence[Axes], scenario: Scenario) -> None:
+    """Make the time axis of axes above each other logarithmic in the time before the arrival; draw the schedule."""
+    begin_s, end_s = scenario.nominal_arrival_s, min_to_go_s(scenario)
+    ticks = [tick for tick in _TICKS_S if end_s <= tick <= begin_s]
+    more = [tick for tick in _MORE_TICKS_S if end_s <= tick <= begin_s]
+    if begin_s < _LONG * end_s:
+        ticks, more = [*ticks, *more], []
+    for axes in column:
+        axes.set_xscale("log")
+        axes.set_xlim(1.1 * begin_s, end_s)
+        axes.xaxis.set_major_locator(FixedLocator(ticks))
+        axes.xaxis.set_minor_locator(FixedLocator(more))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: duration_text(tick)))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        for time_s in marks(scenario).values():
+            axes.axvline(time_s, zorder=1.5, label="times of the schedule", **EVENT)
+    column[-1].set_xlabel("time to go")
+
+
+def name_events(axes: Axes, scenario: Scenario) -> None:
+    """Write the names of the times of the schedule along their lines, in turn to the left and to the right."""
+    for number, (name, time_s) in enumerate(sorted(marks(scenario).items(), key=lambda item: -item[1])):
+        side, offset = (("right", -2.0), ("left", 2.0))[number % 2]
+        place: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points"}
+        axes.annotate(
+            f"{name}, {duration_text(time_s)}", (time_s, 0.97), xytext=(offset, 0.0), rotation=90.0, ha=side, va="top",
+            fontsize="small", path_effects=HALO, zorder=5.0, **place,
+        )  # fmt: skip
