@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
 from rendezvous._arrays import Flags, Floats, Integers
-from rendezvous._compile import compiled
 from rendezvous.relative_motion import LinearMotion, TimeVaryingMotion
+from rendezvous.relative_motion.linear_motion import state_scales
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +108,7 @@ class Path:
 
     def control(self, time_s: Floats) -> Floats:
         """Return u = B' lambda, m/s^2, shape (k, 3), at k times."""
-        return np.asarray(np.einsum("kai,ka->ki", self.motion.input_map(time_s), self.costate(time_s)))
+        return self.costate(time_s)[:, 3:]
 
     def breaks(self) -> Floats:
         """Return times, s, not decreasing, between which the control is smooth and turns by about a radian."""
@@ -164,21 +165,57 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     NotSettledError
         If the numbers overflow, or a Gramian is singular in floating point.
     """
-    starts = np.concatenate([[start_s], nodes.leave_s[:-1]])
-    durations = nodes.arrive_s - starts
     check_times(start_s, nodes.arrive_s, nodes.leave_s)
+    starts = np.concatenate([[start_s], nodes.leave_s[:-1]])
     segment = motion.segment(starts, nodes.arrive_s)
+    scale = state_scales(nodes.arrive_s - starts)
     arrive, begin = nodes.arrive.copy(), np.concatenate([start_state[None], nodes.leave[:-1]])
-    before, at_start, after = np.empty_like(arrive), np.empty_like(arrive), np.zeros_like(arrive)
-    blocks = segment.transition, segment.gramian, segment.drift
-    solved, cost = solve_path(*blocks, durations, begin, arrive, nodes.rendezvous, before, at_start)
-    if not solved or not np.isfinite(cost):
+    free = ~nodes.rendezvous
+    arrive[free, 3:] = begin[1:][free[:-1], 3:] = 0.0  # the unknowns
+    missing = (arrive - (segment.transition @ begin[:, :, None])[:, :, 0] - segment.drift) / scale
+    try:
+        lower = np.linalg.cholesky(segment.gramian / (scale[:, :, None] * scale[:, None, :]))
+        slopes = (
+            np.broadcast_to(np.eye(6)[:, 3:], (len(starts), 6, 3)),
+            segment.transition[:, :, 3:] / scale[:, :, None],
+        )
+        whitened = np.linalg.solve(lower, np.concatenate([missing[:, :, None], *slopes], axis=2))
+        effort, ahead, behind = whitened[:, :, 0], whitened[:, :, 1:4], whitened[:, :, 4:]
+        velocities = _velocities(effort, ahead, behind, free)
+    except (np.linalg.LinAlgError, ValueError):  # ValueError: a number is not finite
         raise NotSettledError(
             "the numbers of the path overflow, or a segment is too short or too long for its Gramian; check the units"
-        )
-    after[:-1] = at_start[1:]
-    gradient = _time_gradient(motion, nodes, arrive, before, after)
+        ) from None
+    effort = effort + np.einsum("kij,kj->ki", ahead, velocities)
+    effort[1:] -= np.einsum("kij,kj->ki", behind[1:], velocities[:-1])
+    before = np.linalg.solve(np.swapaxes(lower, 1, 2), effort[:, :, None])[:, :, 0] / scale
+    at_start = np.einsum("kji,kj->ki", segment.transition, before)
+    after = np.concatenate([at_start[1:], np.zeros((1, 6))])
+    arrive[free, 3:] = velocities[free]
+    begin[1:][free[:-1], 3:] = velocities[:-1][free[:-1]]
+    cost, gradient = 0.5 * float((effort**2).sum()), _time_gradient(motion, nodes, arrive, before, after)
     return Path(motion, nodes, cost, starts, begin, arrive, before, after, at_start[0], gradient)
+
+
+def _velocities(effort: Floats, ahead: Floats, behind: Floats, free: Flags) -> Floats:
+    """Minimise sum |effort_k + ahead_k v_k - behind_k v_(k-1)|^2 over velocities v_k that are free; others are zero.
+
+    The normal equations have 3 x 3 blocks on three diagonals: a banded matrix, shape (6, 3 N), of the lower diagonals.
+    """
+    diagonal = np.einsum("kra,krb->kab", ahead, ahead)
+    diagonal[:-1] += np.einsum("kra,krb->kab", behind[1:], behind[1:])
+    right = -np.einsum("kra,kr->ka", ahead, effort)
+    right[:-1] += np.einsum("kra,kr->ka", behind[1:], effort[1:])
+    below = -np.einsum("kra,krb->kab", ahead[1:], behind[1:])
+    diagonal[~free], right[~free] = np.eye(3), 0.0
+    below[~(free[1:] & free[:-1])] = 0.0
+    band = np.zeros((6, len(effort), 3))
+    for row in range(3):
+        for column in range(3):
+            band[3 + row - column, :-1, column] = below[:, row, column]
+            if row >= column:
+                band[row - column, :, column] = diagonal[:, row, column]
+    return np.asarray(solveh_banded(band.reshape(6, -1), right.ravel(), lower=True).reshape(-1, 3))
 
 
 def _carried(motion: LinearMotion, grid: Floats, start: Floats, costate_end: Floats) -> tuple[Floats, Floats]:
@@ -219,180 +256,8 @@ def _time_gradient(motion: LinearMotion, nodes: Nodes, arrive: Floats, before: F
         states = np.concatenate([nodes.arrive[met], nodes.leave[met]])
         rates = np.concatenate([nodes.arrive_rate[met], nodes.leave_rate[met]])
         costates = np.concatenate([before[met], after[met]])
-        sides = _hamiltonian(motion, times, states, costates) - (costates * rates).sum(axis=1)
+        # The Hamiltonian, without its part lambda' x_i'.
+        sides = (costates * (motion.rates(times, states) - rates)).sum(axis=1)
+        sides += 0.5 * (costates[:, 3:] ** 2).sum(axis=1)
         gradient[met] = sides[len(sides) // 2 :] - sides[: len(sides) // 2]
     return gradient
-
-
-def _hamiltonian(motion: LinearMotion, times: Floats, states: Floats, costates: Floats) -> Floats:
-    control = (costates[:, None, :] @ motion.input_map(times))[:, 0]
-    return np.asarray((costates * motion.rates(times, states)).sum(axis=1) + 0.5 * (control**2).sum(axis=1))
-
-
-@compiled
-def factor(matrix: Floats, lower: Floats) -> bool:
-    """Fill the Cholesky factor; False if the matrix is not positive definite."""
-    size = len(matrix)
-    for row in range(size):
-        for column in range(row + 1):
-            value = matrix[row, column]
-            for inner in range(column):
-                value -= lower[row, inner] * lower[column, inner]
-            if row == column:
-                if not value > 0.0:
-                    return False
-                lower[row, row] = np.sqrt(value)
-            else:
-                lower[row, column] = value / lower[column, column]
-    return True
-
-
-@compiled
-def whiten(lower: Floats, columns: Floats) -> None:
-    """Multiply by the inverse of a lower triangle, in place; `columns` has shape (size, m)."""
-    for column in range(columns.shape[1]):
-        for row in range(len(lower)):
-            value = columns[row, column]
-            for inner in range(row):
-                value -= lower[row, inner] * columns[inner, column]
-            columns[row, column] = value / lower[row, row]
-
-
-@compiled
-def whiten_back(lower: Floats, columns: Floats) -> None:
-    """Multiply by the inverse of its transpose, in place."""
-    for column in range(columns.shape[1]):
-        for row in range(len(lower) - 1, -1, -1):
-            value = columns[row, column]
-            for inner in range(row + 1, len(lower)):
-                value -= lower[inner, row] * columns[inner, column]
-            columns[row, column] = value / lower[row, row]
-
-
-@compiled
-def solve_path(
-    transition: Floats,
-    gramian: Floats,
-    drift: Floats,
-    durations: Floats,
-    begin: Floats,
-    arrive: Floats,
-    pinned: Flags,
-    before: Floats,
-    at_start: Floats,
-) -> tuple[bool, float]:
-    """Solve for the velocities at flybys (in `begin`, `arrive`) and the costates `before` and `at_start` of N segments.
-
-    Transitions, Gramians, drifts and durations are those of the segments, begin and arrive their states at both ends;
-    `pinned` says whether the velocity at the end is given. Returns whether all blocks are positive definite, and I;
-    otherwise the outputs are invalid.
-
-    y_k = L_k^-1 S_k^-1 (x_k - Phi_k x_(k-1) - d_k) with S = (T, T, T, 1, 1, 1); ahead and behind are its slopes along
-    the velocities at the end and, negated, at the start. Normal equations by blocks of 3, factored as they are built.
-    """
-    count = len(durations)
-    lower = np.zeros((count, 6, 6))
-    ahead, behind, effort = np.zeros((count, 6, 3)), np.zeros((count, 6, 3)), np.zeros((count, 6, 1))
-    scaled = np.empty((6, 6))
-    for k in range(count):
-        for row in range(6):
-            by = durations[k] if row < 3 else 1.0
-            for column in range(6):
-                scaled[row, column] = gramian[k, row, column] / (by * (durations[k] if column < 3 else 1.0))
-            value = -drift[k, row]
-            if row < 3 or pinned[k]:
-                value += arrive[k, row]
-            for column in range(6):
-                if column < 3 or k == 0 or pinned[k - 1]:
-                    value -= transition[k, row, column] * begin[k, column]
-            effort[k, row, 0] = value / by
-            for column in range(3):
-                behind[k, row, column] = transition[k, row, 3 + column] / by
-        for axis in range(3):
-            ahead[k, 3 + axis, axis] = 1.0
-        if not factor(scaled, lower[k]):
-            return False, 0.0
-        whiten(lower[k], effort[k])
-        whiten(lower[k], ahead[k])
-        whiten(lower[k], behind[k])
-    velocities = np.zeros((count, 3))
-    if not _eliminate(ahead, behind, effort, pinned, velocities):
-        return False, 0.0
-    cost = 0.0
-    for k in range(count):
-        for row in range(6):
-            value = effort[k, row, 0]
-            for column in range(3):
-                value += ahead[k, row, column] * velocities[k, column]
-                if k > 0:
-                    value -= behind[k, row, column] * velocities[k - 1, column]
-            effort[k, row, 0] = value
-            cost += 0.5 * value * value
-        whiten_back(lower[k], effort[k])
-        for row in range(6):
-            before[k, row] = effort[k, row, 0] / (durations[k] if row < 3 else 1.0)
-        for row in range(6):
-            value = 0.0
-            for column in range(6):
-                value += transition[k, column, row] * before[k, column]
-            at_start[k, row] = value
-        if not pinned[k]:
-            for axis in range(3):
-                arrive[k, 3 + axis] = velocities[k, axis]
-                if k + 1 < count:
-                    begin[k + 1, 3 + axis] = velocities[k, axis]
-    return True, cost
-
-
-@compiled
-def _eliminate(ahead: Floats, behind: Floats, effort: Floats, pinned: Flags, velocities: Floats) -> bool:
-    """Solve the block-tridiagonal normal equations; given velocities stay zero."""
-    count = len(effort)
-    lower, coupled = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
-    right, block = np.zeros((count, 3, 1)), np.zeros((3, 3))
-    for k in range(count):
-        for first in range(3):
-            value = 0.0
-            for row in range(6):
-                value -= ahead[k, row, first] * effort[k, row, 0]
-                if k + 1 < count:
-                    value += behind[k + 1, row, first] * effort[k + 1, row, 0]
-            right[k, first, 0] = value
-            for second in range(3):
-                value = 0.0
-                for row in range(6):
-                    value += ahead[k, row, first] * ahead[k, row, second]
-                    if k + 1 < count:
-                        value += behind[k + 1, row, first] * behind[k + 1, row, second]
-                block[first, second] = value
-        if pinned[k]:
-            for axis in range(3):
-                right[k, axis, 0] = 0.0
-                lower[k, axis, axis] = 1.0
-            continue
-        if k > 0 and not pinned[k - 1]:
-            # coupled = L_(k-1)^-1 times the block above the diagonal.
-            for first in range(3):
-                for second in range(3):
-                    value = 0.0
-                    for row in range(6):
-                        value -= behind[k, row, first] * ahead[k, row, second]
-                    coupled[k, first, second] = value
-            whiten(lower[k - 1], coupled[k])
-            for first in range(3):
-                for inner in range(3):
-                    right[k, first, 0] -= coupled[k, inner, first] * right[k - 1, inner, 0]
-                    for second in range(3):
-                        block[first, second] -= coupled[k, inner, first] * coupled[k, inner, second]
-        if not factor(block, lower[k]):
-            return False
-        whiten(lower[k], right[k])
-    for k in range(count - 1, -1, -1):
-        if k + 1 < count:
-            for first in range(3):
-                for second in range(3):
-                    right[k, first, 0] -= coupled[k + 1, first, second] * right[k + 1, second, 0]
-        whiten_back(lower[k], right[k])
-        for axis in range(3):
-            velocities[k, axis] = right[k, axis, 0]
-    return True

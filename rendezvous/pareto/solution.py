@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 from rendezvous.pareto.encounter import Craft, Encounter
-from rendezvous.relative_motion import TimeVaryingMotion
 
 
 @dataclass(frozen=True)
@@ -34,9 +33,7 @@ class Plan:
 
     def control(self, time_s: ArrayLike) -> Floats:
         """Return u(t) = B' Phi(T, t)' lambda, m/s^2, shape (..., 3): (2.1) of the paper."""
-        times = np.asarray(time_s, dtype=np.float64)
-        costate = self._costate_at(times)
-        return np.asarray(np.einsum("...ai,...a->...i", self.craft.motion.input_map(times), costate))
+        return self._costate_at(np.asarray(time_s, dtype=np.float64))[..., 3:]
 
     def state(self, time_s: ArrayLike) -> Floats:
         """Return x(t) = Phi x0 + drift + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6): (2.5) of the paper."""
@@ -52,7 +49,7 @@ class Plan:
 
     def effects(self, time_s: Floats) -> Floats:
         """Return Phi(T, t) B(t), shape (k, 6, 3), the effect of a unit control for a second on the terminal state."""
-        return np.asarray(self._to_meeting(time_s) @ self.craft.motion.input_map(time_s))
+        return self._to_meeting(time_s)[:, :, 3:]
 
     def breaks(self) -> Floats:
         """Return times from start to meeting between which the motion turns by about a radian at most, s."""
@@ -63,18 +60,7 @@ class Plan:
 
     def _to_meeting(self, times: Floats) -> Floats:
         """Phi(T, t), shape (..., 6, 6)."""
-        motion = self.craft.motion
-        if not isinstance(motion, TimeVaryingMotion):
-            return motion.transition(times, np.full(times.shape, self.meeting_s))
-        # From each time to the next one: long intervals of a motion that varies are expensive.
-        order = np.argsort(times, axis=None, kind="stable")
-        grid = np.append(times.ravel()[order], self.meeting_s)
-        steps = motion.transition(grid[:-1], grid[1:])
-        matrices, ahead = np.empty((times.size, 6, 6)), np.eye(6)
-        for index in range(times.size - 1, -1, -1):
-            ahead = ahead @ steps[index]
-            matrices[order[index]] = ahead
-        return matrices.reshape(*times.shape, 6, 6)
+        return self.craft.motion.transition(times, np.full(times.shape, self.meeting_s))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._extremal import acceleration, eliminate, end_of, flow_back, rate, shoot_back
+from rendezvous.pursuit_evasion._extremal import acceleration, end_of, flow_back, rate, shoot_back
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""
@@ -72,24 +72,21 @@ class Craft:
         if shot is None:
             return None
         y, z = shot
-        right = np.empty((6, 10))
-        right[:, :6] = np.eye(6)
-        right[:, 6] = self.start - y[:6]
-        right[:, 7:9] = -z[:6, 6:8]
+        error = self.start - y[:6]
         # A longer game starts further back, and ends with less mass.
-        right[:, 9] = rate(y, self.mu, self.oblateness, self.thrust / self.mass) + self.flow * z[:6, 8]
-        residual = float(np.abs(right[:, 6]).max())
-        determinant = eliminate(z[:6, :6].copy(), right)
-        if determinant == 0.0:
+        later = rate(y, self.mu, self.oblateness, self.thrust / self.mass) + self.flow * z[:6, 8]
+        try:
+            inverse = np.asarray(np.linalg.inv(z[:6, :6]), dtype=np.float64)
+        except np.linalg.LinAlgError:
             return None
         return Response(
-            rho=right[:, 6],
-            by_nu=right[:, 7:9],
-            by_time=right[:, 9],
-            regular=determinant > 0.0,
-            inverse=right[:, :6],
+            rho=inverse @ error,
+            by_nu=-inverse @ z[:6, 6:8],
+            by_time=inverse @ later,
+            regular=bool(np.linalg.det(z[:6, :6]) > 0.0),
+            inverse=inverse,
             costate=y[6:],
-            residual=residual,
+            residual=float(np.abs(error).max()),
         )
 
     def correct(
@@ -317,17 +314,15 @@ class Pair:
         outer[:, :2] = p.by_nu[:3] - e.by_nu[:3] + distance * plane.T
         outer[:, 2] = nu
         drift = e.by_time[:3] - p.by_time[:3]
-        # The inverse of the system at this duration, and the derivative of (nu, l) by the duration.
-        at_time = np.concatenate([np.eye(3), drift[:, None]], axis=1)
-        if eliminate(outer.copy(), at_time) == 0.0:
+        try:
+            inverse = np.asarray(np.linalg.inv(outer), dtype=np.float64)
+            by_time = inverse @ drift  # of (nu, l)
+            if time_free:
+                outer[:, 2] = -drift
+                inverse = np.asarray(np.linalg.inv(outer), dtype=np.float64)
+        except np.linalg.LinAlgError:
             return None
-        at_distance = at_time[:, :3]
-        if time_free:
-            outer[:, 2] = -drift
-            at_distance = np.eye(3)
-            if eliminate(outer, at_distance) == 0.0:
-                return None
-        return _Linear(p, e, plane, time_free, at_distance, at_time[:, 3])
+        return _Linear(p, e, plane, time_free, inverse, by_time)
 
     def begin(self, latest: float, radius: float) -> Node | None:
         """Return the extremal of a short duration, at most `latest`, from the line of sight as a guess, or None.

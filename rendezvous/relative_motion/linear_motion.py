@@ -26,7 +26,7 @@ class Segment:
 
 
 class LinearMotion(ABC):
-    """x' = A(t) x + B(t) u + w(t), x = (position, velocity); by default B = (0, 1)' and w = 0.
+    """x' = A(t) x + B u + w(t), x = (position, velocity), with B = (0, 1)'; by default w = 0.
 
     Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front.
     """
@@ -50,12 +50,6 @@ class LinearMotion(ABC):
     @abstractmethod
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, between which the motion turns by about a radian at most."""
-
-    def input_map(self, time_s: ArrayLike) -> Floats:
-        """B(t), shape (..., 6, 3)."""
-        matrix = np.zeros((*np.shape(time_s), 6, 3))
-        matrix[..., 3, 0] = matrix[..., 4, 1] = matrix[..., 5, 2] = 1.0
-        return matrix
 
     def forcing(self, time_s: ArrayLike) -> Floats:
         """w(t), shape (..., 6)."""

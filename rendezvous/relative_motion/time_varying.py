@@ -30,15 +30,12 @@ class _Solution(Segment):
 
 @dataclass(frozen=True, eq=False)
 class TimeVaryingMotion(LinearMotion):
-    """x' = A(t) x + B(t) u + w(t).
+    """x' = A(t) x + B u + w(t).
 
     Parameters
     ----------
     matrix_at : callable
         A of times of shape (k,), s: shape (k, 6, 6).
-    input_at : callable or None
-        B, shape (k, 6, 3); None is an acceleration, (0, 1)'. An actuator with the cost u' R u has B = (0, 1)' R^(-1/2),
-        and controls R^(1/2) u.
     drift_at : callable or None
         w, shape (k, 6); None is zero.
 
@@ -50,16 +47,11 @@ class TimeVaryingMotion(LinearMotion):
     """
 
     matrix_at: OfTime
-    input_at: OfTime | None = None
     drift_at: OfTime | None = None
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""
         return _at(self.matrix_at, time_s)
-
-    def input_map(self, time_s: ArrayLike) -> Floats:
-        """B(t), shape (..., 6, 3)."""
-        return super().input_map(time_s) if self.input_at is None else _at(self.input_at, time_s)
 
     def forcing(self, time_s: ArrayLike) -> Floats:
         """w(t), shape (..., 6)."""
@@ -192,8 +184,7 @@ def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels:
     right = np.broadcast_to(np.tile(np.eye(6), (NODES, 1)), (len(durations), panels, 6 * NODES, 6))
     psi = np.linalg.solve(system, right).reshape(len(durations), panels, NODES, 6, 6)
     last = np.eye(6) + np.einsum("k,npkab->npab", weights, adjoint @ psi)
-    inputs = motion.input_map(times) / scale[:, None, None, :, None]
-    effect = np.swapaxes(psi, -1, -2) @ inputs
+    effect = np.swapaxes(psi[..., 3:, :], -1, -2)  # Phi B; velocities are not scaled
     drifts = np.zeros((len(durations), panels, 6))
     if motion.drift_at is not None:
         pushed = _at(motion.drift_at, times) / scale[:, None, None, :]

@@ -79,9 +79,8 @@ def flown(tour: Tour, times: Floats) -> tuple[Floats, float]:
         def rates(time: float, values: Floats) -> Floats:
             # The costate comes along, integrated backward from its end beforehand: here forward from its start.
             state, costate = values[:6], values[6:12]
-            matrix, inputs = tour.motion.dynamics(time), tour.motion.input_map(time)
-            control = inputs.T @ costate
-            moved = matrix @ state + inputs @ control + tour.motion.forcing(time)
+            matrix, control = tour.motion.dynamics(time), costate[3:]
+            moved = matrix @ state + np.append(np.zeros(3), control) + tour.motion.forcing(time)
             return np.concatenate([moved, -matrix.T @ costate, [0.5 * control @ control]])
 
         scale = np.array([end - start] * 3 + [1.0] * 3)

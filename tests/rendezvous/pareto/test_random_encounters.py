@@ -331,9 +331,7 @@ def min_peak_program(plan: Plan, common: int, count: int) -> tuple[float, float]
     half = 0.5 * (end - start) / (4 * count)
     times = (start + half * (2.0 * np.arange(4 * count) + 1.0)[:, None] + half * places).ravel()
     scale = np.array([end - start] * 3 + [1.0] * 3)
-    effects = (motion.transition(times, np.full(times.shape, end)) @ motion.input_map(times) / scale[:, None])[
-        :, :common
-    ]
+    effects = (motion.transition(times, np.full(times.shape, end))[:, :, 3:] / scale[:, None])[:, :common]
     sizes_at = np.linalg.norm(np.einsum("kai,a->ki", effects, multipliers), axis=1)
     below = abs(float(multipliers @ wanted)) / float(np.tile(half * weights, 4 * count) @ sizes_at)
     return below, above
