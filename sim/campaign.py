@@ -161,11 +161,6 @@ class Campaign:
         )
 
     @property
-    def kind(self) -> str:
-        """`campaign` or `sweep`."""
-        return "sweep" if self.axes else "campaign"
-
-    @property
     def engagements(self) -> int:
         """Engagements of all cells, at most."""
         return self.cell_runs * max(1, len(self.cells))

@@ -10,8 +10,6 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from infoset.limits import NUMBER, Limits
-
 _Owner = TypeVar("_Owner")
 
 
@@ -44,7 +42,6 @@ class Column:
     kind: type = float
     nullable: bool = False
     optional: bool = False
-    limits: Limits = NUMBER
     field: str = ""
     component: int | None = None
     derived: bool = False

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.limits import NOT_NEGATIVE
 from infoset.set_queries import MaskedFloats
 from sim.columns import Column, columns, columns_with_values, documented, values_of
 from sim.statistics import HitEstimate, estimate_hits
@@ -72,17 +71,11 @@ class Results:
     """
 
     runs: Integers = field(metadata=columns(Column("run", "", "Run number", int)))
-    miss_m: Floats = field(
-        metadata=columns(Column("miss_m", "m", "Minimum distance between the centres of mass", limits=NOT_NEGATIVE))
-    )
-    impulse_m_s: Floats = field(
-        metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' moduli", limits=NOT_NEGATIVE))
-    )
-    guaranteed_miss_m: MaskedFloats = field(
-        metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True, limits=NOT_NEGATIVE))
-    )
+    miss_m: Floats = field(metadata=columns(Column("miss_m", "m", "Minimum distance between the centres of mass")))
+    impulse_m_s: Floats = field(metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' moduli")))
+    guaranteed_miss_m: MaskedFloats = field(metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True)))
     theorem_8_miss_m: MaskedFloats = field(
-        metadata=columns(Column("theorem_8_miss_m", "m", _THEOREM_8, nullable=True, optional=True, limits=NOT_NEGATIVE))
+        metadata=columns(Column("theorem_8_miss_m", "m", _THEOREM_8, nullable=True, optional=True))
     )
     outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
     set_emptied: Flags = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool)))

@@ -55,7 +55,7 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
         note(f"warning: {warning}")
     with workers_of(options, note) as (executor, workers), progress_bar(options.quiet) as begin:
         began_s = time.perf_counter()
-        folder = campaign.run(executor, workers=workers, resume=options.resume, progress=begin(campaign.kind))
+        folder = campaign.run(executor, workers=workers, resume=options.resume, progress=begin("campaign"))
     return Flown(folder, warnings, time.perf_counter() - began_s)
 
 

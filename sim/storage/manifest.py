@@ -8,9 +8,9 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from infoset.limits import COUNT, NUMBER, WHOLE
+from infoset.limits import COUNT, WHOLE, Number, check_fields
 from sim.parallel import CampaignNoise
 from sim.scenario import Scenario
 from sim.storage.codec import from_json, to_json
@@ -18,7 +18,6 @@ from sim.storage.files import StorageError, reporting, write_whole
 
 SCHEMA = 1
 MANIFEST = "manifest.json"
-MAX_DIFFERENCES = 20
 MAX_CELLS = 10_000
 
 _MAY_DIFFER = ("runs", "until", "cell_runs", "require", "extended", "versions.python")
@@ -43,21 +42,20 @@ class Axis:
     """
 
     key: str
-    values: tuple[float, ...]
+    values: tuple[Number, ...]
     scale: Literal["linear", "log"] = "linear"
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if len(self.values) < 2:
             raise ValueError(f"{self.key}: an axis needs at least two values")
-        for value in self.values:
-            NUMBER.need(self.key, value)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
     """All that determines the numbers of a campaign or a sweep, its progress, and its division into chunks.
 
-    A TypeError or ValueError is raised if a number is out of its range.
+    A ValueError is raised if there are too many cells, or `cell_runs` does not fit.
 
     Parameters
     ----------
@@ -85,24 +83,22 @@ class Manifest:
         Versions of the packages and of Python in the first session; only the latter may differ later.
     """
 
-    runs: int
+    runs: Annotated[int, COUNT]
     until: str | None = None
     cell_runs: tuple[int, ...] = ()
     require: str | None = None
     extended: bool = False
     scenario: Scenario
-    seed: int
+    seed: Annotated[int, WHOLE]
     noise: CampaignNoise
     strategy: str
     guarantee: bool
-    chunk: int
+    chunk: Annotated[int, COUNT]
     axes: tuple[Axis, ...] = ()
     cells_hash: str = ""
     versions: Mapping[str, str]
 
     def __post_init__(self) -> None:
-        for name, limits in (("runs", COUNT), ("chunk", COUNT), ("seed", WHOLE)):
-            limits.need(name, getattr(self, name))
         if self.cells > MAX_CELLS:
             raise ValueError(f"axes make {self.cells} cells, more than the {MAX_CELLS} that a sweep may have")
         if self.cell_runs and len(self.cell_runs) != self.cells:
@@ -167,8 +163,6 @@ class Manifest:
             for key in dict.fromkeys((*there, *here))
             if there.get(key) != here.get(key)
         ]
-        if len(lines) > MAX_DIFFERENCES:
-            lines = [*lines[:MAX_DIFFERENCES], f"\n  and {len(lines) - MAX_DIFFERENCES} more"]
         if lines:
             raise StorageError(
                 f"{folder}: contains a campaign with different settings; repeat the command with those of the folder, "

@@ -1,10 +1,7 @@
 from __future__ import annotations
 
 import itertools
-import random
-import threading
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +13,7 @@ from sim import Campaign, CampaignNoise, QuantileName, Requirement, Scenario, St
 from sim.requirement import Decision, judge
 from sim.scenario import of_model
 from sim.storage import Axis, CampaignFolder, read_manifest
+from tests.sim.shuffled import Shuffled
 
 ERRORS = (1e-5, 1.2e-4, 1.5e-4, 3e-4)
 REQUIRED = Requirement(QuantileName("miss_m", 0.8), 3.0)
@@ -23,27 +21,6 @@ REQUIRED = Requirement(QuantileName("miss_m", 0.8), 3.0)
 
 class InterruptError(Exception):
     """Stands for an interruption."""
-
-
-class Shuffled(Executor):
-    """Computes the waiting chunks in a random order."""
-
-    def __init__(self, seed: int) -> None:
-        self._random = random.Random(seed)
-        self._lock = threading.Lock()
-        self._waiting: list[tuple[Future[Any], Callable[[], Any]]] = []
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        self._waiting.append((future, lambda: fn(*args, **kwargs)))
-        threading.Thread(target=self._one).start()
-        return future
-
-    def _one(self) -> None:
-        with self._lock:
-            future, work = self._waiting.pop(self._random.randrange(len(self._waiting)))
-        if future.set_running_or_notify_cancel():
-            future.set_result(work())
 
 
 @pytest.fixture(scope="module")

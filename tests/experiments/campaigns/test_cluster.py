@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -44,13 +43,13 @@ def test_no_scheduler_is_one_message_and_an_open_one_is_warned_of(
 class Processes:
     """A Dask scheduler and workers, each a process on the loopback."""
 
-    def __init__(self, folder: Path, protocol: str = "tcp") -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.stack = contextlib.ExitStack()
         with socket.create_server(("127.0.0.1", 0)) as server:
             port = server.getsockname()[1]
-        self.address = f"{protocol}://127.0.0.1:{port}"
-        self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--protocol", protocol)
+        self.address = f"tcp://127.0.0.1:{port}"
+        self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", str(port))
 
     def wait_until_up(self) -> None:
         """Wait until the scheduler listens."""
@@ -171,48 +170,3 @@ def test_no_workers_and_workers_of_another_version(
     code, _, err = infoset(*asked)
     assert code == 2
     assert f"infoset {version('infoset')} in the campaign, 0.0.1 on the worker" in err
-
-
-@pytest.mark.thorough
-@pytest.mark.filterwarnings("default")
-@pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make a certificate")
-def test_an_encrypted_cluster_refuses_others(
-    infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As docs/campaigns.md says: one certificate for all, named in Dask's configuration."""
-    import dask
-
-    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
-    subprocess.run(
-        [
-            *("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=infoset"),
-            *("-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)),
-        ],
-        check=True,
-        capture_output=True,
-    )
-    names = {"DASK_DISTRIBUTED__COMM__TLS__CA_FILE": certificate}
-    for who in ("SCHEDULER", "WORKER", "CLIENT"):
-        names |= {
-            f"DASK_DISTRIBUTED__COMM__TLS__{who}__CERT": certificate,
-            f"DASK_DISTRIBUTED__COMM__TLS__{who}__KEY": key,
-        }
-    for name, path in names.items():
-        monkeypatch.setenv(name, str(path))
-    monkeypatch.setenv("DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION", "True")
-    asked = ("campaign", file, "--model", "paper", "--runs", 64, "--chunk", 16, "--dask")
-    found = Processes(tmp_path, "tls")
-    with found.stack:
-        found.wait_until_up()
-        found.worker()
-        # What stands in the environment is put into the configuration, beside the defaults, not in their place.
-        with dask.config.set(dask.config.merge(dask.config.config, dask.config.collect_env())):
-            found.wait_for(1)
-            code, _, err = infoset(*asked, found.address, "--out", "runs")
-        assert (code, err) == (0, "1 Dask workers, 1 threads\nwrote shards, scenario.toml, summary.json in runs\n")
-        for address in (found.address, found.address.replace("tls", "tcp")):  # without a certificate, unencrypted
-            code, out, err = infoset(*asked, address, "--out", "others")
-            assert (code, out) == (2, "")
-            assert err.startswith("error: --dask: no Dask scheduler answers at")
-    expected = Campaign(brief, 64, tmp_path / "here").run().runs()
-    assert CampaignFolder.read(tmp_path / "runs").runs().equals(expected)
