@@ -83,7 +83,8 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
         is_of_cluster = type(error).__module__.startswith(("distributed.", "dask."))
         if not isinstance(error, CancelledError | BrokenExecutor) and not is_of_cluster:
             raise
-        raise InputError(f"a worker process or the cluster has stopped: {str(error)[:200]}{resume_hint}") from None
+        reason = str(error)[:200] or type(error).__name__
+        raise InputError(f"a worker process or the cluster has stopped ({reason}){resume_hint}") from None
 
 
 def duration(seconds: float) -> str:

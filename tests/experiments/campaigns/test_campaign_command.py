@@ -55,7 +55,8 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
     folder = tmp_path / "runs"
     asked = ("campaign", file, "--runs", 150, "--noise", "mixed", "--seed", 4, "--model", "paper", "--out", folder)
     code, out, err = infoset(*asked)
-    assert (code, err) == (0, f"wrote shards, scenario.toml, summary.json in {folder}\n")
+    assert code == 0
+    assert err.endswith(f"wrote shards, scenario.toml, summary.json in {folder}\n")
     assert {each.name for each in folder.iterdir()} == {
         *(".lock", "manifest.json", "scenario.toml", "shards", "summary.json")
     }

@@ -124,7 +124,8 @@ def test_two_workers_give_the_same_bits_and_one_that_ends_loses_nothing(
     processes.wait_for(2)
     options = ("--model", "paper", "--noise", "mixed", "--chunk", 16, "--dask", processes.address)
     code, _, err = infoset("campaign", file, *options, "--out", "two", "--runs", 400)
-    assert (code, err) == (0, "2 Dask workers, 2 threads\nwrote shards, scenario.toml, summary.json in two\n")
+    assert code == 0
+    assert err.startswith("2 Dask workers, 2 threads\n")
     expected = Campaign(brief, 4000, tmp_path / "here", noise=CampaignNoise.MIXED).run().runs()
     assert CampaignFolder.read(tmp_path / "two").runs().equals(expected[:400])
     killer = kill_after(tmp_path / "killed" / "shards", 20, workers[0])
