@@ -53,7 +53,7 @@ def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executo
             "run programs there: use a private network, or tls:// (see the documentation, campaigns)"
         )
     # The failure of a scheduler is one message of the command, without tracebacks of the client's threads.
-    for name in ("distributed", "distributed.client", "asyncio", "tornado"):
+    for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     with contextlib.ExitStack() as stack:
         try:
