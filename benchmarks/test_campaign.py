@@ -29,7 +29,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from experiments import load_scenario
-from experiments.campaigns.samples import samples
+from experiments.campaigns.run_tables import COLUMNS, summary
 from infoset import StateBox
 from sim import Campaign, CampaignNoise
 
@@ -42,7 +42,7 @@ short = replace(whole, set_model=model, dispersion=start, range_sensor=None)
 
 runs, folder = int(sys.argv[1]), Path(sys.argv[2])
 result = Campaign(short, runs, folder, noise=CampaignNoise.MIXED).run(workers=2)
-assert sum(sample.runs for sample in samples(result)) == runs
+assert summary(result, result.runs(COLUMNS))["runs"].sum() == runs
 """
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import FileOptions, Json, Overwrite, Quiet, Seed, Settings
+from experiments.common.options import Csv, FileOptions, Json, Overwrite, Quiet, Seed, Settings
 from experiments.interception.command import MAX_RUNS, RangeSensor, ScenarioName, StrategyName, StudyModel, TieName
 
 MAX_WORKERS = 1024
@@ -180,3 +180,4 @@ class Report(FileOptions):
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep.")]
     require: Required = None
     show: Shown = None
+    csv: Csv = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from experiments.campaigns.command import Campaign as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, duration, fly, scenario_of
-from experiments.campaigns.samples import heading, sample_json, sample_parts, samples
+from experiments.campaigns.run_tables import COLUMNS, heading, records, summary, summary_parts
 from experiments.common.errors import input_errors
 from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
@@ -37,19 +37,19 @@ def run(options: Options) -> None:
         )
         flown = fly(campaign, options, model_notes)
         stored, manifest = flown.folder, flown.folder.manifest
-        by_noise = samples(stored)
+        table = summary(stored, stored.runs(COLUMNS))
         results = {
             **heading(stored),
             **({"warnings": flown.warnings} if flown.warnings else {}),
             "elapsed_s": flown.elapsed_s,
-            "samples": [sample_json(sample) for sample in by_noise],
+            "samples": records(table.drop(columns="cell")),
         }
         stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
         parts = [
             study_title(manifest.scenario, manifest.strategy, manifest.seed),
             f"{some_runs(stored.finished_runs)}{stopped}, {duration(flown.elapsed_s)}; "
             f"quantiles with {'' if stopped else '95 % '}confidence limits",
-            *sample_parts(stored, by_noise),
+            *summary_parts(stored, table),
         ]
         if manifest.until is not None and manifest.stopped_after is None:
             parts.append(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")

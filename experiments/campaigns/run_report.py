@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
-from experiments.campaigns.campaign_columns import campaign_columns, correlations
+import pandas as pd
+
 from experiments.campaigns.command import Report
 from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
-from experiments.campaigns.samples import (
-    Sample,
+from experiments.campaigns.run_tables import (
+    correlations,
     heading,
     noises_of,
-    sample_json,
-    sample_parts,
-    samples,
+    records,
+    screen_table,
+    summary,
+    summary_parts,
     worst_runs,
 )
-from experiments.campaigns.sweep_report import SweepReport, default_requirement, figure_names, quantile_options
-from experiments.campaigns.sweep_table import TABLE, sweep_table
+from experiments.campaigns.sweep_report import TABLE, SweepReport, default_requirement, figure_names, quantile_options
+from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
 from experiments.common.output import Output, output_of, to_json
@@ -27,7 +30,6 @@ from experiments.common.screen import (
     Part,
     figure_files,
     number,
-    number_table,
     progress_bar,
     say,
     show,
@@ -36,8 +38,6 @@ from experiments.common.screen import (
 from experiments.interception.study import study_title
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
-
-Correlations = Mapping[str, Mapping[str, Mapping[str, float | None]]]
 
 
 def run(options: Report) -> None:
@@ -62,39 +62,26 @@ def _figures(folder: CampaignFolder) -> Sequence[str]:
 
 def _read(options: Report) -> CampaignFolder:
     path = options.folder
-    if path.is_file():
-        raise InputError(f"{path}: is a file; name the folder of a campaign or of a sweep")
     if not path.is_dir():
-        raise InputError(f"{path}: there is no such folder; name the folder of infoset campaign or infoset sweep")
+        raise InputError(f"{path}: is no folder; name the folder of infoset campaign or infoset sweep")
     folder = CampaignFolder.read(path)
-    for damage in folder.damaged:
-        say(
-            f"warning: {damage.file}: {damage.reason}; its runs are omitted; simulate them again with --resume",
-            options.quiet,
-        )
     if not folder.finished_runs:
         raise InputError(f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume")
     if not folder.complete:
-        stopped = folder.manifest.axes and folder.manifest.until
-        say(
-            f"warning: {folder.finished_runs} of {'at most ' if stopped else ''}{folder.wanted_runs} runs are stored; "
-            f"{'--resume adds runs to the undecided cells' if stopped else 'the others are missing'}",
-            options.quiet,
-        )
+        most = "at most " if folder.manifest.until else ""
+        stored = f"{folder.finished_runs} of {most}{folder.wanted_runs} runs are stored"
+        say(f"warning: {stored}; --resume adds runs", options.quiet)
     return folder
 
 
 def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Iterator[Part]:
-    sized = bool(folder.numbers("hit").count())
+    scenario = folder.manifest.scenario
+    sized = bool(folder.runs(["hit"])["hit"].count())
     default = folder.manifest.require or default_requirement(has_size=sized)
     required, shown = quantile_options(options.require, options.show, default)
     if required.quantity == "hit" and not sized:
         raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")
-    if (
-        required.quantity == "guaranteed_miss_m"
-        and folder.manifest.scenario.set_model.is_guaranteed
-        and not folder.manifest.guarantee
-    ):
+    if required.quantity == "guaranteed_miss_m" and scenario.set_model.is_guaranteed and not folder.manifest.guarantee:
         raise InputError(
             f"--require {required}: this sweep was simulated without the bound Phi; simulate it in a new folder with "
             "infoset sweep --guarantee, or give a bound of miss_m"
@@ -103,8 +90,8 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begi
     report = SweepReport(folder, sweep_table(folder, required, shown), shown)
     progress(0.5)
     written.save("report.json", to_json(report.to_json()), "--json")
-    if options.out is not None:
-        report.save(written)
+    written.deliver("--csv", report.table.rows.to_csv(index=False))
+    report.save(written)
     progress(1.0)
     return report.parts()
 
@@ -114,58 +101,52 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, b
         if value is not None:
             raise InputError(f"{option}: is only for a sweep, and {folder.path} is a campaign; omit it")
     progress = begin("quantiles")
-    columns = campaign_columns(folder)
+    runs = folder.runs()
     progress(0.3)
-    by_noise = samples(folder)
+    table = summary(folder, runs)
     progress(1.0)
-    # The commands that repeat runs name the scenario file in the folder, or the one that the report writes.
-    scenario_file = folder.path / SCENARIO_FILE
-    if options.out is not None and not scenario_file.is_file():
-        scenario_file = options.out / SCENARIO_FILE
-    worst = worst_runs(folder, scenario_file)
-    related = {column.noise: correlations(column) for column in columns}
+    related, worst = correlations(folder, runs), worst_runs(folder, runs, _scenario_file(folder, options.out))
     report = {
         **heading(folder),
-        "damaged": [{"file": damage.file.name, "reason": damage.reason} for damage in folder.damaged],
-        "samples": [sample_json(sample) for sample in by_noise],
-        "correlation_with_miss": related,
-        "worst": worst,
+        "samples": records(table.drop(columns="cell")),
+        "correlation_with_miss": records(related),
+        "worst": records(worst),
     }
     written.save("report.json", to_json(report), "--json")
+    written.deliver("--csv", table.drop(columns="cell").to_csv(index=False))
     if options.out is not None:
         from experiments.campaigns.campaign_figures import draw_all
 
-        written.draw(_figures(folder), draw_all(folder, columns), begin("figures"))
-    return _parts(folder, by_noise, related, worst)
+        written.draw(_figures(folder), draw_all(folder, runs), begin("figures"))
+    return _parts(folder, table, related, worst)
 
 
-def _parts(
-    folder: CampaignFolder, by_noise: Sequence[Sample], related: Correlations, worst: Sequence[Mapping[str, Any]]
-) -> Iterator[Part]:
+def _scenario_file(folder: CampaignFolder, out: Path | None) -> Path:
+    """Return the file that the commands of single runs name: in the folder, or the one that the report writes."""
+    stored = folder.path / SCENARIO_FILE
+    return stored if out is None or stored.is_file() else out / SCENARIO_FILE
+
+
+def _parts(folder: CampaignFolder, table: pd.DataFrame, related: pd.DataFrame, worst: pd.DataFrame) -> Iterator[Part]:
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
     yield f"{some_runs(folder.finished_runs)}{stopped}"
-    yield from sample_parts(folder, by_noise)
-    yield ""
-    runs = ", ".join(f"{some_runs(sample.runs)} of {sample.noise} noise" for sample in by_noise)
-    yield f"correlation of the miss with the initial state ({runs}; CI by Fisher's z):"
-    table = number_table("noise", "component", "Pearson", "95 % CI", "Spearman", "95 % CI", left=2)
-    for noise, components in related.items():
-        label = noise
-        for name, values in components.items():
-            table.add_row(label, name, *_correlation_cells(values, "pearson"), *_correlation_cells(values, "spearman"))
-            label = ""
-    yield table
+    yield from summary_parts(folder, table)
+    yield from ("", "correlation of the miss with the initial state (CI by Fisher's z):")
+    printed = related[["noise", "component"]].copy()
+    for kind in ("pearson", "spearman"):
+        ends = (related[kind], related[f"{kind}_lower"], related[f"{kind}_upper"])
+        printed[f"{kind.capitalize()} (95 % CI)"] = [*map(_correlation, *ends)]
+    yield screen_table(printed, 2)
     yield from ("", "the worst runs, each with the command that simulates it again:")
-    for row in worst:
+    for row in records(worst):
         miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
         yield f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}"
     if not (folder.path / SCENARIO_FILE).is_file():
         yield f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)"
 
 
-def _correlation_cells(values: Mapping[str, float | None], kind: str) -> tuple[str, str]:
-    value, lower, upper = (values[key] for key in (kind, f"{kind}_lower", f"{kind}_upper"))
-    interval = "-" if lower is None or upper is None else f"{lower:+.2f} to {upper:+.2f}"
-    return "-" if value is None else f"{value:+.2f}", interval
+def _correlation(value: float, lower: float, upper: float) -> str:
+    ends = "" if math.isnan(lower) else f" ({lower:+.2f} to {upper:+.2f})"
+    return "-" if math.isnan(value) else f"{value:+.2f}{ends}"

@@ -9,8 +9,7 @@ import itertools
 import math
 import re
 from collections.abc import Sequence
-from decimal import Context, Decimal, InvalidOperation
-from typing import Literal
+from decimal import Context, Decimal
 
 from experiments.common.display_units import split_unit
 from experiments.common.errors import InputError, input_errors, shown
@@ -20,8 +19,10 @@ from sim.storage import MAX_CELLS, Axis
 
 MAX_AXES = 4
 MAX_VALUES = 1000
-EXAMPLE = "--vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
-
+SCALE = "scale"
+"""Name, after the table of a sensor, of the factor of its error bounds."""
+_NUMBER = r"([+-]?(?:[0-9]{1,20}\.?[0-9]{0,20}|\.[0-9]{1,20})(?:[eE][+-]?[0-9]{1,4})?)"
+_RANGE = re.compile(rf"(log:)?\s*{_NUMBER}\s*:\s*{_NUMBER}\s*:\s*([0-9]{{1,9}})")
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
 
@@ -33,17 +34,16 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
     both keys the same values. `sensor.scale` is a factor of all error bounds of a sensor. Raise `InputError` if the
     text has another form, or scenarios have no such key; the message suggests the most similar key.
     """
-    pieces = [piece.strip() for piece in text.split(",")]
+    pieces = text.split(",")
     if len(pieces) > MAX_AXES:
         raise InputError(f"--vary: at most {MAX_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
-    axes = tuple(_axis(piece, scenario) for piece in pieces)
+    axes = tuple(_axis(piece.strip(), scenario) for piece in pieces)
     bounds = _error_bounds(scenario)
     varied = [(key, tied) for axis in axes for tied in tied_keys(axis.key) for key in bounds.get(tied, {tied: 0.0})]
     for key, _ in varied:
         names = [tied for other, tied in varied if other == key]
         if len(names) > 1:
-            problem = "is named twice" if len(set(names)) == 1 else "vary the same value"
-            raise InputError(f"--vary: {' and '.join(dict.fromkeys(names))} {problem}; name each key once")
+            raise InputError(f"--vary: {' and '.join(names)} vary the same value; name each key once")
     cells = math.prod(len(axis.values) for axis in axes)
     if cells > MAX_CELLS:
         raise InputError(f"--vary: {cells} cells are more than the limit of {MAX_CELLS}; give fewer values")
@@ -71,88 +71,59 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
 
 def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
     """Return the error bounds of each sensor by key, under the name of their common factor: `angle_sensor.scale`."""
-    sensors = {f"{name}_sensor": sensor for name, sensor in scenario.sensors.items()}
     return {
-        f"{table}.{SCALE}": {
-            f"{table}.{name}": value
-            for name, value in vars(sensor).items()
+        f"{sensor}_sensor.{SCALE}": {
+            f"{sensor}_sensor.{name}": value
+            for name, value in vars(declared).items()
             if "error" in name and value
             if isinstance(value, float)
         }
-        for table, sensor in sensors.items()
+        for sensor, declared in scenario.sensors.items()
     }
 
 
 def _axis(piece: str, scenario: Scenario) -> Axis:
     *keys, written = (part.strip() for part in piece.split("="))
-    key = "=".join(keys)
-    if not key:
-        raise InputError(f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT; for example {EXAMPLE}")
-    for single in keys:
-        if single not in _error_bounds(scenario) and numeric_key(Scenario, single) is None:
-            known = [*keys_of(Scenario), *_error_bounds(scenario)]
-            guess = similar_key(single, [key for key in known if key != single])
+    factors = _error_bounds(scenario)
+    for key in keys:
+        if key not in factors and numeric_key(Scenario, key) is None:
+            guess = similar_key(key, [known for known in [*keys_of(Scenario), *factors] if known != key])
             remedy = f"; did you mean {guess}?" if guess else ""
-            raise InputError(f"--vary: a scenario has no numeric key {shown(single)}{remedy}")
-    if len({unit_of(single) for single in keys}) > 1:
-        units = ", ".join(f"{single} in {unit_of(single) or 'no unit'}" for single in keys)
+            raise InputError(f"--vary: a scenario has no numeric key {shown(key)}{remedy}")
+    if len({unit_of(key) for key in keys}) > 1:
+        units = ", ".join(f"{key} in {unit_of(key) or 'no unit'}" for key in keys)
         raise InputError(f"--vary: keys with the same values must have the same unit, found {units}")
-    whole = any(numeric_key(Scenario, single) is int for single in keys)
-    parts = [part.strip() for part in written.split(":")]
-    scale: Literal["linear", "log"] = "linear"
-    if parts[0] == "log":
-        scale, parts = "log", parts[1:]
-    if len(parts) != 3:
+    match = _RANGE.fullmatch(written)
+    if not keys or match is None:
         raise InputError(
-            f"--vary: {key}: must be FROM:TO:COUNT or log:FROM:TO:COUNT, found {shown(written)}; for example {EXAMPLE}"
+            f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT or KEY=log:FROM:TO:COUNT; for example "
+            "--vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
         )
-    first, last = (_number(part, key) for part in parts[:2])
-    if first >= last:
-        raise InputError(f"--vary: {key}: must go from a smaller to a greater value, found {shown(written)}")
-    if first <= 0 and any(single.endswith(f".{SCALE}") for single in keys):
-        raise InputError(f"--vary: {key} must be greater than 0, found {shown(written)}")
-    if scale == "log" and first <= 0:
-        raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
-    if not re.fullmatch(r"[0-9]{1,9}", parts[2]) or not 2 <= int(parts[2]) <= MAX_VALUES:
-        problem = f"the count must be a whole number from 2 to {MAX_VALUES}, found {shown(parts[2])}"
-        raise InputError(f"--vary: {key}: {problem}")
-    count = int(parts[2])
-    values = _spaced(first, last, count, scale, whole=whole)
+    is_log, first, last, count = bool(match[1]), Decimal(match[2]), Decimal(match[3]), int(match[4])
+    if first >= last or not 2 <= count <= MAX_VALUES:
+        raise InputError(
+            f"--vary: {keys[0]}: must go from a smaller to a greater value, with a count from 2 to {MAX_VALUES}, found "
+            f"{shown(written)}"
+        )
+    if first <= 0 and (is_log or any(key in factors for key in keys)):
+        raise InputError(f"--vary: {keys[0]}: factors and logarithmic values must be greater than 0, found {match[2]}")
+    values = _spaced(first, last, count, is_log=is_log)
+    if any(numeric_key(Scenario, key) is int for key in keys):
+        values = [Decimal(round(value)) for value in values]
     if len(set(values)) < count:
-        raise InputError(
-            f"--vary: {key}: {count} values from {parts[0]} to {parts[1]} are not all different"
-            f"{' whole numbers' if whole else ''}; give fewer values"
-        )
+        raise InputError(f"--vary: {keys[0]}: {count} values from {first} to {last} are not all different; give fewer")
     with input_errors("--vary"):
-        return Axis(key, values, scale)
+        return Axis("=".join(keys), tuple(map(float, values)), "log" if is_log else "linear")
 
 
-def _number(text: str, key: str) -> Decimal:
-    try:
-        value = Decimal(text) if re.fullmatch(r"[+-]?[0-9.]{1,40}(?:[eE][+-]?[0-9]{1,4})?", text) else None
-    except InvalidOperation:
-        value = None
-    if value is None:
-        raise InputError(f"--vary: {key}: must be a number, found {shown(text)}; for example {EXAMPLE}")
-    return value
-
-
-def _spaced(first: Decimal, last: Decimal, count: int, scale: str, *, whole: bool) -> tuple[float, ...]:
+def _spaced(first: Decimal, last: Decimal, count: int, *, is_log: bool) -> list[Decimal]:
     """Return evenly spaced values; the first and the last are not rounded."""
-    if scale == "log":
+    if is_log:
         rise = math.log(last / first) / (count - 1)
         between = [Decimal(float(first) * math.exp(rise * index)) for index in range(1, count - 1)]
     else:
         between = [first + (last - first) * index / (count - 1) for index in range(1, count - 1)]
-    values = [first, *(_PLACES.plus(value) for value in between), last]
-    return tuple(float(round(value)) if whole else float(value) for value in values)
-
-
-SCALE = "scale"
-"""Name, after the table of a sensor, of the factor of its error bounds."""
-
-_BEFORE_ARRIVAL = ("first_image_s", "last_image_s", "last_impulse_s")
-"""Times that count from the nominal arrival back."""
+    return [first, *(_PLACES.plus(value) for value in between), last]
 
 
 def tied_keys(key: str) -> list[str]:
@@ -162,29 +133,15 @@ def tied_keys(key: str) -> list[str]:
 
 def unit_of(key: str) -> str:
     """Return the unit in the name of a key; empty if it has none."""
-    return split_unit(_parts(tied_keys(key)[0])[1])[1]
+    return split_unit(key.removesuffix(".min").removesuffix(".max"))[1]
 
 
-def key_label(key: str) -> str:
-    """Return a key as the label of an axis: `angle sensor: error at nominal range, rad`."""
-    tables = [_parts(single)[0] for single in tied_keys(key)]
-    names = [_words(single) for single in tied_keys(key)]
-    if len(set(tables)) == 1:
-        tables, names = tables[:1], [" = ".join(names)]
-    label = " = ".join(f"{table}: {name}" if table else name for table, name in zip(tables, names, strict=True))
-    unit = unit_of(key)
-    label = label.replace("_", " ")
-    return f"{label}, {unit}" if unit else label
-
-
-def _words(key: str) -> str:
-    _, name, end = _parts(key)
-    if name == SCALE:
-        return "factor of the error bounds"
-    return f"{split_unit(name)[0]} {'before arrival' if name in _BEFORE_ARRIVAL else end}".strip()
-
-
-def _parts(key: str) -> tuple[str, str, str]:
-    """Return the table, the name, and the end of a pair or an empty text."""
-    *tables, name = key.removesuffix(".min").removesuffix(".max").split(".")
-    return " ".join(tables), name, {".min": "minimum", ".max": "maximum"}.get(key[-4:], "")
+def key_label(key: str, factor: str = "") -> str:
+    """Return a key as the label of an axis, with a factor of its unit: `angle sensor: error at nominal range, rad`."""
+    names = []
+    for single in tied_keys(key):
+        end = single[-4:] if single.endswith((".min", ".max")) else ""
+        name = split_unit(single.removesuffix(end))[0] + end.replace(".", " ")
+        names.append(name.replace(f".{SCALE}", ".factor of the error bounds").replace(".", ": "))
+    unit = f"{factor}{unit_of(tied_keys(key)[0])}".strip()
+    return " = ".join(names) + (f", {unit}" if unit else "")

@@ -197,12 +197,13 @@ def _record(folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
 
 def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
     """Give the small languages of the command line: --vary, --until, --require, --x, --set."""
-    from experiments.campaigns.sweep_axes import EXAMPLE, sweep_axes, sweep_cells
+    from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
     from experiments.common.errors import InputError
     from experiments.interception.scenario_file import load_scenario
     from experiments.pursuit.file import load_pursuit
     from experiments.pursuit.map import read_axis
-    from sim import QuantileName, Requirement, StoppingRule
+    from sim import QuantileName, StoppingRule
+    from sim.requirement import parse_requirement
 
     from .mutations import mutated_bytes
     from .subjects import attempted
@@ -212,8 +213,8 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
     def parse(content: bytes) -> None:
         text = content[1:].decode(errors="surrogateescape")
         attempted(lambda: _given(content[:1], text), InputError)
-        for rule in (QuantileName, Requirement, StoppingRule):
-            read, _ = attempted(lambda kind=rule: kind.parse(text), ValueError)  # type: ignore[misc]
+        for read_text in (QuantileName.parse, StoppingRule.parse, parse_requirement):
+            read, _ = attempted(lambda reader=read_text: reader(text), ValueError)  # type: ignore[misc]
             assert not isinstance(read, QuantileName) or QuantileName.parse(str(read)) == read
 
     def _given(option: bytes, text: str) -> None:
@@ -237,8 +238,8 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
             text = text[:at] + draw.choice(pieces) + text[at:] if draw.random() < 0.4 else mutated_bytes(text, draw)
         return text
 
-    vary = EXAMPLE.removeprefix("--vary ")
-    texts = [f"v{vary}", "vinformation_set.sections=log:5:50:3", "vthruster.budget_m_s=log:1:1000:4", "rmiss_m p99<10"]
+    vary = "vangle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
+    texts = [vary, "vinformation_set.sections=log:5:50:3", "vthruster.budget_m_s=log:1:1000:4", "rmiss_m p99<10"]
     texts += ["vuncertainty.x_km.min=5000:5300:2", "rmiss_m p99 ci<0.5", "rimpulse_m_s p50", "xphase_deg=-60:60:61"]
     return parse, mutate, [text.encode() for text in [*texts, "sevader.thrust_N=5", "spursuer.mass_kg=2e3"]]
 

@@ -20,7 +20,6 @@ import pytest
 
 import sim
 from experiments.campaigns.flight import duration
-from experiments.campaigns.samples import replay_line
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
 from experiments.interception.scenario_file import load_scenario, with_model
@@ -70,11 +69,11 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
     for sample in found["samples"]:
         own = sorted(runs["miss_m"][runs["noise"] == sample["noise"]])
         assert sample["runs"] == len(own) == 75
-        assert sample["miss_m"]["max"] == own[-1]
-        assert sample["miss_m"]["p50"]["value"] == own[37]
-        assert sample["miss_m"]["p50"]["lower"] in own
-        assert sample["miss_m"]["p99.9"]["upper"] is None
-        assert sum(sample["outcomes"].values()) == 75
+        assert sample["miss_m_max"] == own[-1]
+        assert sample["miss_m_p50"] == own[37]
+        assert sample["miss_m_p50_lower"] in own
+        assert sample["miss_m_p99.9_upper"] is None
+        assert sum(sample[name] for name in ("arrived", "set_empty", "budget_spent", "diverged")) == 75
     code, out, err = infoset(*asked, "--resume", "--json", "-")
     assert code == 0
     assert json.loads(out)["runs"] == 150
@@ -229,8 +228,6 @@ def test_times_and_commands_are_readable() -> None:
     assert [duration(each) for each in (3.0, 99.0, 150.0, 7800.0, 180_000.0, 1e7)] == [
         *("3 s", "99 s", "2 min", "2 h 10 min", "2 days", "116 days"),
     ]
-    line = replay_line(Path("a folder/it's.toml"), 7, 3, "game")
-    assert line == "infoset engage 'a folder/it'\"'\"'s.toml' --noise game --seed 3 --run 7"
 
 
 def command(file: Path, folder: Path, runs: int, *options: object) -> list[str]:

@@ -1,27 +1,32 @@
+"""`infoset report` of a campaign, its tables and its figures."""
+
 from __future__ import annotations
 
-import contextlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from scipy.stats import pearsonr, spearmanr
 
-from experiments.campaigns.campaign_columns import START, CampaignColumns, correlations
-from experiments.campaigns.campaign_figures import draw_campaign_distributions, draw_convergence, draw_dispersion
-from experiments.common.screen import BeginProgress
+from experiments.campaigns.campaign_figures import draw_convergence, draw_dispersion
+from experiments.campaigns.run_tables import correlations
 from experiments.interception.figures.distributions import MAX_POINTS
 from experiments.interception.scenario_file import load_scenario
-from sim import Campaign, CampaignNoise, Scenario
+from guidance import NoiseKind
+from sim import Campaign, CampaignNoise, Scenario, simulate
+from sim.storage import CampaignFolder
 from tests.experiments.campaigns.figure_room import need_room
+from tests.experiments.command_line import Command
 
-Infoset = Callable[..., tuple[int, str, str]]
 FIGURES = [
     f"figure-{name}.{kind}" for name in ("convergence", "dispersion", "distributions") for kind in ("pdf", "png")
 ]
@@ -35,243 +40,155 @@ def folder(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_report_of_files_alone_shows_its_progress(
-    infoset: Infoset, brief: Scenario, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bars: list[str] = []
-
-    @contextlib.contextmanager
-    def recorded(quiet: bool) -> Iterator[BeginProgress]:
-        def begin(name: str) -> Callable[[float], None]:
-            bars.append(name)
-            return lambda done: None
-
-        yield begin
-
-    monkeypatch.setattr("experiments.campaigns.run_report.progress_bar", recorded)
+def test_a_report_of_files_alone(infoset: Command, brief: Scenario, folder: Path, tmp_path: Path) -> None:
     before = sorted(each.name for each in folder.iterdir())
-    code, out, err = infoset("report", folder, "--out", tmp_path / "report")
+    code, out, _ = infoset("report", folder, "--out", tmp_path / "report", "--csv", "table.csv")
     assert code == 0
-    assert bars == ["quantiles", "figures"]
-    assert sorted(err.removeprefix("wrote ").removesuffix(f" in {tmp_path / 'report'}\n").split(", ")) == [
-        *FIGURES,
-        "report.json",
-        "scenario.toml",
-    ]
-    assert sorted(each.name for each in folder.iterdir()) == before == [".lock", "manifest.json", "shards"]
+    assert sorted(each.name for each in folder.iterdir()) == before
     assert sorted(each.name for each in (tmp_path / "report").iterdir()) == [*FIGURES, "report.json", "scenario.toml"]
     assert load_scenario(tmp_path / "report" / "scenario.toml") == brief
     found = json.loads((tmp_path / "report" / "report.json").read_text())
-    assert [each["noise"] for each in found["samples"]] == ["random", "game"]
-    assert set(found["correlation_with_miss"]) == {"random", "game"}
-    assert len(found["worst"]) == 10
+    table = pd.read_csv(tmp_path / "table.csv")
+    for first, (sample, row) in enumerate(zip(found["samples"], table.to_dict("records"), strict=True)):
+        flown = simulate(replace(brief, noise=NoiseKind(sample["noise"])), range(first, 300, 2))
+        assert (sample["noise"], sample["runs"]) == (row["noise"], 150)
+        assert sample["miss_m_p90"] == row["miss_m_p90"] == np.quantile(flown.miss_m, 0.9)
+        assert sample["phi_known"] == flown.phi_held.count()
+        assert sample["impulse_m_s_max"] == flown.impulse_m_s.max()
+    worst = found["worst"]
+    assert [row["miss_m"] for row in worst] == sorted((row["miss_m"] for row in worst), reverse=True)
     scenario = tmp_path / "report" / "scenario.toml"
-    for each in found["worst"]:
-        assert each["replay"] == f"infoset engage {scenario} --noise {each['noise']} --seed 0 --run {each['run']}"
-        assert each["replay"] in out
-    for title in (
-        "correlation of the miss with",
-        "150 runs of random noise",
-        "Fisher's z",
-        "|z_km|",
-        "Spearman",
-        "the worst runs, each",
-        "p99.9",
-        "95 % CI",
-    ):
+    for row in worst:
+        assert row["replay"] == f"infoset engage {scenario} --noise {row['noise']} --seed 0 --run {row['run']}"
+        assert row["replay"] in out
+    for title in ("correlation of the miss with", "Fisher's z", "|start_z_m|", "Spearman", "p99.9", "95 % CI"):
         assert title in out
 
 
-def test_no_digit_is_cut_at_60_columns(infoset: Infoset, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_digit_is_cut_at_60_columns(infoset: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     code, out, _ = infoset("report", folder)
     assert code == 0
     assert "…" not in out
-    table = [line.split() for line in out.splitlines() if " p99 " in line]
-    assert len(table) == 6  # three quantities, two noises
-    assert all(float(row[row.index("p99") + 1]) > 0.0 for row in table)
+    assert "--out writes one" in out
+    rows = [line.split() for line in out.splitlines() if " p99 " in line]
+    assert len(rows) == 6  # three quantities, two noises
+    assert all(float(row[row.index("p99") + 1]) > 0.0 for row in rows)
     assert "150 runs are too few for p99.9; 1000 runs of each noise (--runs 2000) show all quantiles" in out
 
 
-def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_path: Path) -> None:
-    code, out, _ = infoset("report", folder)
-    assert code == 0
-    assert "--out writes one" in out
-    assert list(tmp_path.iterdir()) == []
-    assert infoset("report", folder, "-q") == (0, "", "")
-    for option, value in (("--require", "miss_m p90<10"), ("--show", "miss_m p50")):
-        code, out, err = infoset("report", folder, option, value)
-        assert (code, out) == (2, "")
-        assert f"{option}: is only for a sweep, and {folder} is a campaign; omit it" in err
-
-
 @pytest.mark.parametrize(
-    ("what", "parts"),
+    ("arguments", "part"),
     [
-        ("missing", ["there is no such folder"]),
-        (".", ["contains no campaign and no sweep"]),
-        ("empty", ["contains no runs yet"]),
-        ("broken", ["is not a readable manifest"]),
+        (["missing"], "is no folder"),
+        (["."], "contains no campaign"),
+        (["empty"], "contains no runs yet"),
+        (["broken"], "is not a readable manifest"),
+        (["runs", "--require", "miss_m p90<10"], "--require: is only for a sweep"),
+        (["runs", "--show", "miss_m p50"], "--show: is only for a sweep"),
     ],
 )
-def test_what_cannot_be_reported(what: str, parts: list[str], infoset: Infoset, folder: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_reported(
+    arguments: list[str], part: str, infoset: Command, folder: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "runs").symlink_to(folder)
     for name, manifest in (("empty", (folder / "manifest.json").read_text()), ("broken", "{]")):
         (tmp_path / name).mkdir()
         (tmp_path / name / "manifest.json").write_text(manifest)
-    code, out, err = infoset("report", what, "--out", "report")
-    assert (code, out) == (2, "")
-    assert err.count("error: ") == 1
-    for part in parts:
-        assert part in err
+    assert part in infoset.refused("report", "--out", "report", *arguments)
     assert not (tmp_path / "report").exists()
 
 
-PLANE = ("z_km", "x_km", "vz_km_s", "vx_km_s")
+PLANE = ("start_z_m", "start_x_m", "start_vz_m_s", "start_vx_m_s")
+SPACE = ("start_y_m", "start_z_m", "start_x_m", "start_vy_m_s", "start_vz_m_s", "start_vx_m_s")
 
 
-def columns(noise: str, size: int, components: Sequence[str] = PLANE) -> CampaignColumns:
+def made_runs(noise: str, size: int, components: Sequence[str] = PLANE) -> pd.DataFrame:
     rng = np.random.default_rng([size, noise == "game"])
-    start = {name: rng.uniform(size=size) for name in components}
-    return CampaignColumns(
-        noise, False, rng.exponential(size=size), rng.normal(100.0, 5.0, size), np.zeros(0), start, False
-    )
+    start = {name: rng.uniform(-900.0, 900.0, size) for name in components}
+    drawn = {"miss_m": rng.exponential(size=size), "impulse_m_s": rng.normal(100.0, 5.0, size)}
+    return pd.DataFrame({"cell": 0, "noise": noise, **start, **drawn})
 
 
-def test_the_axis_has_room_for_the_guarantee_or_says_what_is_beyond() -> None:
-    drawn = replace(columns("random", 40), guaranteed_miss_m=np.linspace(10.0, 20.0, 40), guarantees=True)
-    figure = draw_campaign_distributions([drawn])
-    (miss, _) = figure.axes
-    assert miss.get_xlim()[1] > 20.0
-    assert miss.get_xlabel() == "miss, m"
-    (legend,) = figure.legends
-    assert "random noise: guaranteed miss" in [text.get_text() for text in legend.get_texts()]
-    tailed = replace(drawn, guaranteed_miss_m=np.append(np.linspace(10.0, 20.0, 39), 9e4))
-    (miss, _) = draw_campaign_distributions([tailed]).axes
-    assert miss.get_xlabel().split("\n")[1:] == ["guaranteed misses beyond the axis: 1 of 40"]
-
-
-def test_the_radius_of_the_body_is_a_line_with_a_label() -> None:
-    figure = draw_campaign_distributions([replace(columns("random", 40), radius_m=0.5), columns("game", 40)])
-    miss, impulse = figure.axes
-    (line,) = [each for each in miss.lines if str(each.get_label()).startswith("body radius")]
-    assert float(np.asarray(line.get_xdata())[0]) == 0.5
-    assert not [each for each in impulse.lines if str(each.get_label()).startswith("body radius")]
-    (legend,) = figure.legends
-    assert legend.get_texts()[-1].get_text() == "body radius, 0.5 m: a smaller miss is a hit"
-
-
-@pytest.mark.parametrize("size", [1, 2, 30, 20_000])
-def test_figures_of_few_runs_and_of_many(size: int) -> None:
-    both = [columns("random", size), columns("game", size)]
-    left, right = draw_campaign_distributions(both).axes
-    assert (left.get_xlabel().split("\n")[0], right.get_xlabel()) == ("miss, m", "impulse spent, m/s")
-    assert max(len(np.asarray(line.get_xdata())) for line in left.get_lines()) <= MAX_POINTS + 2
-    panels = draw_convergence(both).axes
-    assert [each.get_title() for each in panels] == [
-        "(a) miss, random noise",
-        "(b) impulse spent, random noise",
-        "(c) miss, game noise",
-        "(d) impulse spent, game noise",
-    ]
-    assert all(each.get_xlabel() == "runs" for each in panels)
-    clouds = draw_dispersion(both).axes
-    assert [each.get_xlabel() for each in clouds[:4]] == [
-        *("initial z, km", "initial x, km", "initial V$_z$, km/s", "initial V$_x$, km/s"),
-    ]
-    assert max(len(np.asarray(line.get_xdata())) for line in clouds[0].get_lines()) <= MAX_POINTS
-
-
-def test_texts_of_figures_never_touch() -> None:
-    both = [columns("random", 400), columns("game", 400)]
-    far = replace(both[1], miss_m=np.append(both[1].miss_m[:-1], 1e5))
-    for drawn in (both, [both[0], far]):
-        for draw in (draw_campaign_distributions, draw_convergence, draw_dispersion):
-            need_room(draw(drawn))
-    slow = replace(
-        both[0], start={name: 6.14 + 1e-4 * values / np.abs(values).max() for name, values in far.start.items()}
-    )
-    figure = draw_dispersion([slow])
-    need_room(figure)
-    assert figure.axes[3].get_xlabel() == "initial V$_x$, m/s"
-    assert all(not axes.xaxis.get_offset_text().get_text() for axes in figure.axes)
-    row = draw_dispersion([far]).axes[0]
-    assert row.get_ylabel() == "miss, m\nruns beyond the axis: 1 of 400"
-
-
-def test_in_space_the_components_along_y_are_shown_too() -> None:
-    both = [columns("random", 400, START), columns("game", 400, START)]
-    figure = draw_dispersion(both)
-    need_room(figure)
-    labels = [axes.get_xlabel() for axes in figure.axes]
-    assert labels == 2 * [
-        *("initial y, km", "initial z, km", "initial x, km"),
-        *("initial V$_y$, km/s", "initial V$_z$, km/s", "initial V$_x$, km/s"),
-    ]
-    assert [bool(axes.get_ylabel()) for axes in figure.axes] == 4 * [True, False, False]
-    moduli = ["|y_km|", "|z_km|", "|vy_km_s|", "|vz_km_s|"]
-    assert [*correlations(both[0])] == [*START, *moduli]
-    assert [*correlations(columns("random", 50))] == [*PLANE, "|z_km|", "|vz_km_s|"]
+def correlated(runs: pd.DataFrame) -> dict[str, dict[str, Any]]:
+    """Return the correlations of runs of random noise by component."""
+    manifest = SimpleNamespace(cells=1, noise=SimpleNamespace(kinds=[NoiseKind.RANDOM]))
+    rows = correlations(cast(CampaignFolder, SimpleNamespace(manifest=manifest)), runs).to_dict("records")
+    return {row["component"]: row for row in rows}
 
 
 def test_correlations_by_hand() -> None:
-    given = columns("random", 50)
     rising = np.arange(50.0)
-    start = {"z_km": rising - 20.0, "x_km": rising**3, "vz_km_s": -rising, "vx_km_s": np.ones(50)}
-    found = correlations(replace(given, miss_m=rising, start=start))
-    assert [found["z_km"][kind] for kind in ("pearson", "spearman")] == pytest.approx([1.0, 1.0])
-    assert found["x_km"]["spearman"] == pytest.approx(1.0)
-    assert found["x_km"]["pearson"] == pytest.approx(np.corrcoef(rising, rising**3)[0, 1])
-    assert found["vz_km_s"]["pearson"] == pytest.approx(-1.0)
-    assert found["|vz_km_s|"]["pearson"] == pytest.approx(1.0)
-    assert set(found["vx_km_s"].values()) == {None}
+    start = {"start_z_m": rising - 20.0, "start_x_m": rising**3, "start_vz_m_s": -rising, "start_vx_m_s": np.ones(50)}
+    found = correlated(made_runs("random", 50).assign(miss_m=rising, **start))
+    assert [*found] == [*PLANE, "|start_z_m|", "|start_vz_m_s|"]
+    assert [found["start_z_m"][kind] for kind in ("pearson", "spearman")] == pytest.approx([1.0, 1.0])
+    assert found["start_x_m"]["spearman"] == pytest.approx(1.0)
+    assert found["start_x_m"]["pearson"] == pytest.approx(np.corrcoef(rising, rising**3)[0, 1])
+    assert found["start_vz_m_s"]["pearson"] == pytest.approx(-1.0)
+    assert found["|start_vz_m_s|"]["pearson"] == pytest.approx(1.0)
+    assert np.isnan([found["start_vx_m_s"][kind] for kind in ("pearson", "spearman", "pearson_lower")]).all()
 
 
 def test_correlations_have_confidence_intervals() -> None:
-    given = columns("random", 30)
-    found = correlations(given)["z_km"]
-    pearson, lower, upper = found["pearson"], found["pearson_lower"], found["pearson_upper"]
-    assert pearson is not None
-    interval = pearsonr(given.start["z_km"], given.miss_m).confidence_interval()
-    assert [lower, upper] == pytest.approx([interval.low, interval.high])
-    assert found["spearman_lower"] is not None
-    few = correlations(columns("random", 3))["z_km"]
-    assert (few["pearson_lower"], few["spearman_upper"]) == (None, None)
-    assert few["pearson"] is not None
-
-
-def legend_texts(figure: Figure) -> list[str]:
-    (legend,) = figure.legends
-    return [legend.get_title().get_text(), *(text.get_text() for text in legend.get_texts())]
-
-
-def test_figures_show_no_quantile_of_too_few_runs() -> None:
-    figure = draw_convergence([columns("random", 30)])
-    assert legend_texts(figure) == ["too few runs for p99", "p50 and its 95 % confidence interval", "p90"]
-    figure = draw_convergence([columns("random", 500)])
-    assert legend_texts(figure)[1:] == [f"{level} and its 95 % confidence interval" for level in ("p50", "p90", "p99")]
-    p99 = max(figure.axes[0].get_lines(), key=lambda line: float(np.asarray(line.get_xdata())[0]))
-    assert np.asarray(p99.get_xdata())[0] >= 100.0
-    for size in (30, 60, 150, 4000):
-        for axes in draw_convergence([columns("random", size)]).axes:
-            low, high = axes.get_xlim()
-            assert sum(low <= tick <= high for tick in axes.get_xticks()) >= 3
-
-
-def test_the_dispersion_of_few_runs_is_visible() -> None:
-    few, many = (draw_dispersion([columns("random", size)]) for size in (30, 2000))
-    assert legend_texts(few) == ["too few runs for median and p90 (200 of a noise are needed)", "runs"]
-    assert legend_texts(many)[1:] == ["runs", "median", "p90"]
-    assert few.axes[0].get_lines()[0].get_markersize() > 5.0
-    assert len(few.axes[0].get_lines()) == 1
+    runs = made_runs("random", 30)
+    found = correlated(runs)["start_z_m"]
+    interval = pearsonr(runs["start_z_m"], runs["miss_m"]).confidence_interval()
+    assert (found["pearson_lower"], found["pearson_upper"]) == pytest.approx((interval.low, interval.high))
+    # Fieller, Hartley and Pearson (1957): the variance of the z of Spearman's coefficient is 1.06 / (n - 3).
+    z = np.arctanh(found["spearman"]) + np.array([-1.0, 1.0]) * 1.959963984540054 * np.sqrt(1.06 / 27.0)
+    assert (found["spearman_lower"], found["spearman_upper"]) == pytest.approx(tuple(np.tanh(z)))
+    few = correlated(made_runs("random", 3))["start_z_m"]
+    assert np.isnan([few["pearson_lower"], few["spearman_upper"]]).all()
 
 
 @given(values=st.lists(st.tuples(st.integers(-4, 4), st.integers(-4, 4)), min_size=3, max_size=30))
 @settings(deadline=None)
 def test_spearmans_correlation_is_scipys_with_ties(values: list[tuple[int, int]]) -> None:
     one, other = (np.array(each, dtype=np.float64) for each in zip(*values, strict=True))
-    given = columns("random", len(values))
-    found = correlations(replace(given, miss_m=other, start={**given.start, "z_km": one}))["z_km"]["spearman"]
+    found = correlated(made_runs("random", len(values)).assign(miss_m=other, start_z_m=one))["start_z_m"]["spearman"]
     if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
-        assert found is None
+        assert np.isnan(found)
     else:
         assert found == pytest.approx(spearmanr(one, other).statistic, abs=1e-12)
+
+
+def titles(figure: Figure) -> list[str]:
+    return [axes.get_title(loc="left") for axes in figure.axes]
+
+
+@pytest.mark.parametrize("size", [1, 2, 30, 400, 20_000])
+def test_figures_of_few_runs_and_of_many(size: int) -> None:
+    both = {noise: made_runs(noise, size) for noise in ("random", "game")}
+    figure = draw_convergence(both)
+    if size > 2:
+        need_room(figure)
+    assert titles(figure) == ["(a) random noise", "(b) random noise", "(c) game noise", "(d) game noise"]
+    shown = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert shown == [name for name, needed in (("p50", 2), ("p90", 10), ("p99", 100)) if size >= needed]
+    assert ("too few runs for" in figure.legends[0].get_title().get_text()) == (size < 100)
+    figure = draw_dispersion(both)
+    need_room(figure)
+    assert [axes.get_xlabel() for axes in figure.axes[:4]] == [
+        *("initial $z$, km", "initial $x$, km", "initial $V_z$, m/s", "initial $V_x$, m/s")
+    ]
+    drawn = figure.axes[0].get_lines()
+    assert max(len(np.asarray(line.get_xdata())) for line in drawn) <= MAX_POINTS
+    assert len(drawn) == (3 if size >= 200 else 1)
+
+
+def test_a_quantile_is_drawn_from_the_runs_that_show_it() -> None:
+    axes = draw_convergence({"random": made_runs("random", 500)}).axes[0]
+    drawn = [np.asarray(line.get_xdata(), dtype=np.float64) for line in axes.get_lines()]
+    assert max(runs[0] for runs in drawn if runs.size) >= 100.0
+
+
+def test_the_dispersion_in_space_and_runs_above_the_axis() -> None:
+    runs = made_runs("random", 400, SPACE)
+    runs.loc[0, "miss_m"] = 1e5
+    figure = draw_dispersion({"random": runs, "game": made_runs("game", 400, SPACE)})
+    need_room(figure)
+    assert [axes.get_xlabel()[8:] for axes in figure.axes[:6]] == [
+        *("$y$, km", "$z$, km", "$x$, km", "$V_y$, m/s", "$V_z$, m/s", "$V_x$, m/s")
+    ]
+    assert [text.get_text() for text in figure.axes[0].texts] == ["1 runs above"]
