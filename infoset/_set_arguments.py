@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import math
-from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Floats
-from infoset.limits import COUNT, MAXIMUM, NOT_NEGATIVE, WHOLE, real_values, shown
+from infoset.limits import MAXIMUM, NOT_NEGATIVE, real_values, shown
 
 Set = TypeVar("Set")
-Kind = TypeVar("Kind", bound=type)
 
 
 def need_finite(name: str, values: Floats) -> None:
@@ -71,22 +67,12 @@ def box_ends(lower: ArrayLike, upper: ArrayLike, *shape: str | int) -> tuple[Flo
     """Return the ends of boxes, of the same shape."""
     minimum = finite_values("lower", lower, *shape)
     most = finite_values("upper", upper, *(shape if shape[0] == "..." else minimum.shape))
-    common_shape("lower and upper", minimum.shape, most.shape)
     minimum, most = np.broadcast_arrays(minimum, most)
     if (minimum > most).any():
         raise ValueError(
             f"the box is reversed: its lower end exceeds the upper one by {float((minimum - most).max()):g}"
         )
     return minimum, most
-
-
-def common_shape(names: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape to which some shapes are broadcast."""
-    try:
-        return np.broadcast_shapes(*shapes)
-    except ValueError:
-        text = " and ".join(map(str, shapes))
-        raise ValueError(f"{names} must have the same shape, or shapes that can be broadcast: got {text}") from None
 
 
 def radius_values(radius: ArrayLike, *shape: str) -> Floats:
@@ -121,65 +107,8 @@ def is_set(value: object) -> bool:
     return getattr(value, "__array_ufunc__", True) is None
 
 
-def with_hint(hint: str) -> Callable[[Kind], Kind]:
-    """Return a decorator of a class: the message about missing or superfluous arguments has its name and a hint."""
-
-    def decorate(kind: Kind) -> Kind:
-        decorated: Any = kind
-        construct = decorated.__init__
-
-        @functools.wraps(construct)
-        def checked(*arguments: Any, **named: Any) -> None:
-            try:
-                construct(*arguments, **named)
-            except TypeError:
-                try:
-                    inspect.signature(construct).bind(*arguments, **named)
-                except TypeError as error:
-                    raise TypeError(f"{decorated.__name__}: {error}; {hint}") from None
-                raise
-
-        decorated.__init__ = checked
-        return kind
-
-    return decorate
-
-
 def not_negative(name: str, value: float) -> float:
     """Return a number that is not negative."""
     if value != 0.0:
         NOT_NEGATIVE.need(name, value)
     return value
-
-
-def random_source(count: int, seed: int | np.random.Generator) -> np.random.Generator:
-    """Return the source of the random numbers of a sample of `count` points, at least one."""
-    COUNT.need("count", count)
-    if isinstance(seed, np.random.Generator):
-        return seed
-    WHOLE.need("seed", seed)
-    return np.random.default_rng(seed)
-
-
-def need_plot_axes(axes: Any) -> Any:
-    """Return axes of matplotlib."""
-    if not hasattr(axes, "add_patch"):
-        raise TypeError(f"axes must be Axes of matplotlib: got {shown(axes)}")
-    return axes
-
-
-def ring_of(geometry: Any) -> Floats:
-    """Return the vertices of a shapely Point, LineString of one segment, or Polygon without holes, shape (k, 2)."""
-    kind = getattr(geometry, "geom_type", None)
-    if kind is None:
-        raise TypeError(f"geometry must be a shapely geometry: got {shown(geometry)}")
-    if geometry.is_empty:
-        return np.zeros((0, 2))
-    if kind not in ("Point", "LineString", "Polygon"):
-        raise ValueError(f"a Point, LineString or Polygon is needed: got {kind}")
-    if kind == "Polygon" and len(geometry.interiors):
-        raise ValueError("the polygon has a hole: it is not convex")
-    vertices = np.asarray((geometry.exterior if kind == "Polygon" else geometry).coords)[:, :2]
-    if kind == "LineString" and len(vertices) > 2:
-        raise ValueError("a line must be a single segment")
-    return vertices

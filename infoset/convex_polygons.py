@@ -12,10 +12,7 @@ from infoset._set_arguments import (
     axis_numbers,
     finite_values,
     is_set,
-    need_plot_axes,
     not_negative,
-    random_source,
-    with_hint,
 )
 from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, real_values, shown
@@ -25,10 +22,6 @@ if TYPE_CHECKING:
     from infoset.polytope import Polytope
 
 
-_NAMES = ("empty set", "point", "segment", "triangle", "quadrangle", "pentagon", "hexagon")
-
-
-@with_hint("use ConvexPolygons.from_vertices(rings)")
 class ConvexPolygons(PolygonArrays):
     """A batch of convex polygons with any batch shape; a single polygon is a batch of shape ().
 
@@ -65,19 +58,7 @@ class ConvexPolygons(PolygonArrays):
     __array_ufunc__ = None
 
     def __repr__(self) -> str:
-        if self.shape:
-            return f"<convex polygons, batch of shape {self.shape}, " + (
-                f"{min(self.counts.flat, default=0)} to {max(self.counts.flat, default=0)} vertices>"
-            )
-        count = int(self.counts)
-        name = _NAMES[count] if count < len(_NAMES) else f"polygon of {count} vertices"
-        if count == 0:
-            return "<empty set>"
-        if count == 1:
-            return f"<point ({self.vertices[0, 0]:.6g}, {self.vertices[0, 1]:.6g})>"
-        if count == 2:
-            return f"<segment, length {np.hypot(*(self.vertices[1] - self.vertices[0])):.3g}>"
-        return f"<{name}, area {self.area():.3g}>"
+        return f"ConvexPolygons(shape={self.shape}, counts={self.counts.tolist()})"
 
     def polytope(self) -> Polytope:
         """Return a single polygon as a `Polytope`; `ConvexPolygons.from_points(polytope.vertices)` is the reverse."""
@@ -361,7 +342,7 @@ class ConvexPolygons(PolygonArrays):
 
         O(n) for each point; inside to rounding.
         """
-        random = random_source(count, seed)
+        random = np.random.default_rng(seed)
         vertices, counts = self._flat()
         out = np.zeros((counts.size, count, 2))
         kernels.sample(vertices, counts, random.random((counts.size, count, 3)), out)
@@ -369,11 +350,10 @@ class ConvexPolygons(PolygonArrays):
 
     def plot(self, axes: Any, **style: Any) -> None:
         """Fill the polygons on matplotlib axes, with the options of `matplotlib.axes.Axes.fill`."""
-        need_plot_axes(axes)
         for index in np.ndindex(self.shape):
             axes.fill(*self.vertices[index][: self.counts[index]].T, **style)
 
-    # Operators and old names --------------------------------------------------------------------------------------
+    # Operators --------------------------------------------------------------------------------------
 
     def __and__(self, other: ConvexPolygons) -> ConvexPolygons:
         return self.intersection(other) if isinstance(other, ConvexPolygons) else NotImplemented

@@ -165,14 +165,6 @@ class _Rule:
             need_pair(self.name, value, self.limits)
 
 
-def limits_of(owner: type, field: str) -> Limits:
-    """Return the limits that a dataclass declares for the numbers of a field; raise TypeError if it declares none."""
-    limits = next(rule.limits for rule in _rules(owner) if rule.field == field)
-    if limits is None:
-        raise TypeError(f"{owner.__name__}.{field} declares no limits")
-    return limits
-
-
 def check_fields(owner: object) -> None:
     """Check the values of a dataclass against the annotations of its fields; raise TypeError or ValueError.
 

@@ -213,11 +213,6 @@ class LinearObserver:
         self.step = 0
         self._empty = np.full(self._runs, -1), np.zeros(self._runs, dtype=np.int64), np.zeros(self._runs)
 
-    def __repr__(self) -> str:
-        runs = "a single run" if self._single else f"{self._runs} runs"
-        sizes = f"states: {self.states}, outputs: {self.outputs}, inputs: {self.inputs}"
-        return f"<linear observer of {runs} at step {self.step}; {sizes}>"
-
     def _need_set(self, name: str, value: Set, shape: tuple[int, ...] = ()) -> None:
         if not isinstance(value, ConvexPolygons | Polytope | Zonotope):
             raise TypeError(f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}")

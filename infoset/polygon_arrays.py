@@ -13,16 +13,14 @@ from infoset import polygon_batches as kernels
 from infoset._set_arguments import (
     bound_values,
     box_ends,
-    common_shape,
     constraint_values,
     finite_values,
     need_finite,
     need_set,
     radius_values,
-    ring_of,
 )
 from infoset.arrays import Flags, Floats, Integers
-from infoset.limits import WHOLE, Limits, real_values, shown
+from infoset.limits import Limits, real_values, shown
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -127,7 +125,7 @@ class PolygonArrays:
             If a set is unbounded.
         """
         rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "...", "k", 2)
-        shape = common_shape("normals and offsets", rows.shape[:-1], limits.shape)
+        shape = np.broadcast_shapes(rows.shape[:-1], limits.shape)
         if not shape[-1]:
             raise ValueError("a set without constraints is unbounded")
         table = np.empty((*shape, 3))
@@ -161,7 +159,6 @@ class PolygonArrays:
         """
         Limits(minimum=3, whole=True).need("sides", sides)
         middle, r = finite_values("centre", centre, "...", 2), radius_values(radius, "...")
-        common_shape("centre and radius", middle.shape[:-1], r.shape)
         angles = (np.arange(sides) + (0.5 if outer else 0.0)) * (2.0 * math.pi / sides)
         unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1) / (math.cos(math.pi / sides) if outer else 1.0)
         return cls.from_points(middle[..., None, :] + r[..., None, None] * unit)
@@ -175,7 +172,7 @@ class PolygonArrays:
         """
         middle = finite_values("centre", centre, "...", 2)
         rows = finite_values("generators", generators, "...", "g", 2)
-        shape = common_shape("centre and generators", middle.shape[:-1], rows.shape[:-2])
+        shape = np.broadcast_shapes(middle.shape[:-1], rows.shape[:-2])
         points = cls.unchecked(middle[..., None, :], np.ones(middle.shape[:-1], dtype=np.int64)).broadcast_to(shape)
         halves = np.broadcast_to(rows, (*shape, *rows.shape[-2:])).reshape(points.counts.size, *rows.shape[-2:])
         return points._make(2 * rows.shape[-2], kernels.add_segments, np.ascontiguousarray(halves))
@@ -189,7 +186,12 @@ class PolygonArrays:
         """
         if isinstance(geometry, Sequence | np.ndarray) and not isinstance(geometry, str):
             return cls.stack([cls.from_shapely(one) for one in geometry])
-        vertices = ring_of(geometry)
+        from shapely import get_coordinates
+
+        vertices, kind = get_coordinates(geometry), geometry.geom_type
+        has_hole = kind == "Polygon" and len(geometry.interiors) > 0
+        if kind not in ("Point", "LineString", "Polygon") or has_hole or (kind == "LineString" and len(vertices) > 2):
+            raise ValueError(f"a Point, a single segment or a Polygon without a hole is needed: got {shown(geometry)}")
         count = np.array([len(vertices)])
         kernels.drop_repeats(vertices[None], count)
         return cls(vertices, count[0])._make(0, kernels.exact_hull)
@@ -206,7 +208,6 @@ class PolygonArrays:
     @classmethod
     def empty(cls, shape: tuple[int, ...] = ()) -> Self:
         """Return a batch of empty sets."""
-        _need_shape(shape)
         return cls.unchecked(np.zeros((*shape, 0, 2)), np.zeros(shape, dtype=np.int64))
 
     @classmethod
@@ -272,13 +273,9 @@ class PolygonArrays:
         ValueError
             If the batch cannot be broadcast to this shape.
         """
-        _need_shape(shape)
         if shape == self.shape:
             return self
-        try:
-            counts = np.broadcast_to(self.counts, shape)
-        except ValueError:
-            raise ValueError(f"a batch of shape {self.shape} cannot be broadcast to {shape}") from None
+        counts = np.broadcast_to(self.counts, shape)
         return self.unchecked(np.broadcast_to(self.vertices, (*shape, *self.vertices.shape[-2:])), counts)
 
     # For operations -----------------------------------------------------------------------------------------------
@@ -318,19 +315,14 @@ class PolygonArrays:
         """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`."""
         shape = (*self.shape, *last)
         if values.shape != shape:
-            spread = np.empty(shape)
             try:
-                if values.ndim > len(shape) or values.shape[values.ndim - len(last) :] != last:
+                if values.shape[values.ndim - len(last) :] != last:
                     raise ValueError
-                spread[...] = values
+                values = np.broadcast_to(values, shape)
             except ValueError:
-                several = not self.shape and values.shape[values.ndim - len(last) :] == last
-                remedy = "; broadcast_to makes a batch of a single polygon" if several else ""
                 raise ValueError(
-                    f"{name} must have the shape {last}, or one that can be broadcast to {shape}: "
-                    f"got {values.shape}{remedy}"
+                    f"{name} must have the shape {last}, or one that can be broadcast to {shape}: got {values.shape}"
                 ) from None
-            values = spread
         return _plain(values.reshape(self.counts.size, *last))
 
     def _with(self, other: Self) -> tuple[Self, Self]:
@@ -338,7 +330,7 @@ class PolygonArrays:
         need_set("other", other, type(self))
         if self.shape == other.shape:
             return self, other
-        shape = common_shape("batches", self.shape, other.shape)
+        shape = np.broadcast_shapes(self.shape, other.shape)
         return self.broadcast_to(shape), other.broadcast_to(shape)
 
     def _flat(self) -> tuple[Floats, Integers]:
@@ -365,10 +357,3 @@ class PolygonArrays:
 def _plain(values: NDArray[Any]) -> NDArray[Any]:
     """Return an array that kernels accept: contiguous and writeable."""
     return values if values.flags.carray else values.copy()
-
-
-def _need_shape(shape: tuple[int, ...]) -> None:
-    if not isinstance(shape, tuple):
-        raise TypeError(f"shape must be a tuple of integers: got {shown(shape)}")
-    for size in shape:
-        WHOLE.need("each size of shape", size)

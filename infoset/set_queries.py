@@ -213,12 +213,6 @@ class SetQueries:
         lower, upper = ([ends[..., end, column] for column in range(4)] for end in (0, 1))
         return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))
 
-    def worst_predicted_miss_m(self) -> Floats:
-        """Return the maximum |predicted miss| in each stored section, m, shape (B, S); zero for empty sections."""
-        summaries = self._state.stack.summaries[self._channels]
-        worst = np.maximum(summaries[..., section_life.UPPER_MISS], -summaries[..., section_life.LOWER_MISS])
-        return np.where(self.living, np.hypot.reduce(worst, axis=0), 0.0)
-
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
         """Return the minimum and the maximum predicted miss of each section, m, each (B, S); zeros if it is empty."""
         summaries, living = self._by_axis(self._state.stack.summaries), self.living
@@ -332,21 +326,4 @@ class SetQueries:
         return [section.omega_alpha.to_shapely() for section in self.sections(engagement)]
 
     def __repr__(self) -> str:
-        head = f"{type(self).__name__} at t = {self.time_s:g} s"
-        if self.batch > 1:
-            counts = np.bincount(self._state.status, minlength=len(SetStatus))
-            states = ", ".join(f"{counts[s.value]} {s.name.lower()}" for s in SetStatus if counts[s.value])
-            if self.inconsistent.any():
-                states += f", {np.count_nonzero(self.inconsistent)} of them inconsistent"
-            return f"<{head}: {self.batch} engagements, {states}>"
-        if not self.tracking[0]:
-            return f"<{head}: {self.status[0].name.lower()}>"
-        minimum, maximum = self.stored_range_interval_m()
-        miss = self.predicted_miss()
-        ends = np.stack([miss.lower_m, miss.upper_m]).reshape(2, -1)[:, : len(self.axes)].T.tolist()
-        named = ["predicted miss"] if len(ends) == 1 else [f"predicted miss along {axis}" for axis in self.axes]
-        misses = ", ".join(f"{name} {low:.4g} to {high:.4g} m" for name, (low, high) in zip(named, ends, strict=True))
-        return (
-            f"<{head}: {self.section_counts[0]} sections, range {minimum[0] / 1e3:.6g} to {maximum[0] / 1e3:.6g} km, "
-            f"{misses}>"
-        )
+        return f"<{type(self).__name__} at t = {self.time_s:g} s: {self.batch} engagements>"

@@ -14,11 +14,8 @@ from infoset._set_arguments import (
     bound_values,
     finite_values,
     is_set,
-    need_plot_axes,
     need_set,
     not_negative,
-    random_source,
-    with_hint,
 )
 from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, real_values
@@ -31,7 +28,6 @@ _FLAT_WIDTH = 1e-12
 _EPS = float(np.finfo(np.float64).eps)
 
 
-@with_hint("use Polytope.from_constraints(normals, offsets) or Polytope.from_vertices(points)")
 class Polytope(PolytopeArrays):
     """A convex polytope; it may be flat, a segment, a point, or empty.
 
@@ -347,7 +343,7 @@ class Polytope(PolytopeArrays):
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
         """Return points distributed uniformly over the set, shape (count, n), from a division into simplices."""
-        random = random_source(count, seed)
+        random = np.random.default_rng(seed)
         simplices, shares = simplices_of(self.needed().vertices, self._axes)
         weights = random.dirichlet(np.ones(simplices.shape[1]), count)
         return np.asarray(np.einsum("ij,ijk->ik", weights, simplices[random.choice(len(shares), count, p=shares)]))
@@ -392,7 +388,6 @@ class Polytope(PolytopeArrays):
     def plot(self, axes: Any, **style: Any) -> None:
         """Fill a set of R^2 on matplotlib axes, with the options of `matplotlib.axes.Axes.fill`."""
         self._of_plane()
-        need_plot_axes(axes)
         points = self.vertices - self.vertices.mean(axis=0) if len(self.vertices) else self.vertices
         order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
         axes.fill(*self.vertices[order].T, **style)

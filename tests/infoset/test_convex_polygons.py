@@ -206,96 +206,32 @@ def test_the_empty_set_has_no_points_to_give(measure: Callable[[ConvexPolygons],
 
 
 @pytest.mark.parametrize(
-    ("vertices", "counts", "message"),
+    ("wrong", "message"),
     [
-        ([0.0, 1.0], 1, "shape"),
-        (np.zeros((4, 3)), 4, "shape"),
-        (np.zeros((2, 4, 2)), 4, "shape"),
-        (np.zeros((2, 4, 2)), [4, 4, 4], "shape"),
-        (np.zeros((4, 2)), 5, "counts must lie between 0 and 4"),
-        (np.zeros((4, 2)), -1, "counts must lie between 0 and 4"),
-        ([[0.0, np.nan]], 1, "finite"),
-        ([[0.0, 1.0], [np.inf, 0.0]], 2, "finite"),
+        (lambda: ConvexPolygons(np.zeros((2, 4, 2)), 4), "shape"),
+        (lambda: ConvexPolygons(np.zeros((4, 2)), 5), "counts must lie between 0 and 4"),
+        (lambda: ConvexPolygons([[0.0, np.nan]], 1), "finite"),
+        (lambda: square().translate((1.0, 2.0, 3.0)), "offset"),
+        (lambda: square().cut((1.0, 0.0), np.nan, 1.0), "lower must be a number"),
+        (lambda: boxes((2,)).cut([(1.0, 0.0), (0.0, 0.0)], 0.0, 1.0), "must not be zero"),
+        (lambda: boxes((3,)).cut((1.0, 0.0), [0.0, 0.0]), "broadcast"),
+        (lambda: boxes((3,)).minkowski_sum(boxes((2,))), "broadcast"),
+        (lambda: square().reduce_outward(3), "cap must be at least 4"),
+        (lambda: ConvexPolygons.from_box((1.0, 0.0), (0.0, 1.0)), "reversed"),
+        (lambda: boxes((3,)).polygon(), "choose one with an index"),
+        (lambda: ConvexPolygons.from_ball((0.0, 0.0), -1.0), "radius must not be negative"),
+        (lambda: ConvexPolygons.from_constraints([[1.0, 0.0]], [1.0, 2.0]), "must have as many rows"),
+        (lambda: ConvexPolygons.from_constraints(np.zeros((0, 2)), []), "unbounded"),
     ],
 )
-def test_bad_vertices_are_refused(vertices: object, counts: object, message: str) -> None:
+def test_bad_arguments_are_refused(wrong: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        ConvexPolygons(vertices, counts)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("bad", [(np.nan, 0.0), (np.inf, 1.0), (1.0,), (1.0, 2.0, 3.0), 1.0])
-def test_vectors_that_are_not_finite_pairs_are_refused(bad: object) -> None:
-    polygon = square()
-    for operation, name in [
-        (polygon.cut, "normal"),
-        (polygon.translate, "offset"),
-        (polygon.add_segment, "half"),
-        (polygon.support_function, "direction"),
-        (polygon.support_vector, "direction"),
-        (polygon.margin, "point"),
-        (polygon.contains, "point"),
-    ]:
-        with pytest.raises(ValueError, match=name):
-            operation(bad)  # type: ignore[operator]
-
-
-def test_other_bad_arguments_are_refused() -> None:
-    polygon = square()
-    with pytest.raises(ValueError, match="lower must be a number"):
-        polygon.cut((1.0, 0.0), np.nan, 1.0)
-    with pytest.raises(ValueError, match="upper must be a number"):
-        polygon.cut((1.0, 0.0), 0.0, np.nan)
-    with pytest.raises(ValueError, match="must not be zero"):
-        polygon.cut((0.0, 0.0), 0.0, 1.0)
-    with pytest.raises(ValueError, match="must not be zero"):
-        boxes((2,)).cut([(1.0, 0.0), (0.0, 0.0)], 0.0, 1.0)
-    with pytest.raises(ValueError, match="finite"):
-        polygon.linear_map([[np.nan, 0.0], [0.0, 1.0]])
-    with pytest.raises(ValueError, match="broadcast"):
-        polygon.linear_map(np.zeros((3, 3)))
-    with pytest.raises(ValueError, match="broadcast"):
-        boxes((3,)).cut((1.0, 0.0), [0.0, 0.0])
-    with pytest.raises(ValueError, match=r"broadcast|mismatch"):
-        boxes((3,)).minkowski_sum(boxes((2,)))
-    with pytest.raises(ValueError, match="cap must be at least 4"):
-        polygon.reduce_outward(3)
-    with pytest.raises(ValueError, match="reversed"):
-        ConvexPolygons.from_box((1.0, 0.0), (0.0, 1.0))
-    with pytest.raises(ValueError, match="reversed"):
-        ConvexPolygons.from_box((0.0, 1.0), (1.0, 0.0))
-    with pytest.raises(ValueError, match="choose one with an index"):
-        boxes((3,)).polygon()
-    with pytest.raises(TypeError, match=r"\.counts"):
-        len(polygon)
-    with pytest.raises(ValueError, match="finite"):
-        ConvexPolygons.from_points([(0.0, np.nan)])
+        wrong()
 
 
 def test_a_reversed_band_is_empty() -> None:
     assert square().cut((1.0, 0.0), 0.6, 0.4).is_empty
     assert boxes((2,)).cut((1.0, 0.0), [0.0, 0.6], [0.5, 0.4]).is_empty.tolist() == [False, True]
-
-
-# What a person sees ---------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("polygon", "text"),
-    [
-        (ConvexPolygons.empty(), "<empty set>"),
-        (POINT, "<point (1, 2)>"),
-        (SEGMENT, "<segment, length 5>"),
-        (ConvexPolygons([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 3), "<triangle, area 0.5>"),
-        (square(), "<quadrangle, area 1>"),
-        (square().cut((1.0, 1.0), upper=1.5), "<pentagon, area 0.875>"),
-        (square().minkowski_sum(square().linear_map([[1.0, -1.0], [1.0, 1.0]])), "<polygon of 8 vertices, area 7>"),
-        (boxes((2, 3)), "<convex polygons, batch of shape (2, 3), 4 to 4 vertices>"),
-        (boxes((2,)).cut((1.0, 0.0), 1.5), "<convex polygons, batch of shape (2,), 0 to 4 vertices>"),
-        (ConvexPolygons.empty((0,)), "<convex polygons, batch of shape (0,), 0 to 0 vertices>"),
-    ],
-)
-def test_printing_one_says_what_it_is(polygon: ConvexPolygons, text: str) -> None:
-    assert repr(polygon) == text
 
 
 def test_boxes_may_be_segments_and_points() -> None:
@@ -370,9 +306,7 @@ def test_from_shapely_orients_and_refuses() -> None:
     assert ConvexPolygons.from_shapely(clockwise).area() == 1.0
     with pytest.raises(ValueError, match="not convex"):
         ConvexPolygons.from_shapely(shapely.Polygon([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)]))
-    with pytest.raises(ValueError, match="single segment"):
-        ConvexPolygons.from_shapely(shapely.LineString([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]))
-    with pytest.raises(ValueError, match="is needed: got MultiPoint"):
+    with pytest.raises(ValueError, match="is needed"):
         ConvexPolygons.from_shapely(shapely.MultiPoint([(0.0, 0.0), (1.0, 0.0)]))
     with pytest.raises(ValueError, match="choose one with an index"):
         boxes((3,)).to_shapely()

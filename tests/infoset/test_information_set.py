@@ -215,7 +215,6 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     information.predict()
     information.shift(1.0)
     assert information.predicted_miss().exists.all()
-    assert "2 tracking, 1 of them inconsistent" in repr(information)
 
 
 def test_without_recovery_an_inconsistent_set_stays_empty() -> None:
@@ -238,7 +237,6 @@ def test_a_set_whose_labels_have_all_left_is_finished() -> None:
         information.drop_below_threshold()
         information.predict()
     assert information.status == [SetStatus.FINISHED]
-    assert "finished" in repr(information)
 
 
 def test_measuring_some_of_a_batch_leaves_the_others_alone() -> None:
@@ -322,15 +320,9 @@ def test_shapely_and_margin_agree_on_what_is_inside() -> None:
 
 def test_exact_knowledge_gives_segments_and_points() -> None:
     line = replace(MODEL, bounds=replace(KNOWN, z_m=(100.0, 100.0)), initial_set=InitialSet.BOX)
-    assert repr(InformationSet(line).sections()[0].polygon).startswith("<segment")
+    assert InformationSet(line).sections()[0].polygon.counts == 2
     point = replace(line, bounds=replace(line.bounds, vz_m_s=(3.0, 3.0)))
-    assert repr(InformationSet(point).sections()[0].polygon) == "<point (3, 100)>"
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_what_is_not_finite_is_refused(value: float) -> None:
-    with pytest.raises(ValueError, match="alpha_rad must be finite"):
-        InformationSet(MODEL).measure_angle(value)
+    assert InformationSet(point).sections()[0].polygon.polygon().tolist() == [[3.0, 100.0]]
 
 
 def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:

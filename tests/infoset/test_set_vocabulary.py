@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from infoset import ConvexPolygons, Polytope, Zonotope
-from infoset.polytope import product
+from infoset import ConvexPolygons, Polytope
 
 VOCABULARY = {
     "linear_map", "affine_map", "translate", "minkowski_sum", "minkowski_difference", "intersection", "convex_hull",
@@ -102,7 +101,7 @@ def test_a_single_polygon_takes_many_points_and_directions() -> None:
     assert square.contains(square.sample(20)).all()
     assert not ConvexPolygons.empty().contains(points).any()
     assert square.contains(np.zeros((0, 2))).shape == (0,)
-    with pytest.raises(ValueError, match=r"\(2, 2\); broadcast_to makes a batch of a single polygon"):
+    with pytest.raises(ValueError, match="normal must have the shape"):
         square.cut([[1, 0], [0, 1]], 0.0, 1.0)  # for a Polytope this is one intersection
 
 
@@ -113,196 +112,36 @@ def test_hulls_of_lists_and_a_line_beside_a_polygon() -> None:
         ConvexPolygons.from_points(one).slice(0, 5.0)
 
 
-SQUARE, CUBE = ConvexPolygons.from_box([0, 0], [1, 1]), Polytope.from_box([0, 0, 0], [1, 1, 1])
-EYE = np.eye(3)
 BAD_NUMBERS: list[Any] = [np.nan, np.inf, "1", None, 1e70, 1j, np.ma.masked_array([1.0], [True])]
-BAD_VECTORS: list[Any] = [
-    *BAD_NUMBERS,
-    1.0,
-    [],
-    [1.0],
-    [1, 2, 3, 4],
-    [1, np.nan],
-    [1, 2, np.inf],
-    ["a", "b"],
-    [[1], [2, 3]],
-]
-BAD_MATRICES: list[Any] = [
-    *BAD_VECTORS,
-    EYE[None, None],
-    np.full((3, 3), np.nan),
-    np.full((2, 2), np.inf),
-    [[1, 2, 3, 4]],
-]
-BAD_SETS: list[Any] = [None, 1.0, "set", [[0, 0], [1, 1]]]
-BAD_AXES: list[Any] = [-1, 5, 0.5, "x", None, [], [0, 0], [[0], [1]], [1, 7], True]
-BAD_COUNTS: list[Any] = [-1, 0, 1.5, "2", None, True]
-BAD_TOLERANCES: list[Any] = [-1.0, np.nan, np.inf, "1", None]
-AXES_WITHOUT_FILL = [None, "axes", np.zeros(2)]
 
 
-def unit(one: Any) -> list[float]:
-    """Return a direction, and a point of the set."""
-    return [1.0, 0.0] if isinstance(one, ConvexPolygons) else [1.0, 0.0, 0.0]
-
-
-Operation = Callable[[Any, Any], object]
-OPERATIONS: dict[str, tuple[Operation, list[Any]]] = {
-    "linear_map": (lambda p, x: p.linear_map(x), BAD_MATRICES),
-    "affine_map": (lambda p, x: p.affine_map(x), BAD_MATRICES),
-    "affine_map offset": (lambda p, x: p.affine_map(np.eye(len(unit(p))), x), [[], [1.0], *BAD_NUMBERS[:-1]]),
-    "A @ P": (lambda p, x: x @ p, BAD_MATRICES[:-3]),
-    "translate": (lambda p, x: p.translate(x), BAD_VECTORS),
-    "P + vector": (lambda p, x: p + x, BAD_VECTORS),
-    "preimage": (lambda p, x: p.preimage(x), BAD_MATRICES),
-    "preimage offset": (lambda p, x: p.preimage(np.eye(len(unit(p))), x), [[], [1.0], *BAD_NUMBERS[:-1]]),
-    "minkowski_sum": (lambda p, x: p.minkowski_sum(x), BAD_SETS),
-    "minkowski_difference": (lambda p, x: p.minkowski_difference(x), BAD_SETS),
-    "intersection": (lambda p, x: p.intersection(x), BAD_SETS),
-    "convex_hull": (lambda p, x: p.convex_hull(x), BAD_SETS),
-    "is_subset": (lambda p, x: p.is_subset(x), BAD_SETS),
-    "equals": (lambda p, x: p.equals(x), BAD_SETS),
-    "hausdorff_distance": (lambda p, x: p.hausdorff_distance(x), BAD_SETS),
-    "P & Q": (lambda p, x: p & x, BAD_SETS),
-    "P <= Q": (lambda p, x: p <= x, BAD_SETS),
-    "cut": (lambda p, x: p.cut(x, 0.0, 1.0), BAD_MATRICES),
-    "cut lower": (lambda p, x: p.cut(unit(p), x), [np.nan, "1", None, [1, 2], []]),
-    "cut upper": (lambda p, x: p.cut(unit(p), upper=x), [np.nan, "1", None, [1, 2], []]),
-    "cut slack": (lambda p, x: p.cut(unit(p), 0, 1, slack_ulp=x), BAD_TOLERANCES),
-    "support_function": (lambda p, x: p.support_function(x), BAD_VECTORS),
-    "support_vector": (lambda p, x: p.support_vector(x), BAD_VECTORS),
-    "margin": (lambda p, x: p.margin(x), BAD_VECTORS),
-    "contains": (lambda p, x: p.contains(x), BAD_VECTORS),
-    "point in P": (lambda p, x: x in p, BAD_VECTORS),
-    "contains tolerance": (lambda p, x: p.contains(unit(p), x), BAD_TOLERANCES),
-    "is_subset tolerance": (lambda p, x: p.is_subset(p, x), BAD_TOLERANCES),
-    "equals tolerance": (lambda p, x: p.equals(p, x), BAD_TOLERANCES),
-    "closest_point": (lambda p, x: p.closest_point(x), BAD_VECTORS),
-    "distance": (lambda p, x: p.distance(x), BAD_VECTORS),
-    "project": (lambda p, x: p.project(x), BAD_AXES),
-    "slice": (lambda p, x: p.slice(x, 0.5), [*BAD_AXES, [0, 1, 2]]),
-    "slice values": (lambda p, x: p.slice(0, x), [np.nan, "1", None, [1, 2]]),
-    "sample": (lambda p, x: p.sample(x), BAD_COUNTS),
-    "sample seed": (lambda p, x: p.sample(1, x), [-1, 1.5, "2", None]),
-    "reduce_outward": (lambda p, x: p.reduce_outward(x), [*BAD_COUNTS, 3]),
-    "plot": (lambda p, x: p.plot(x), AXES_WITHOUT_FILL),
-    "from_vertices": (lambda p, x: p.from_vertices(x), [*BAD_NUMBERS, 1.0, [1.0], [[np.nan, 0]], [["a", "b"]], [[1, 2],
-        [3]]]),
-    "from_constraints": (lambda p, x: p.from_constraints(x, [1.0]), BAD_MATRICES),
-    "from_constraints offsets": (lambda p, x: p.from_constraints([unit(p)], x), [*BAD_NUMBERS[:1], "1", None, [],
-        [1, 2], 1]),
-    "from_box": (lambda p, x: p.from_box(x, unit(p)), [*BAD_NUMBERS, 1.0, [], [1, 2, 3, 4], [2, 0, 0], [2, 0]]),
-    "from_box upper": (lambda p, x: p.from_box(0 * np.array(unit(p)), x), [*BAD_VECTORS, [-1, 0], [-1, 0, 0]]),
-    "from_ball": (lambda p, x: p.from_ball(x, 1.0), [*BAD_NUMBERS, 1.0, [], [[[]]], [1, np.nan], ["a", "b"]]),
-    "from_ball radius": (lambda p, x: p.from_ball(unit(p), x), [-1.0, np.nan, "1", None, np.inf]),
-    "from_zonotope": (lambda p, x: p.from_zonotope(x, []), [*BAD_NUMBERS, 1.0, [], [1, np.nan], ["a", "b"]]),
-    "from_zonotope generators": (lambda p, x: p.from_zonotope(unit(p), x), [*BAD_NUMBERS, [1.0], [[1, 2, 3, 4]],
-        [[np.nan] * 3]]),
-    "from_shapely": (lambda p, x: p.from_shapely(x), [None, 1.0, "POINT (1 2)", shapely.MultiPoint([(0, 0), (1, 0)])]),
-    "empty": (lambda p, x: p.empty(x), [-1, 1.5, "2", None, (-1,), [1]]),
-}  # fmt: skip
-
-ONE_CLASS: dict[str, tuple[Callable[[Any], object], list[Any]]] = {
-    "ConvexPolygons(vertices)": (lambda x: ConvexPolygons(x, 3), [*BAD_NUMBERS, 1.0, [1.0], np.eye(3)]),
-    "ConvexPolygons(counts)": (lambda x: ConvexPolygons([[0, 0]], x), [-1, 2, 0.5, np.nan, "1", None, [1, 1]]),
-    "ConvexPolygons.from_vertices counts": (lambda x: ConvexPolygons.from_vertices([[0, 0]], x), [-1, 2, 0.5, "1",
-        [1, 1]]),
-    "ConvexPolygons.from_points": (ConvexPolygons.from_points, [*BAD_NUMBERS, 1.0, [1.0], [[1, 2], [3]], [[1, 2, 3]]]),
-    "ConvexPolygons.from_ball sides": (lambda x: ConvexPolygons.from_ball([0, 0], 1, x), [2, 3.5, "4", None]),
-    "ConvexPolygons.stack": (ConvexPolygons.stack, [[None], [SQUARE, CUBE], [SQUARE, SQUARE.broadcast_to((2,))]]),
-    "ConvexPolygons.broadcast_to": (SQUARE.broadcast_to((2,)).broadcast_to, [(3,), 5, "2", (-1,), None, np.eye(2)]),
-    "ConvexPolygons.add_segment": (SQUARE.add_segment, BAD_VECTORS),
-    "batches": (SQUARE.broadcast_to((2,)).intersection, [SQUARE.broadcast_to((3,))]),
-    "batch to R^3": (SQUARE.broadcast_to((2,)).affine_map, [np.ones((3, 2))]),
-    "another space": (CUBE.intersection, [Polytope.empty(2)]),
-    "distance from another space": (CUBE.distance, [Polytope.empty(2)]),
-    "across": (lambda x: Polytope.from_constraints(EYE, np.ones(3), x, [1.0]), [[[1, 0]], [1.0],
-        [[np.nan, 0, 0]], "a"]),
-    "levels": (lambda x: Polytope.from_constraints(EYE, np.ones(3), [[1, 0, 0]], x), [None, [1, 2], [np.nan],
-        [np.inf]]),
-    "excess": (CUBE.excess, BAD_VECTORS),
-    "cut with several": (lambda x: CUBE.cut(EYE, upper=x), [[1, 2], [1, 2, np.nan]]),
-    "product": (lambda x: product(*x), [(), (CUBE, None)]),
-}  # fmt: skip
-
-
-def refuse(operation: Callable[[], object], what: str) -> None:
-    """Check that an operation raises one clear error: of the checks of arguments, not from inside."""
-    with pytest.raises((ValueError, TypeError)) as caught:
-        operation()
-    last = caught.traceback[-1]
-    assert "/numpy/" not in str(last.path), (what, str(caught.value))
-    text = str(caught.value)
-    inside = (
-        "setting an array",
-        "operands",
-        "matmul",
-        "could not convert",
-        "out of range",
-        "subscript",
-        "ufunc",
-        "unexpected",
-    )
-    assert not any(word in text for word in inside) or "unsupported operand" in text, (what, text)
-    clear = (
-        "must",
-        "needed",
-        "not convex",
-        "unsupported operand",
-        "not supported",
-        "unbounded",
-        "hole",
-        "batch",
-        "reversed",
-        "needs",
-    )
-    assert any(word in text for word in clear), (what, text)
-
-
-@pytest.mark.parametrize("name", OPERATIONS)
-@pytest.mark.parametrize("sample", [SQUARE, CUBE, ConvexPolygons.empty(), Polytope.empty(3)], ids=repr)
-def test_mistaken_arguments_have_one_clear_message(name: str, sample: Any) -> None:
-    operation, mistakes = OPERATIONS[name]
-    for mistake in mistakes:
-        refuse(lambda mistake=mistake: operation(sample, mistake), f"{name}({mistake!r})")  # type: ignore[misc]
-
-
-@pytest.mark.parametrize("name", ONE_CLASS)
-def test_mistaken_arguments_of_one_class_have_one_clear_message(name: str) -> None:
-    operation, mistakes = ONE_CLASS[name]
-    for mistake in mistakes:
-        refuse(lambda mistake=mistake: operation(mistake), f"{name}({mistake!r})")  # type: ignore[misc]
-
-
+@pytest.mark.parametrize("value", BAD_NUMBERS)
 @pytest.mark.parametrize(
-    ("kind", "arguments", "message"),
-    [
-        (Polytope, (EYE, np.ones(3)), "Polytope: missing a required argument: 'offsets'; use Polytope.from"),
-        (Polytope, (), "Polytope: missing a required argument: 'vertices'; use Polytope.from"),
-        (ConvexPolygons, ([(0, 0), (1, 0)],), "ConvexPolygons: missing a required argument: 'counts'; use ConvexPo"),
-        (ConvexPolygons, (1, 2, 3), "ConvexPolygons: too many positional arguments; use ConvexPolygons.from_vertices"),
-    ],
+    "sample", [ConvexPolygons.from_box([0, 0], [1, 1]), Polytope.from_box([0, 0, 0], [1, 1, 1])], ids=["2", "3"]
 )
-def test_a_constructor_names_its_own_class_and_the_way_to_make_a_set(kind: Any, arguments: Any, message: str) -> None:
-    with pytest.raises(TypeError) as raised:
-        kind(*arguments)
-    assert str(raised.value).startswith(message)
-
-
-@pytest.mark.parametrize("sample", [SQUARE, CUBE])
-def test_a_sum_with_a_set_of_another_class_names_the_class(sample: Any) -> None:
-    other: Any
-    for other in (Zonotope(np.zeros(2), np.eye(2)), CUBE if sample is SQUARE else SQUARE):
-        for one, two in ((sample, other), (other, sample)):
-            with pytest.raises(TypeError, match=r"^other must be of the type (Polytope|ConvexPolygons): got "):
-                one + two
-
-
-def test_every_public_operation_is_in_the_table() -> None:
-    without_arguments = {"area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter", "constraints"}
-    others = {
-        "to_shapely",
-        "vertices",
-        "is_empty",
-    }
-    assert VOCABULARY - without_arguments - others <= {name.split()[0] for name in OPERATIONS}
+def test_what_would_give_wrong_numbers_is_refused(sample: Any, value: Any) -> None:
+    """Values that NumPy would take: not finite, complex, masked, texts, and too large for exact decisions."""
+    space = 2 if isinstance(sample, ConvexPolygons) else 3
+    if isinstance(value, np.ma.MaskedArray):
+        vector: Any = np.ma.masked_array(np.ones(space), [True] + [False] * (space - 1))
+        matrix: Any = np.ma.masked_array(np.eye(space), np.eye(space, dtype=bool))
+    else:
+        vector, matrix = [value] * space, [[value] * space] * space
+    operations: tuple[Callable[[], object], ...] = (
+        lambda: sample.linear_map(matrix),
+        lambda: sample.preimage(matrix),
+        lambda: sample.translate(vector),
+        lambda: sample.cut(vector, 0.0, 1.0),
+        lambda: sample.support_function(vector),
+        lambda: sample.margin(vector),
+        lambda: sample.contains(vector),
+        lambda: sample.distance(vector),
+        lambda: sample.from_vertices(matrix),
+        lambda: sample.from_constraints(matrix, np.ones(space)),
+        lambda: sample.from_box(vector, vector),
+        lambda: sample.from_ball(vector, 1.0),
+        lambda: sample.from_zonotope(vector, []),
+    )
+    for operation in operations:
+        with pytest.raises((TypeError, ValueError)):
+            operation()
