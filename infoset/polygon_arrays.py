@@ -181,8 +181,12 @@ class PolygonArrays:
     def from_shapely(cls, geometry: BaseGeometry | Sequence[BaseGeometry]) -> Self:
         """Return a convex shapely Point, LineString or Polygon as a single polygon, and a sequence of them as a batch.
 
-        O(n). Vertices along a side are dropped. A ValueError is raised if a geometry is not convex by more than
-        rounding (64 ulp of the coordinates), or is of another type.
+        O(n). Vertices along a side are dropped.
+
+        Raises
+        ------
+        ValueError
+            If a geometry is not convex by more than rounding (64 ulp of the coordinates), or is of another type.
         """
         if isinstance(geometry, Sequence | np.ndarray) and not isinstance(geometry, str):
             return cls.stack([cls.from_shapely(one) for one in geometry])

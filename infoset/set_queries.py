@@ -326,4 +326,4 @@ class SetQueries:
         return [section.omega_alpha.to_shapely() for section in self.sections(engagement)]
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} at t = {self.time_s:g} s: {self.batch} engagements>"
+        return f"<{type(self).__name__} of {self.batch} at t = {self.time_s:g} s>"
