@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from importlib import import_module
+from typing import Any
 
 import typer
 from rich.text import Text
@@ -32,22 +34,19 @@ def reproduce_paper(paper: Paper, progress: Progress) -> tuple[Comparison, ...]:
     else:
         command, ours = import_module(f"experiments.{paper.name}.run").COMMAND, {}
         for done, (source, numbers) in enumerate(paper.tables.items(), start=1):
-            results = command.to_json(command.report(COMMANDS[paper.name](**paper.options[source])))
+            report = command.report(COMMANDS[paper.name](**paper.options[source]))
+            results = json.loads(to_json(command.to_json(report)))
             ours[source] = [_value(results, number.name) for number in numbers]
             progress(done / len(paper.tables))
     progress(1.0)
     return paper.compare(ours)
 
 
-def _value(results: object, key: str) -> float:
+def _value(results: Any, key: str) -> float:
     """Return the number at a key such as `nodes.0.velocity_m_s.1`; NaN if there is none."""
-    found: object = results
     for part in key.split("."):
-        if isinstance(found, dict):
-            found = found[part]
-        elif found is not None:
-            found = found[int(part)]  # type: ignore[index]  # an array or a list
-    return math.nan if found is None else float(found)  # type: ignore[arg-type]
+        results = results and results[int(part) if isinstance(results, list) else part]
+    return math.nan if results is None else float(results)
 
 
 def run(options: Reproduce) -> None:
@@ -79,16 +78,12 @@ def _summary(paper: Paper, numbers: Sequence[Comparison]) -> dict[str, object]:
         "remarks": list(paper.remarks),
         "numbers": [
             {
-                "source": each.number.source,
-                "name": each.number.name,
-                "printed": each.number.printed,
-                "corrected": each.number.corrected,
+                **{key: getattr(each.number, key) for key in ("source", "name", "printed", "corrected", "note")},
                 "ours": each.ours.value if math.isfinite(each.ours.value) else None,
                 "other_model": each.ours.other,
                 "agrees_from": each.band[0],
                 "agrees_to": each.band[1],
-                "verdict": each.verdict.value,
-                "note": each.number.note,
+                "verdict": each.verdict,
             }
             for each in numbers
         ],
@@ -136,11 +131,6 @@ def _row(each: Comparison, notes: Sequence[str]) -> tuple[str, ...]:
 
 
 def _digits(number: PrintedNumber, value: float) -> str:
-    """Return a computed number with one or two digits more than the printed one."""
-    known = Decimal(number.corrected or number.printed).as_tuple()
-    assert isinstance(known.exponent, int)
-    if "e" in number.printed and value:
-        text = f"{value:.{len(known.digits)}e}"
-    else:
-        text = f"{value:.{max(0, -known.exponent) + 2}f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
+    """Return a computed number with at least two digits more than the printed one."""
+    digits = len(Decimal(number.corrected or number.printed).as_tuple().digits) + 2
+    return f"{value:#.{digits}g}"

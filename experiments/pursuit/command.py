@@ -37,7 +37,7 @@ class Pursuit(FileOptions):
         typer.Option(
             metavar="POLICY",
             help="Simulate a pursuer that replans and an evader that follows this policy: optimal, random, coast, "
-            "prograde, retrograde, normal, antinormal, outward, inward, or a CSV file with lines time_s,policy.",
+            "prograde, retrograde, normal, antinormal, outward or inward.",
         ),
     ] = None
     replan_s: Annotated[
@@ -65,7 +65,7 @@ class Pursuit(FileOptions):
 class PursuitMap(FileOptions):
     """Solve a pursuit game on a grid of two parameters.
 
-    A parameter is phase_deg (lead of the evader), thrust_ratio, mass_ratio, or any key of the file. The solution of a
+    A parameter is phase_deg (lead of the evader), thrust_ratio, or any key of the file. The solution of a
     point starts from those of its neighbours; some points are solved from scratch as a check. A point without a
     certified solution has no capture time. Without --out, --json or --csv no file is written.
     """

@@ -21,8 +21,8 @@ from rendezvous.pursuit_evasion import STATUSES, CaptureMap, Game, PointStatus, 
 from rendezvous.two_body import OrbitalElements
 
 MAX_POINTS = 100_000
-RATIOS = ("phase_deg", "thrust_ratio", "mass_ratio")
-"""Parameters besides the keys of a file: lead of the evader in true longitude, its thrust and mass by the pursuer's."""
+RATIOS = ("phase_deg", "thrust_ratio")
+"""Parameters besides the keys of a file: lead of the evader in true longitude, its thrust by the pursuer's."""
 STATUS_WORDS = {
     PointStatus.FOLLOWED: "solved from scratch",
     PointStatus.NEIGHBOUR: "continued from a neighbour",
@@ -92,8 +92,6 @@ def game_at(problem: PursuitProblem, values: Mapping[str, float]) -> Game:
         evader = replace(evader, orbit=replace(evader.orbit, true_anomaly_rad=anomaly_rad))
     if "thrust_ratio" in values:
         evader = replace(evader, thrust_N=values["thrust_ratio"] * pursuer.thrust_N)
-    if "mass_ratio" in values:
-        evader = replace(evader, mass_kg=values["mass_ratio"] * pursuer.mass_kg)
     return replace(problem, evader=evader).game
 
 

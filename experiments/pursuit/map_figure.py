@@ -26,7 +26,6 @@ _UNKNOWN: dict[PointStatus, tuple[str, str]] = {
 _RATIOS = {
     "phase_deg": "lead of the evader, deg",
     "thrust_ratio": "thrust of the evader / thrust of the pursuer",
-    "mass_ratio": "mass of the evader / mass of the pursuer",
 }
 
 

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from experiments.common.errors import InputError
+from experiments.common.options import choice
 from experiments.common.problem_command import ProblemCommand
 from experiments.common.screen import BeginProgress, say
 from experiments.pursuit.command import Pursuit
-from experiments.pursuit.evader import EvaderPolicy, evader_policy
 from experiments.pursuit.file import PursuitProblem
 from experiments.pursuit.page import pursuit_page
 from experiments.pursuit.report import Feedback, Report, report_json, report_lines, trajectories
-from rendezvous.pursuit_evasion import Observation, Solution, certify, fly_many, solve
+from rendezvous.pursuit_evasion import (
+    Observation,
+    Policy,
+    RandomSteering,
+    Solution,
+    Steering,
+    certify,
+    fly_many,
+    solve,
+)
+
+OPTIMAL, RANDOM = "optimal", "random"
+"""Policies of the evader besides those of `Policy`."""
 
 REPLAN_S, MIN_PLANS, MAX_PLANS = 600.0, 50, 2000
 """Default time between plans, and the smallest and largest number of plans in a game by default."""
@@ -24,26 +36,33 @@ def solve_pursuit(problem: PursuitProblem, options: Pursuit, begin: BeginProgres
             "--runs, --replan-s, --delay-s and the noise options need a policy of the evader; "
             "add one, for example --feedback random"
         )
-    evader = None if options.feedback is None else evader_policy(options.feedback, options.seed)
+    if options.feedback is not None:
+        choice("--feedback", options.feedback, [OPTIMAL, RANDOM, *(policy.value for policy in Policy)])
     progress = begin("solve")
     solution = solve(problem.game, all_directions=options.certify)
     progress(0.5)
     certificate = None if solution.capture is None else certify(solution, all_directions=options.certify)
     progress(1.0)
-    feedback = None if evader is None else _fly(solution, options, evader, begin)
+    feedback = None if options.feedback is None else _fly(solution, options, options.feedback, begin)
     return Report(problem, solution, certificate, feedback)
 
 
-def _fly(solution: Solution, options: Pursuit, evader: EvaderPolicy, begin: BeginProgress) -> Feedback | None:
+def _fly(solution: Solution, options: Pursuit, policy: str, begin: BeginProgress) -> Feedback | None:
     if solution.capture is None:
         say("no feedback: there is no capture, and so no plan to start from", options.quiet)
         return None
     game_s = solution.capture.time_s
     replan_s = options.replan_s or max(min(REPLAN_S, game_s / MIN_PLANS), game_s / MAX_PLANS)
     observation = Observation(options.delay_s, options.position_noise_m, options.velocity_noise_m_s)
+
+    def steering(run: int) -> Steering | None:
+        if policy == RANDOM:
+            return RandomSteering(options.seed, run, replan_s)
+        return None if policy == OPTIMAL else Policy(policy).direction
+
     flights = fly_many(
         solution.game,
-        lambda run: evader(run, replan_s),
+        steering,
         options.runs,
         replan_s=replan_s,
         observation=observation,
@@ -51,7 +70,7 @@ def _fly(solution: Solution, options: Pursuit, evader: EvaderPolicy, begin: Begi
         progress=begin("feedback"),
         solution=solution,
     )
-    return Feedback(str(options.feedback), replan_s, observation, options.seed, tuple(flights))
+    return Feedback(policy, replan_s, observation, options.seed, tuple(flights))
 
 
 COMMAND = ProblemCommand(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -32,10 +32,6 @@ class Reach(FileOptions):
             "(N random ones).",
         ),
     ] = "energy,l1,norms,peak,chebyshev,analytic"
-    route: Annotated[
-        Literal["auto", "exact", "lifted"],
-        typer.Option(help="Representation of the sets: exact polytopes, or lifted linear programs; auto chooses one."),
-    ] = "auto"
     replan: Annotated[
         bool,
         typer.Option(

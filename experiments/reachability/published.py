@@ -7,9 +7,9 @@ paper's axes; problems, controls and states are in Hill's.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from experiments.common.printed_numbers import Ours, PrintedNumber, Progress, re
 from experiments.reachability.file import Rendezvous, load_rendezvous
 from experiments.reachability.report import Member
 from experiments.reachability.run import fly_members
-from infoset.arrays import Floats
+from infoset.arrays import Flags, Floats
 from rendezvous.reachability import NonlinearMotion, ReachabilityProblem, minimum_energy, nearest, solve
 from rendezvous.relative_motion import EllipticOrbit
 
@@ -30,43 +30,39 @@ _CONTROL_ROUNDING = 0.5e-4
 _STATE_ROUNDING = np.array([0.05, 0.05, 0.05, 0.005, 0.005, 0.005])
 
 
-@dataclass(frozen=True)
-class PrintedTable:
-    """A table of the paper."""
+class PrintedTable(NamedTuple):
+    """A table of the paper; misprints are corrected in the controls, shape (4, 3), and the linear states, shape (4, 6).
+
+    `contradicted`, shape (4, 3), are the controls that the states contradict; they stay as printed, because the correct
+    ones are not known. The `nonlinear` states, shape (4, 6), are as printed.
+    """
 
     numbers: tuple[PrintedNumber, ...]
-
-    @property
-    def contradicted(self) -> np.ndarray:
-        """Return which controls the states contradict, of which the correct ones are not known: shape (4, 3)."""
-        found = [number.corrected is not None and float(number.corrected) == 0.0 for number in self.numbers[_U]]
-        return np.reshape(found, (4, 3))
-
-    @property
-    def controls(self) -> Floats:
-        """Return the controls, shape (4, 3), with misprints corrected except for contradicted ones."""
-        printed = np.reshape([number.value for number in self.numbers[_U]], (4, 3))
-        return np.where(self.contradicted, printed, self._corrected(_U, 3))
-
-    @property
-    def linear(self) -> Floats:
-        """Return the linear states, shape (4, 6), with misprints corrected."""
-        return self._corrected(_LINEAR, 6)
-
-    @property
-    def nonlinear(self) -> Floats:
-        """Return the nonlinear states, shape (4, 6), as printed."""
-        return np.reshape([number.value for number in self.numbers[_NONLINEAR]], (4, 6))
-
-    def _corrected(self, part: slice, columns: int) -> Floats:
-        numbers = [float(number.corrected or number.printed) for number in self.numbers[part]]
-        return np.reshape(numbers, (4, columns))
+    contradicted: Flags
+    controls: Floats
+    linear: Floats
+    nonlinear: Floats
 
 
 @cache
 def printed_tables() -> tuple[PrintedTable, ...]:
     """Return tables 1 to 3."""
-    return tuple(map(PrintedTable, read_paper("reachability").tables.values()))
+    tables = []
+    for numbers in read_paper("reachability").tables.values():
+        printed = np.array([number.value for number in numbers])
+        corrected = np.array([float(number.corrected or number.printed) for number in numbers])
+        contradicted = (corrected == 0.0) & (printed != 0.0)
+        controls = np.where(contradicted, printed, corrected)[_U]
+        tables.append(
+            PrintedTable(
+                numbers,
+                contradicted[_U].reshape(4, 3),
+                controls.reshape(4, 3),
+                corrected[_LINEAR].reshape(4, 6),
+                printed[_NONLINEAR].reshape(4, 6),
+            )
+        )
+    return tuple(tables)
 
 
 def compute(progress: Progress) -> dict[str, Sequence[Ours]]:

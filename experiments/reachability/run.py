@@ -25,7 +25,6 @@ from rendezvous.reachability import (
     Route,
     SetKind,
     Solution,
-    TooLargeError,
     TooManyVerticesError,
     analytic_centre,
     chebyshev_centre,
@@ -61,10 +60,7 @@ def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgres
     """Return the sets, the selected optimal controls with their trajectories, and the simulations in closed loop."""
     names, count = _selection(options.select)
     progress = begin(rendezvous.name)
-    try:
-        solution = solve(rendezvous.problem, None if options.route == "auto" else Route(options.route))
-    except (TooLargeError, UncertainHullError) as error:
-        raise InputError(f"--route exact: {error}; choose --route lifted") from None
+    solution = solve(rendezvous.problem)
     progress(0.2)
     searched = rendezvous.problem if solution.optimal.miss == 0.0 else rendezvous.longer
     minimum = min_periods(searched)

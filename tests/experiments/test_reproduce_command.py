@@ -214,11 +214,12 @@ def test_reachability_tables_stand_as_the_theory_says() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "count"), [("multipoint", 23), pytest.param("pursuit", 42, marks=pytest.mark.thorough)]
+    ("name", "tables"), [("multipoint", 9), ("pursuit", 1), pytest.param("pursuit", 9, marks=pytest.mark.thorough)]
 )
-def test_results_of_commands_agree(name: str, count: int) -> None:
-    found = reproduce_paper(read_paper(name), silent)
-    assert [each.verdict for each in found] == [Verdict.AGREED] * count
+def test_results_of_commands_agree(name: str, tables: int) -> None:
+    paper = read_paper(name)
+    found = reproduce_paper(replace(paper, tables=dict([*paper.tables.items()][:tables])), silent)
+    assert {each.verdict for each in found} == {Verdict.AGREED}
 
 
 @pytest.mark.thorough
