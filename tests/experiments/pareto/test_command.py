@@ -122,31 +122,6 @@ def test_unsound_files_are_refused(text: str, told: str, infoset: Command, mine:
     assert not Path("x.json").exists()
 
 
-LONG = """
-kind = "pareto-encounter"
-orbit_rate_rad_s = 0.0011
-duration_s = 818181.8
-free = ["x"]
-max_control_m_s2 = 1.05e-5
-[[craft]]
-name = "a"
-position_m = [1042.875, -544.668, -206.956]
-velocity_m_s = [0.348, 0.814, 0.248]
-[[craft]]
-name = "b"
-position_m = [-1284.581, -1098.813, -661.613]
-velocity_m_s = [-1.734, 0.838, 0.126]
-"""
-
-
-def test_a_meeting_after_many_revolutions_is_not_refused(infoset: Command, mine: Callable[[str], Path]) -> None:
-    # 9.980e-6 m/s^2 suffices (test_choices.py); a fixed rule of quadrature said 1.14e-5.
-    code, out, _ = infoset("pareto", mine(LONG))
-    assert code == 0
-    assert "another control satisfies the bound" in out
-    infoset.refused("pareto", mine(LONG.replace("1.05e-5", "9.97e-6")))
-
-
 LATE = """
 kind = "pareto-encounter"
 orbit_rate_rad_s = 6.53e-05
