@@ -31,15 +31,3 @@ def test_the_node_and_the_perigee_are_where_they_are_said_to_be() -> None:
     assert position[2] == pytest.approx(0.0, abs=1e-6)
     assert velocity[2] > 0.0
     assert math.degrees(math.atan2(position[1], position[0])) == pytest.approx(40.0)
-
-
-@pytest.mark.parametrize(("axis", "eccentricity"), [(-7e6, 0.1), (0.0, 0.1), (7e6, 1.0), (7e6, -0.1)])
-def test_what_is_no_ellipse_is_refused(axis: float, eccentricity: float) -> None:
-    with pytest.raises(ValueError, match="an ellipse has"):
-        OrbitalElements(axis, eccentricity, 0.0, 0.0, 0.0, 0.0)
-
-
-def test_a_hyperbola_has_a_negative_axis_and_a_fall_no_perigee() -> None:
-    position = np.array([7e6, 0.0, 0.0])
-    assert semi_major_axis_m(position, np.array([0.0, 12e3, 0.0]), MU) < 0.0
-    assert perigee_m(position, np.array([1e3, 0.0, 0.0]), MU) == 0.0

@@ -35,7 +35,6 @@ from rendezvous.pareto import (
     peak_control,
     simplex_weights,
     solve_encounter,
-    sweep_meeting_time,
     total_impulse,
 )
 from rendezvous.pareto.selections import nearest_in_hull
@@ -98,16 +97,6 @@ def test_the_front_of_three_in_closed_form() -> None:
     across, height = np.sqrt(np.maximum(first - along**2, 0.0)), np.sqrt(left**2 - corner**2)
     # Near the edge between the first two ideals the square root amplifies rounding.
     np.testing.assert_allclose((along - corner) ** 2 + (across - height) ** 2, third, rtol=1e-7)
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 6])
-def test_weights_cover_the_simplex(count: int) -> None:
-    weights = simplex_weights(count, 300)
-    np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-14)
-    assert (weights >= 0.0).all()
-    for corner in np.eye(count):
-        assert (np.abs(weights - corner).max(axis=1) < 1e-15).any()
-    np.testing.assert_array_equal(weights, simplex_weights(count, 300))
 
 
 @given(SEEDS, st.integers(1, 5), st.booleans(), st.sampled_from(list(Meeting)))
@@ -206,12 +195,6 @@ def test_with_one_free_component_the_nearest_is_clipped_to_the_ideals(preferred:
     np.testing.assert_allclose(nearest_to(solution, np.array([preferred])), np.clip(preferred, low, high), rtol=1e-12)
 
 
-@pytest.mark.parametrize("preferred", [[np.nan], [np.inf], [0.0, 1.0], []])
-def test_a_preferred_meeting_that_is_none_is_refused(preferred: list[float]) -> None:
-    with pytest.raises(ValueError, match="must be 1 finite numbers"):
-        nearest_to(one_line(), np.array(preferred))
-
-
 @given(SEEDS, st.integers(1, 5), st.booleans())
 @settings(max_examples=15, deadline=None)
 def test_coalitions_are_superadditive_and_shares_add_up(seed: int, count: int, own_starts: bool) -> None:
@@ -237,36 +220,12 @@ def test_coalitions_are_superadditive_and_shares_add_up(seed: int, count: int, o
     np.testing.assert_allclose(found.shapley, added, rtol=1e-9, atol=1e-12)
 
 
-def test_regret_with_equal_weights_is_the_distance_from_the_coalitions_own_mean() -> None:
-    solution = some(4, 4)
-    craft = tuple(replace(each, weight=1.0) for each in solution.encounter.craft)
-    solution = solve_encounter(replace(solution.encounter, craft=craft))
-    matrix = solution.costs[0].matrix
-    for each in analyse_coalitions(solution).coalitions:
-        away = solution.point - solution.ideals[list(each.members)].mean(axis=0)
-        assert each.regret == pytest.approx(len(each.members) * away @ matrix @ away, rel=1e-9, abs=1e-12)
-
-
 def test_craft_that_agree_have_nothing_to_share() -> None:
     solution = some(9, 1)
     twins = tuple(replace(solution.encounter.craft[0], name=name) for name in ("a", "b"))
     found = analyse_coalitions(solve_encounter(replace(solution.encounter, craft=twins)))
     assert found.core is Core.ZERO
     np.testing.assert_allclose(found.shapley, 0.0, atol=1e-12)
-
-
-def test_craft_that_almost_agree_share_a_cost_beside_an_expensive_craft() -> None:
-    solution = some(9, 1)
-    first = solution.encounter.craft[0]
-    near = replace(first, name="near", state=first.state * (1.0 + 1e-6))
-    late = replace(first, name="late", weight=0.0, start_s=solution.encounter.meeting_s * (1.0 - 1e-6))
-    craft = (first, near, late)
-    assert analyse_coalitions(solve_encounter(replace(solution.encounter, craft=craft))).core is Core.EMPTY
-
-
-def test_too_many_craft_for_coalitions() -> None:
-    with pytest.raises(ValueError, match="13 craft have 8191 coalitions"):
-        analyse_coalitions(some(0, 13))
 
 
 def test_peak_and_impulse_of_a_flight() -> None:
@@ -353,81 +312,3 @@ def test_a_nearest_meeting_that_is_not_one_is_no_answer(monkeypatch: pytest.Monk
     monkeypatch.setattr("rendezvous.pareto.selections._min_share", lambda _, begin: begin)
     with pytest.raises(NotOptimalError, match="is known"):
         nearest_to(solution, solution.ideals.mean(axis=0) + 3.0 * np.ptp(solution.ideals, axis=0))
-
-
-def test_no_control_beats_the_min_peak() -> None:
-    # A bound of one component after another by a linear program's relaxation: |u| on 16 directions of a cone.
-    plan = some(8, 1, (Component.X,)).plan(0)
-    minimum = min_peak(plan)
-    nodes, weights = np.polynomial.legendre.leggauss(60)
-    times, weights = 300.0 * (1.0 + nodes), 300.0 * weights
-    motion = plan.craft.motion
-    effect = np.einsum("k,kai->kai", weights, motion.transition(times, np.full(60, 600.0))[:, :, 3:])
-    effect[:, :3] /= 600.0
-    achieved = np.einsum("kai,ki->a", effect, plan.control(times))
-    rows = effect.transpose(1, 0, 2).reshape(6, -1)
-
-    def smooth_peak(shift: Floats) -> float:
-        controls = (base + null @ shift).reshape(60, 3)
-        sizes = np.linalg.norm(controls, axis=1) / minimum
-        return float(np.log(np.mean(np.exp(60.0 * (sizes - sizes.max())))) / 60.0 + sizes.max())
-
-    base = np.linalg.lstsq(rows, achieved, rcond=None)[0]
-    null = np.linalg.svd(rows)[2][6:].T
-    found = minimize(smooth_peak, np.zeros(null.shape[1]), method="L-BFGS-B", options={"maxiter": 60}).x
-    assert np.linalg.norm((base + null @ found).reshape(60, 3), axis=1).max() >= minimum * (1.0 - 1e-6)
-
-
-def test_a_sweep_over_the_meeting_time() -> None:
-    solution = some(7, 3)
-    found = sweep_meeting_time(solution.encounter, [300.0, 600.0, 1200.0])
-    assert found.group_loss[1] == pytest.approx(float(solution.group_loss()), rel=1e-13)
-    np.testing.assert_allclose(found.points[1], solution.point, rtol=1e-12)
-    assert found.cost_squared.shape == found.ideal_cost_squared.shape == (3, 3)
-    assert (np.diff(found.group_loss) < 0.0).all()
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"craft": ()}, "needs a craft"),
-        ({"free": ()}, "no component"),
-        ({"free": (Component.X, Component.X)}, "twice"),
-        ({"free": (Component.VX,), "meeting": Meeting.INTERCEPT}, "velocities of the craft differ"),
-        ({"fixed": np.array([np.nan] * 6)}, "finite"),
-        ({"meeting_s": np.inf}, "finite"),
-        ({"meeting_s": 0.0}, "must start before the meeting"),
-    ],
-)
-def test_unsound_encounters_are_refused(changes: dict[str, object], says: str) -> None:
-    with pytest.raises(ValueError, match=says):
-        some(0, 2, **changes)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"weight": -1.0}, "must be finite and not negative"),
-        ({"weight": np.inf}, "must be finite and not negative"),
-        ({"state": np.zeros(5)}, "six finite numbers"),
-        ({"name": "1"}, "two craft are called"),
-    ],
-)
-def test_unsound_craft_are_refused(changes: dict[str, object], says: str) -> None:
-    encounter = some(0, 2).encounter
-    craft = (replace(encounter.craft[0], **changes), encounter.craft[1])  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=says):
-        replace(encounter, craft=craft)
-
-
-def test_weights_must_not_all_be_zero() -> None:
-    encounter = some(0, 2).encounter
-    with pytest.raises(ValueError, match="all weights are zero"):
-        replace(encounter, craft=tuple(replace(each, weight=0.0) for each in encounter.craft))
-
-
-def test_overflow_is_told() -> None:
-    encounter = some(0, 1).encounter
-    craft = (replace(encounter.craft[0], motion=ClohessyWiltshire(1e-160)),)
-    with pytest.raises(ValueError, match=r"overflows|singular"):
-        solve_encounter(replace(encounter, craft=craft))

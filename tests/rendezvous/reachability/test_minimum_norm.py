@@ -19,7 +19,6 @@ from rendezvous.reachability import (
     SetKind,
     ThrustShape,
     analytic_centre,
-    between_periods,
     chebyshev_centre,
     min_periods,
     minimum_energy,
@@ -209,23 +208,3 @@ def test_random_problems() -> None:
 def test_two_thousand_random_problems() -> None:
     told = Counter(check(seed, precise_to=4, members=False) for seed in range(2000))
     assert told["refused"] == 0
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("thrust", list(ThrustShape))
-@pytest.mark.parametrize("periods", [3, 6, 10, 16])
-@pytest.mark.parametrize("checks", [0, 2])
-def test_gaps_of_more_periods(paper: Paper, thrust: ThrustShape, periods: int, checks: int) -> None:
-    from rendezvous.reachability import MotionModel, motion_of
-    from rendezvous.relative_motion import EllipticOrbit
-
-    problem = paper(periods=periods, period_s=720.0 / periods, thrust=thrust)
-    if checks:
-        motion = motion_of(EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14), MotionModel.FROZEN)
-        problem = replace(problem, between=between_periods(motion, periods, 720.0 / periods, 0.15, checks))
-    minimum = cone_program(Dense(problem), "bound")[0]
-    for gap in 10.0 ** -np.arange(1.0, 10.0):
-        below = replace(problem, control_bounds=np.full(3, minimum * (1.0 - gap)))
-        assert_precise(below, optimal_controls(below).miss) if periods <= 6 else optimal_controls(below)
-        if periods > 6 and gap > 1e-4:
-            assert optimal_controls(below).miss == pytest.approx(cone_program(Dense(below), "norm")[0], rel=1e-4)

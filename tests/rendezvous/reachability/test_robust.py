@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import product
 
 import numpy as np
 import pytest
@@ -9,10 +8,8 @@ from numpy.typing import NDArray
 
 from rendezvous.reachability import (
     EmptyTubeError,
-    NoRobustPlanError,
     ReachabilityProblem,
     Route,
-    ThrustShape,
     feedback_plan,
     samples,
     solve,
@@ -48,25 +45,6 @@ def test_tightened_constraints_hold_for_every_disturbance(paper: Paper) -> None:
         for moves in extreme_moves(50, 4, 1):
             states = flown(problem, disturbance, control, moves)
             assert (np.abs(states) <= problem.state_bounds + 1e-9).all()
-
-
-def test_tightening_is_by_the_support_and_no_more(paper: Paper) -> None:
-    problem = paper()
-    disturbance = pushes(problem, 1e-3)
-    safe = tightened(problem, disturbance)
-    assert safe.offsets is not None
-    # One axis: the maximum x1(4) over the corners of all disturbances is what is taken.
-    reached = [
-        flown(problem, disturbance, np.zeros((4, 3)), np.array(corner).reshape(4, 1) * [[1.0, 0.0, 0.0]])[-1, 2]
-        for corner in product([-1.0, 1.0], repeat=4)
-    ]
-    assert max(reached) - min(reached) == pytest.approx(0.0, abs=1e-9)  # x pushes never move z
-    worst = max(
-        flown(problem, disturbance, np.zeros((4, 3)), np.array(corner).reshape(4, 1) * [[0.0, 0.0, 1.0]])[-1, 2]
-        for corner in product([-1.0, 1.0], repeat=4)
-    )
-    still = problem.run(np.zeros((4, 3)))[-1, 2]
-    assert problem.state_bounds[2] - safe.offsets[4, 2] == pytest.approx(worst - still, rel=1e-12)
 
 
 def test_feedback_keeps_what_no_fixed_control_keeps(paper: Paper) -> None:
@@ -109,15 +87,3 @@ def test_the_terminal_spread_is_what_the_last_disturbance_does(paper: Paper) -> 
     assert open_loop.offsets is not None
     fixed = problem.state_bounds - open_loop.offsets[4, :6]
     assert (spread / problem.state_bounds).sum() < 0.6 * (fixed / problem.state_bounds).sum()
-
-
-def test_what_cannot_be_planned_is_said(paper: Paper) -> None:
-    with pytest.raises(NoRobustPlanError, match="under every disturbance"):
-        feedback_plan(paper(), pushes(paper(), 0.2))
-    with pytest.raises(ValueError, match="thrust in a box"):
-        feedback_plan(paper(thrust=ThrustShape.BALL), pushes(paper(), 1e-3))
-    long = paper(periods=32, period_s=22.5)
-    with pytest.raises(ValueError, match="at most 24"):
-        feedback_plan(long, pushes(long, 1e-3))
-    with pytest.raises(ValueError, match="finite, of shape"):
-        tightened(paper(), np.zeros((3, 6, 3)))

@@ -186,24 +186,3 @@ def test_an_orbit_of_a_size() -> None:
     turn = 2.0 * np.pi / orbit.mean_motion_rad_s
     assert float(orbit.true_anomaly(3.0 * turn)) == pytest.approx(6.0 * np.pi, rel=1e-14)
     assert float(orbit.time_of_eccentric(orbit.eccentric_anomaly(777.0))) == pytest.approx(777.0, rel=1e-13)
-
-
-@pytest.mark.parametrize("rate", [0.0, -1e-3, np.inf, np.nan])
-def test_a_rate_must_be_positive(rate: float) -> None:
-    with pytest.raises(ValueError, match="orbit rate must be positive"):
-        ClohessyWiltshire(rate)
-
-
-@pytest.mark.parametrize("eccentricity", [-0.1, 1.0, 2.0, np.nan])
-def test_an_eccentricity_must_be_an_ellipses(eccentricity: float) -> None:
-    with pytest.raises(ValueError, match="eccentricity must be at least 0 and below 1"):
-        EllipticOrbit(RATE, eccentricity)
-
-
-def test_unsound_times_are_refused() -> None:
-    with pytest.raises(ValueError, match="needs start <= end"):
-        ClohessyWiltshire(RATE).gramian(10.0, 5.0)
-    with pytest.raises(ValueError, match="a time is not finite"):
-        TschaunerHempel(EllipticOrbit(RATE, 0.2)).transition(0.0, np.nan)
-    with pytest.raises(ValueError, match="shape"):
-        ConstantMotion(np.eye(5))
