@@ -35,21 +35,11 @@ class Observation:
 
     `delay_s` is its age; the pursuer assumes that the evader has been optimal since. The errors are standard deviations
     of each component.
-
-    Raises
-    ------
-    ValueError
-        If a value is negative or not finite.
     """
 
     delay_s: float = 0.0
     position_error_m: float = 0.0
     velocity_error_m_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        values = (self.delay_s, self.position_error_m, self.velocity_error_m_s)
-        if not all(np.isfinite(value) and value >= 0.0 for value in values):
-            raise ValueError("delay and errors of the observation must be finite and not negative")
 
     @property
     def is_exact(self) -> bool:

@@ -204,14 +204,7 @@ def samples(optimal: OptimalControls, count: int, generator: np.random.Generator
 
     Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
     are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
-
-    Raises
-    ------
-    ValueError
-        If the count is less than 1.
     """
-    if count < 1:
-        raise ValueError(f"at least one sample must be drawn, not {count}")
     space = optimal.space
     start, hessian = analytic_point(space, optimal.centre)
     points = np.repeat(start[None, :], count, axis=0)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 from rendezvous._compile import compiled
-from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, checked_rate, even_breaks
+from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
 
 SERIES_BELOW_RAD = 1.0
 QUADRATURE_BELOW_RAD = 2.0
@@ -23,17 +23,9 @@ class ClohessyWiltshire(LinearMotion):
 
     Barseghyan and Stepanyan (2008), (1.8), X[T, t] and (2.3), corrected and in Hill's axes. A transition takes about
     0.1 microseconds, a Gramian at most 1.
-
-    Raises
-    ------
-    ValueError
-        If the rate is not positive.
     """
 
     rate_rad_s: float
-
-    def __post_init__(self) -> None:
-        checked_rate(self.rate_rad_s)
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A, the same at all times, shape (..., 6, 6): x'' = 3 n^2 x + 2 n y', y'' = -2 n x', z'' = -n^2 z."""

@@ -17,18 +17,9 @@ class ConstantMotion(LinearMotion):
     """x' = A x + (0, u)' with a constant `matrix` A, shape (6, 6).
 
     Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it.
-
-    Raises
-    ------
-    ValueError
-        If A has another shape or is not finite.
     """
 
     matrix: Floats
-
-    def __post_init__(self) -> None:
-        if np.shape(self.matrix) != (6, 6) or not np.isfinite(self.matrix).all():
-            raise ValueError("A must be a finite matrix of shape (6, 6)")
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A, the same at all times, shape (..., 6, 6)."""

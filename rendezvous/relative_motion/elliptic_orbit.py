@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 from rendezvous.relative_motion.constant import ConstantMotion
-from rendezvous.relative_motion.linear_motion import checked_rate
 
 _MAX_STEPS = 60
 
@@ -21,7 +20,7 @@ class EllipticOrbit:
     Raises
     ------
     ValueError
-        If the mean motion is not positive, the eccentricity outside [0, 1), or the anomaly not finite.
+        If the mean motion is not positive, or the eccentricity outside [0, 1).
     """
 
     mean_motion_rad_s: float
@@ -29,11 +28,10 @@ class EllipticOrbit:
     true_anomaly_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        checked_rate(self.mean_motion_rad_s)
+        if not self.mean_motion_rad_s > 0.0:
+            raise ValueError(f"the mean motion must be positive, found {self.mean_motion_rad_s!r} rad/s")
         if not 0.0 <= self.eccentricity < 1.0:
             raise ValueError(f"the eccentricity must be at least 0 and below 1, found {self.eccentricity!r}")
-        if not np.isfinite(self.true_anomaly_rad):
-            raise ValueError("the true anomaly is not finite")
 
     @classmethod
     def of_size(

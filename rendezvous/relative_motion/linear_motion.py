@@ -69,10 +69,8 @@ class LinearMotion(ABC):
 
 
 def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-    """Return end - start, s; raise `ValueError` if it is negative or not finite."""
+    """Return end - start, s; raise `ValueError` if it is negative."""
     durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
-    if not np.isfinite(durations).all():
-        raise ValueError("a time is not finite")
     if (durations < 0.0).any():
         raise ValueError(f"the end is {-durations.min():g} s before the start; a Gramian needs start <= end")
     return durations
@@ -83,12 +81,6 @@ def state_scales(durations: Floats) -> Floats:
     scale = np.ones((*durations.shape, 6))
     scale[..., :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[..., None]
     return scale
-
-
-def checked_rate(rate_rad_s: float) -> None:
-    """Check an orbit rate; raise `ValueError` if it is not positive and finite."""
-    if not (np.isfinite(rate_rad_s) and rate_rad_s > 0.0):
-        raise ValueError(f"the orbit rate must be positive and finite, found {rate_rad_s!r} rad/s")
 
 
 def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:

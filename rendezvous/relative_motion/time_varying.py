@@ -109,8 +109,6 @@ class TimeVaryingMotion(LinearMotion):
 
     def _solved(self, start_s: ArrayLike, end_s: ArrayLike) -> _Solution:
         starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
-        if not (np.isfinite(starts).all() and np.isfinite(ends).all()):
-            raise ValueError("a time is not finite")
         solution, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
         return _Solution(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
 

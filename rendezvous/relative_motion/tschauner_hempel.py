@@ -34,15 +34,7 @@ class TschaunerHempel(LinearMotion):
         return self.orbit.dynamics(time_s)
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Phi(end, start), shape (..., 6, 6); the end may be before the start.
-
-        Raises
-        ------
-        ValueError
-            If a time is not finite.
-        """
-        if not (np.isfinite(start_s).all() and np.isfinite(end_s).all()):
-            raise ValueError("a time is not finite")
+        """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         return self._by_length(
             start_s, end_s, self._collocated.transition, lambda starts, ends: _closed(self.orbit, starts, ends)
         )

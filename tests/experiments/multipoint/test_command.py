@@ -142,7 +142,7 @@ def test_five_targets_as_listed(infoset: Command) -> None:
         (changed("time_s = 2600.0\n", ""), [], "--times given: needs time_s of every target"),
         (OPTIMISED.replace("time_s = 2600.0\n", ""), ["--times", "given"], "--times given: needs time_s"),
         (OPTIMISED.replace("2600.0", "900.0"), ["--times", "given"], "times must increase: visit 2 is at 900 s"),
-        (changed('"T2"', '"T1"'), [], "target 'T1' is listed twice"),
+        (changed('"T2"', '"T1"'), [], "two targets have the same name"),
         (changed("4000.0", "1e9"), [], "the last of time_s and latest_s is 1.13e+06 radians of the orbit"),
         (changed(ORBIT, ""), [], "orbit_rate_rad_s (Hill's axes) or"),
         (changed(ORBIT, f"{ORBIT}\ngravitational_parameter_m3_s2 = 4e14"), [], "is needed, not both"),
