@@ -9,13 +9,12 @@ import pytest
 
 from guidance import GameNoise, NoiseKind, Situation, TieRule
 from guidance.scripted_noise import ScriptedNoise
-from infoset import InitialSet, Model, RateSensor, StateBox
+from infoset import InitialSet, Model, RateSensor
 from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.closed_form import worst_shift_m
 from sim.draws import corners, draw
 from sim.engagement import Engagements
-from sim.first_plans import FirstPlans
 from sim.planned_flights import PlannedTarget, Plans, PlanSpace
 from sim.scenario import of_model
 from sim.target import GivenTarget
@@ -128,15 +127,6 @@ def test_with_all_sensors_in_space(ranging: Scenario) -> None:
     assert (found.errors["angle"][0] != found.errors["angle"][1]).any()
 
 
-@pytest.mark.thorough
-def test_the_worst_in_space_is_worse_than_in_the_plane(coarse: Scenario) -> None:
-    spatial = guaranteed(in_space(coarse))
-    found = find_worst(spatial, budget=60, seed=3)
-    assert found.value_m > find_worst(guaranteed(coarse), budget=60, seed=3).value_m
-    again = find_worst(spatial, budget=60, seed=3, threads=2)
-    assert (again.value_m, again.history) == (found.value_m, found.history)
-
-
 def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:
     assert worst.evaluations == BUDGET
     evaluations, misses = np.array(worst.history).T
@@ -183,30 +173,6 @@ def test_a_strategy_of_ones_own(coarse: Scenario) -> None:
     assert float(record.result.impulse_m_s[0]) == 0.0
 
 
-def test_progress_rises_to_one(coarse: Scenario) -> None:
-    told: list[float] = []
-    find_worst(coarse, budget=17, progress=told.append)
-    assert told == sorted(told)
-    assert told[0] > 0.0
-    assert told[-1] == 1.0
-
-
-def test_starts_do_not_come_from_the_dispersion(coarse: Scenario) -> None:
-    nowhere = replace(coarse, dispersion=StateBox((0.0, 0.0), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3)))
-    found = find_worst(nowhere, budget=10, seed=4)
-    assert found.position_m.tolist() != [0.0, 5801.3e3]
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("seed", [0])
-def test_symmetric_miss_in_the_papers_model_misses_by_85_m_with_its_set_kept(asteroid: Scenario, seed: int) -> None:
-    found = find_worst(asteroid, budget=4000, seed=seed, keep_set=True, threads=2)
-    assert found.outcome is Outcome.ARRIVED
-    assert found.value_m >= 85.0
-    assert_possible(found, asteroid)
-    assert_flies_again(found)
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0])
 def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenario, seed: int) -> None:
@@ -218,19 +184,6 @@ def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenari
     guaranteed_miss = found.record().result.guaranteed_miss_m
     assert not np.ma.getmaskarray(guaranteed_miss)[0]
     assert found.miss_m <= found.value_m <= guaranteed_miss.data[0]
-    assert_possible(found, scenario)
-    assert_flies_again(found)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("seed", [0])
-def test_symmetric_miss_in_space_misses_by_90_m_below_phi(asteroid: Scenario, seed: int) -> None:
-    scenario = guaranteed(in_space(asteroid))
-    found = find_worst(scenario, budget=1500, seed=seed, threads=2)
-    assert found.outcome is Outcome.ARRIVED
-    assert found.truth_kept
-    assert found.value_m >= 90.0
-    assert found.miss_m <= found.value_m <= found.record().result.guaranteed_miss_m[0]
     assert_possible(found, scenario)
     assert_flies_again(found)
 
@@ -285,17 +238,3 @@ def test_targets_accelerate_at_the_bound_of_the_model_or_as_that_of_the_scenario
     found = find_worst(coarse, budget=1, seed=2)
     assert found.accelerations_m_s2 is None
     assert found.target() is None
-
-
-def test_a_search_flies_constant_blockwise_and_increasing_accelerations(coarse: Scenario) -> None:
-    space = PlanSpace.of(guaranteed(coarse), 200)
-    plans = FirstPlans(space, np.random.default_rng(0)).make(90)
-    of_game = np.concatenate([each.sides for each, tie in plans if tie is not None])
-    others = np.concatenate([each.sides for each, tie in plans if tie is None])
-    assert (np.abs(of_game).min(axis=-1) == 1.0).all()
-    assert (of_game == of_game[..., :1]).all()
-    is_increasing = (others == 0.0).all(axis=(1, 2))
-    is_constant = (others == others[..., :1]).all(axis=(1, 2)) & ~is_increasing
-    is_in_blocks = (np.abs(others) == 1.0).all(axis=(1, 2)) & ~is_constant
-    for kind in (is_increasing, is_constant, is_in_blocks):
-        assert 5 <= np.count_nonzero(kind) <= 30

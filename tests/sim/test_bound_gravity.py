@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 from guidance import Thruster
 from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
 from sim import Scenario, Sun
-from sim.bound import lower_bound, pair_at
+from sim.bound import pair_at
 from sim.coasting import coasting
 from sim.scenario import of_model
 from sim.truth_pair import Approach, TruthPair, later_impulses
@@ -341,9 +341,3 @@ def test_transition_matrices_are_those_of_two_body_gravity() -> None:
     assert pair.track_m[:, : len(states[0])] == pytest.approx(0.5 * found[:2], abs=1e-5 * np.abs(found[:3]).max())
     middle = 0.5 * (states[0] + states[1])[:, 2]
     assert motion.range_m[: len(middle)] == pytest.approx(middle, abs=1.0)
-
-
-def test_lower_bound_of_a_motion_that_never_arrives_is_zero() -> None:
-    """Gravity turns the object back before x = 0."""
-    sun = Sun(1e4 * SUN, 60e9, 0.0)
-    assert lower_bound(replace(slow_flight(140000.0), sun=sun)).bound_m == 0.0

@@ -19,16 +19,11 @@ from infoset import (
     InformationSet,
     InitialSet,
     Model,
-    RangeSensor,
-    RateSensor,
     SetModel,
     StateBox,
 )
 from infoset.arrays import Floats
-from infoset.section_law import section_laws
-from infoset.section_life import slope_band
 from sim import Record, Results, Scenario, fly_one, simulate
-from sim.adversary import find_worst
 from sim.bound import lower_bound, pair_at
 from sim.closed_form import images_s, possible_miss_m, possible_miss_of
 from sim.draws import draw
@@ -168,19 +163,6 @@ def test_possible_miss_with_a_disturbance_is_that_of_a_linear_program(
     assert expected * (1.0 - 3e-3) <= found <= expected * (1.0 + 3e-3)
 
 
-def test_both_cases_of_the_possible_miss_agree_where_they_meet_and_none_is_for_one_image() -> None:
-    meet_m_s2 = 4.0 * (PIXEL_RAD * SPEED_M_S * LAST_S + CENTROID_M) / (FIRST_S - LAST_S) ** 2
-    less, more = (
-        possible_miss_m(SPEED_M_S, PIXEL_RAD, CENTROID_M, FIRST_S, LAST_S, disturbance_m_s2=meet_m_s2 * factor)
-        for factor in (1.0 - 1e-9, 1.0 + 1e-9)
-    )
-    assert less == pytest.approx(more, rel=1e-8)
-    assert possible_miss_m(SPEED_M_S, 0.0, 0.0, FIRST_S, LAST_S) == 0.0
-    for first_s in (LAST_S, 0.5 * LAST_S):
-        with pytest.raises(ValueError, match="before the last image"):
-            possible_miss_m(SPEED_M_S, PIXEL_RAD, CENTROID_M, first_s, LAST_S)
-
-
 @pytest.mark.parametrize(("cut_off_s", "changing_m", "constant_m"), [(150, 37.2, 33.6), (900, 197.5, 186.3)])
 def test_possible_misses_of_dart_are_those_of_pairs(cut_off_s: float, changing_m: float, constant_m: float) -> None:
     """The program of the pair at the nominal range is another way to the same number."""
@@ -189,21 +171,6 @@ def test_possible_misses_of_dart_are_those_of_pairs(cut_off_s: float, changing_m
     assert possible_miss_of(scenario, constant_bias=True) == pytest.approx(constant_m, abs=0.05)
     pair = pair_at(scenario, scenario.nominal_range_m, -scenario.set_model.closing_speed_m_s)
     assert possible_miss_of(scenario) == pytest.approx(pair.bound_m, rel=1e-4)
-
-
-def test_centroid_error_adds_itself_for_a_long_arc_and_less_than_twice_itself_above_three_cut_offs() -> None:
-    def added(share: float, *, constant: bool = False) -> float:
-        one, none = (
-            possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, 1e4, 1e4 * share, constant_bias=constant)
-            for centroid_m in (1.0, 0.0)
-        )
-        return one - none
-
-    assert added(1e-5) == pytest.approx(1.0, rel=1e-4)
-    assert added(1.0 / 3.0) == pytest.approx(2.0)
-    assert added(0.2) < 2.0 < added(0.5)
-    for share in (1e-5, 0.3, 0.9):
-        assert added(share, constant=True) == pytest.approx(1.0)
 
 
 def measured_set(centroid_m: float, alpha_rad: Callable[[float], float]) -> InformationSet:
@@ -250,24 +217,6 @@ def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
         lower, upper = interval(lambda before_s: random.choice([-1.0, 1.0]) * bound(before_s * SPEED_M_S))
         assert 0.5 * (upper - lower) <= (1.0 + 1e-5) * expected
         assert lower <= 0.0 <= upper
-
-
-@pytest.mark.parametrize("centroid_m", [0.0, 12.0, 100.0])
-def test_a_truth_at_the_end_of_the_possible_misses_agrees_with_exact_images_of_its_mirror(centroid_m: float) -> None:
-    """Its errors go from one bound to the other, linearly in the inverse of the time before the arrival."""
-    miss = possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, FIRST_S, LAST_S)
-    # |z| reaches the bound at the first image on one side and at the last one on the other.
-    first = -(PIXEL_RAD * SPEED_M_S + centroid_m / FIRST_S)
-    last = PIXEL_RAD * SPEED_M_S + centroid_m / LAST_S
-    inverse = np.array([1.0 / FIRST_S, 1.0 / LAST_S])
-    slope, rate = np.polyfit(inverse, [first, last], 1)
-    assert slope == pytest.approx(miss)
-    camera = AngleSensor.camera(EVERY_S, PIXEL_RAD, centroid_m)
-    for before_s in np.arange(LAST_S, FIRST_S + 1.0, EVERY_S).tolist():
-        alpha = math.atan((slope / before_s + rate) / SPEED_M_S)
-        assert abs(alpha) <= camera.error_bound(before_s * SPEED_M_S) * (1.0 + 1e-6)
-    information = measured_set(centroid_m, lambda before_s: 0.0)
-    assert float(information.predicted_miss().upper_m[0]) >= miss * (1.0 - 1e-9)
 
 
 def test_closed_form_of_a_scenario_knows_schedule_delay_and_images() -> None:
@@ -421,61 +370,6 @@ def test_a_lost_image_is_no_value_of_the_record_and_no_cut() -> None:
     ]
 
 
-def test_margins_of_the_truth_with_lost_images_and_a_range_sensor() -> None:
-    """Engagements with and without an image in a step have their own cuts; a record has the margins of both."""
-    scenario = replace(camera_scenario(miss_probability=0.4), range_sensor=RangeSensor(EVERY_S, 0.01))
-    record = fly_one(scenario, 3)
-    margins = [step.truth_margin_m for step in record.steps if step.truth_margin_m is not None]
-    assert len(margins) == len(record.steps)
-    assert min(margins) == record.result.truth_margin_m[0]
-
-
-def test_a_flight_without_images_has_no_margin() -> None:
-    results = simulate(camera_scenario(last_image_s=4000.0), 2)
-    assert results.truth_margin_m.mask.all()
-    assert sound(results)
-
-
-@pytest.mark.parametrize("spatial", [False, True])
-def test_a_run_with_lost_images_does_not_depend_on_its_batch(spatial: bool) -> None:
-    """Ranges and rates of a step whose image is lost cut without the angle."""
-    scenario = camera_scenario(miss_probability=0.5, bias=Bias.CONSTANT)
-    scenario = in_space(scenario) if spatial else scenario
-    scenario = replace(scenario, range_sensor=RangeSensor(EVERY_S, 0.01), rate_sensor=RateSensor(EVERY_S, 1e-8))
-    together = simulate(scenario, 5)
-    assert sound(together)
-    for run in (1, 4):
-        alone = simulate(scenario, [run])
-        assert alone.miss_m[0] == together.miss_m[run]
-        assert alone.guaranteed_miss_m[0] == together.guaranteed_miss_m[run]
-        assert alone.truth_margin_m[0] == together.truth_margin_m[run]
-
-
-def test_bands_are_mirrored_for_a_negative_angle_and_empty_behind_the_target() -> None:
-    model = camera_scenario().set_model
-    (law,) = section_laws(model)
-    label = 3600.0 * SPEED_M_S
-    for alpha in (1e-5, 0.02, 1.2):
-        lower, upper = slope_band(alpha, 0.0, label - 2e3, 2e3, law)
-        assert slope_band(-alpha, 0.0, label - 2e3, 2e3, law) == (-upper, -lower)
-        # Labels below the threshold extend the band in the range; behind the target, its limits are reversed there.
-        heights = [np.multiply(x, slope_band(alpha, 0.0, label - x, x, law)) for x in (500.0, 1000.0, 1500.0)]
-        assert np.diff(heights, n=2, axis=0) == pytest.approx(0.0, abs=1e-9)
-        for x in (0.0, -1e4):
-            lower, upper = np.multiply(x, slope_band(alpha, 0.0, label - x, x, law))
-            assert upper <= lower
-
-
-def test_the_published_model_takes_the_angle_itself() -> None:
-    model = replace(camera_scenario().set_model, model=Model.PAPER)
-    (law,) = section_laws(model)
-    for x in (1e3, 2e4, 1e7):
-        bound = PIXEL_RAD + CENTROID_M / x
-        assert slope_band(0.01, 0.0, 2e7 - x, x, law) == pytest.approx((0.01 - bound, 0.01 + bound), rel=1e-8)
-    results = simulate(replace(camera_scenario(), **of_model(model), noise=NoiseKind.GAME), 4)
-    assert np.isfinite(results.miss_m).all()
-
-
 @pytest.mark.parametrize("centroid_m", [CENTROID_M, 60.0])
 def test_pairs_of_the_lower_bound_stay_within_the_bounds_of_a_camera(centroid_m: float) -> None:
     """The two motions have the same images until the cut-off of the images, and at least one misses by the bound."""
@@ -510,12 +404,3 @@ def test_extremal_errors_reach_the_possible_miss_with_any_strategy(centroid_m: f
     assert flown.max_error_share <= 1.0
     phi = flown.results.guaranteed_miss_m.max()
     assert expected * (1.0 - 1e-4) <= flown.results.miss_m.max() <= phi <= expected * (1.0 + 1e-4)
-
-
-def test_the_adversary_keeps_the_bounds_of_a_camera() -> None:
-    scenario = camera_scenario(miss_probability=0.3, last_image_s=120.0)
-    worst = find_worst(scenario, budget=64)
-    record = worst.record()
-    assert record.result.miss_m[0] == pytest.approx(worst.miss_m)
-    assert record.result.truth_kept.all()
-    assert any("angle" not in step.measured for step in record.steps[:200:2])

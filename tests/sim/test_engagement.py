@@ -118,17 +118,6 @@ def test_the_truth_stays_in_its_section_in_the_models_own_dynamics(asteroid: Sce
     assert Outcome.SET_EMPTY not in results.outcomes
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
-def test_the_truth_stays_in_its_section_in_ten_thousand_engagements(asteroid: Scenario, noise: NoiseKind) -> None:
-    rules = list(TieRule)
-    for part in range(50):
-        scenario = replace(asteroid, noise=noise, tie=rules[part % len(rules)])
-        results = fly_in_the_model(scenario, 200, 100 + part)
-        assert results.truth_margin_m.min() >= 0.0
-        assert Outcome.SET_EMPTY not in results.outcomes
-
-
 def test_a_run_is_the_same_in_whatever_company(ranging: Scenario) -> None:
     scenario = replace(ranging, noise=NoiseKind.GAME, tie=TieRule.RANDOM)
     together = simulate(scenario, 9, seed=4)
@@ -139,30 +128,11 @@ def test_a_run_is_the_same_in_whatever_company(ranging: Scenario) -> None:
     assert alone.truth_margin_m[0] == together.truth_margin_m[7]
 
 
-def test_the_applied_starts_are_those_of_the_dispersion(asteroid: Scenario) -> None:
-    results = simulate(asteroid, 40)
-    starts = np.hstack((results.position_m, results.velocity_m_s))
-    box = asteroid.dispersion
-    for column, (minimum, maximum) in zip(starts.T, (box.z_m, box.x_m, box.vz_m_s, box.vx_m_s), strict=True):
-        assert minimum <= column.min()
-        assert column.max() <= maximum
-        assert np.ptp(column) > 0.7 * (maximum - minimum)
-
-
 class Silent:
     def start(self, batch: int) -> None: ...
 
     def decide(self, situation: Situation, state: None) -> Floats:
         return np.zeros_like(situation.budget_left_m_s)
-
-
-class Greedy:
-    def start(self, batch: int) -> dict[str, int]:
-        return {"calls": 0}
-
-    def decide(self, situation: Situation, state: dict[str, int]) -> Floats:
-        state["calls"] += 1
-        return np.full_like(situation.budget_left_m_s, 1e6)
 
 
 def test_without_control_the_miss_is_that_of_the_free_motion(asteroid: Scenario) -> None:
@@ -171,15 +141,6 @@ def test_without_control_the_miss_is_that_of_the_free_motion(asteroid: Scenario)
     vz, vx = results.velocity_m_s.T
     np.testing.assert_allclose(results.miss_m, np.abs(z * vx - x * vz) / np.hypot(vz, vx), rtol=1e-9)
     assert not results.impulse_m_s.any()
-
-
-def test_a_greedy_strategy_spends_its_budget_and_no_more(asteroid: Scenario) -> None:
-    # Little enough that the angles stay small: far off the course the paper's model loses the set.
-    head_on = StateBox((0.0, 0.0), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
-    scenario = replace(asteroid, dispersion=head_on, thruster=replace(asteroid.thruster, budget_m_s=3.0))
-    results = simulate(scenario, 5, strategy=Greedy())
-    np.testing.assert_allclose(results.impulse_m_s, 3.0)
-    assert set(results.outcomes) == {Outcome.BUDGET_SPENT}
 
 
 class Broken:
@@ -194,21 +155,7 @@ def test_a_strategy_that_returns_nonsense_is_named(asteroid: Scenario) -> None:
         simulate(asteroid, 2, strategy=Broken())
 
 
-def test_a_wrong_model_of_the_start_loses_the_set(asteroid: Scenario) -> None:
-    far = StateBox((60e3, 60e3), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
-    results = simulate(replace(asteroid, dispersion=far), 3)
-    assert set(results.outcomes) == {Outcome.SET_EMPTY}
-    assert not results.truth_kept.any()
-    assert np.isfinite(results.miss_m).all()
-
-
 def test_a_miss_beyond_the_nominal_range_is_divergence(asteroid: Scenario) -> None:
     away = StateBox((0.0, 0.0), (5801.3e3, 5801.3e3), (90e3, 90e3), (-58e3, -58e3))
     scenario = replace(asteroid, dispersion=away, nominal_range_m=1e6)
     assert simulate(scenario, 1).outcomes == (Outcome.DIVERGED,)
-
-
-@pytest.mark.parametrize("runs", [0, [], [-1]])
-def test_no_run_to_fly_is_an_error(asteroid: Scenario, runs: int | list[int]) -> None:
-    with pytest.raises(ValueError, match="at least one run"):
-        simulate(asteroid, runs)

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from experiments import load_scenario
-from guidance import GameNoise, NoiseKind, TieRule
+from guidance import NoiseKind
 from sim import Scenario, simulate
-from sim.bound import lower_bound, pair_at
+from sim.bound import pair_at
 from sim.closed_form import possible_miss_m, possible_miss_of, worst_shift_m
-from sim.scenario import of_model
 from sim.truth_pair import TruthPair
 
 RUNS = 10
@@ -56,21 +55,6 @@ def test_a_target_at_the_bound_of_the_model_brings_every_run_to_the_closed_form(
     assert results.phi_held.all()
 
 
-def test_the_shift_moves_the_truth_to_the_side_of_its_target_along_each_axis() -> None:
-    shift_m, draws, side = np.ones((2, 3)), np.zeros((2, 2, 3)), np.array([[1.0, -1.0], [-1.0, -1.0]])
-    assert GameNoise(TieRule.UPPER, draws).truth_side == 0.0
-    assert GameNoise(TieRule.UPPER, draws, shift_m).truth_side == -1.0
-    for tie in (TieRule.UPPER, TieRule.LOWER):
-        assert (GameNoise(tie, draws, shift_m, side).truth_side == side).all()
-    mixed = GameNoise((TieRule.LOWER, TieRule.ALTERNATE), draws, shift_m, side)
-    assert mixed.truth_side.tolist() == [[1.0, -1.0], [0.0, 0.0]]
-
-
-def test_the_max_bound_is_that_of_the_latest_arrival() -> None:
-    scenario = load_scenario("dart-2022")
-    assert lower_bound(scenario).bound_m == latest_pair(scenario).bound_m
-
-
 def test_without_a_disturbance_the_shift_is_a_straight_line_between_the_bounds() -> None:
     """Its miss is that of the closed form."""
     settings = ["angle_sensor.centroid_error_m=3", "information_set.disturbance_m_s2=0", "target.manoeuvre=none"]
@@ -85,23 +69,6 @@ def test_without_a_disturbance_the_shift_is_a_straight_line_between_the_bounds()
     per_second = (shift_m[-1] - shift_m[0]) / (first_s - last_s)
     expected = possible_miss_m(speed_m_s, 5.4e-6, 3.0, first_s, last_s)
     assert shift_m[-1] + per_second * last_s == pytest.approx(expected)
-
-
-def test_only_a_schedule_has_a_shift() -> None:
-    asteroid = load_scenario("asteroid-1997")
-    assert worst_shift_m(asteroid) is None
-    thruster = replace(asteroid.thruster, last_impulse_s=20.0)
-    assert worst_shift_m(replace(asteroid, thruster=thruster)) is not None
-    no_images = replace(asteroid.set_model.angle_sensor, first_image_s=10.0)
-    late = replace(asteroid, thruster=thruster, **of_model(replace(asteroid.set_model, angle_sensor=no_images)))
-    assert worst_shift_m(late) is None
-
-
-def test_the_two_rules_have_opposite_errors() -> None:
-    scenario = replace(load_scenario("haiv-2013"), noise=NoiseKind.GAME)
-    upper, lower = (simulate(replace(scenario, tie=tie), runs=RUNS) for tie in (TieRule.UPPER, TieRule.LOWER))
-    across = [np.ma.getdata(results.lateral_miss) for results in (upper, lower)]
-    assert (np.sign(across[0]) == -np.sign(across[1])).all()
 
 
 def test_each_axis_has_the_shift_of_its_own_bounds() -> None:

@@ -135,16 +135,6 @@ def test_reserve_of_one_impulse_by_hand() -> None:
     assert reserve.tangent_m == pytest.approx(exact_m * (np.cos(np.arctan(slope) + 2e-4) ** -2 - 1.0), rel=1e-3)
 
 
-def test_a_budget_that_may_bind_is_named() -> None:
-    scenario = known()
-    lower = lower_bound(scenario)
-    assert isinstance(value_reserve(scenario, lower), ValueReserve)
-    short = with_thruster(scenario, replace(scenario.thruster, budget_m_s=150.0))
-    reason = value_reserve(short, lower)
-    assert isinstance(reason, str)
-    assert reason.startswith("budget below the ")
-
-
 CAMERA = AngleSensor.camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.0)
 
 

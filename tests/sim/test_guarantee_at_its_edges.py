@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, RandomNoise, Thruster, TieRule
-from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 from infoset.history import LastSight
 from infoset.section_law import BOUND_SLACK, SectionLaw, section_laws
 from infoset.section_life import rate_band
-from sim import Outcome, Results, Scenario, Sun, simulate
+from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.scenario import of_model
@@ -75,73 +75,6 @@ def test_random_scenarios_keep_the_guarantee(
 
 
 # Round numbers: truths and hypotheses come to a range of exactly zero at a step -----------------------------------
-
-
-def round_scenario(number: int) -> Scenario:
-    """Scenario of a number whose lengths, speeds and times are multiples of each other, in either model."""
-    generator = np.random.default_rng(number)
-
-    def one_of(*values: float) -> float:
-        return float(generator.choice(values))
-
-    e = one_of(1e3, 2e3, 5e3, 1e4, 2.5e4, 58e3, 1e5)
-    step_s, steps = one_of(0.01, 0.1, 0.25, 0.5, 1.0, 2.0, 10.0), int(generator.integers(10, 60))
-    range_m, spread_m = e * step_s * steps, one_of(0.0, 1.0, 2.0, 5.0) * e * step_s
-    z_m, vz_m_s, speed_error = range_m * one_of(1e-4, 1e-3, 0.01, 0.1), e * one_of(0.0, 1e-4, 1e-3), one_of(0, 1e-3)
-    bounds = StateBox(
-        (-z_m, z_m),
-        (range_m - spread_m, range_m + spread_m),
-        (-vz_m_s, vz_m_s),
-        (-e * (1.0 + speed_error), -e * (1.0 - speed_error)),
-    )
-    error_rad = float(10.0 ** generator.uniform(-6.0, -2.0))
-    model = (Model.PAPER, Model.GUARANTEED)[int(generator.integers(2))]
-    sections = int(one_of(3, 5, 11, 29, 101, 500))
-    set_model = SetModel(
-        e,
-        step_s,
-        bounds,
-        AngleSensor(step_s * int(generator.integers(1, 3)), error_rad, error_rad * one_of(0.7, 1.0, 1.5), range_m),
-        disturbance_m_s2=one_of(0.0, 1e-3, 0.1),
-        range_threshold_m=one_of(0.0, 0.0, 1e-3, 0.1) * range_m,
-        sections=sections,
-        fewest_sections=int(generator.integers(1, min(6, sections))),
-        initial_set=InitialSet.BOX if model is Model.GUARANTEED or one_of(0, 1) else InitialSet.RECTANGLE,
-        model=model,
-    )
-    asteroid = load_scenario("asteroid-1997")
-    sensor = asteroid.range_sensor
-    assert sensor is not None
-    return replace(
-        asteroid,
-        sun=asteroid.sun if one_of(0, 1) else None,
-        nominal_range_m=range_m,
-        dispersion=replace(bounds, x_m=(range_m, range_m), vx_m_s=(-e, -e)) if one_of(0, 1) else bounds,
-        **of_model(set_model),
-        range_sensor=replace(sensor, period_s=2.0 * step_s) if one_of(0, 1) else None,
-        thruster=replace(
-            asteroid.thruster,
-            budget_m_s=vz_m_s + 1.0,
-            min_impulse_m_s=one_of(0.0, 0.1),
-            max_impulse_m_s=vz_m_s + 1.0,
-        ),
-        strategy=str(generator.choice(["symmetric-miss", "patient", "kalman", "zero-effort-miss"])),
-        noise=(NoiseKind.RANDOM, NoiseKind.GAME)[int(generator.integers(2))],
-        tie=list(TieRule)[int(generator.integers(4))],
-        rate_sensor=None if one_of(0, 1) else RateSensor(step_s, 0.5 * error_rad / step_s),
-    )
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(("first", "number"), [(0, 60), pytest.param(1000, 2000, marks=pytest.mark.thorough)])
-def test_round_numbers_give_no_warning_and_finite_results(first: int, number: int) -> None:
-    for case in range(first, first + number):
-        scenario = round_scenario(case)
-        results = simulate(scenario, 4)
-        for values in (results.miss_m, results.impulse_m_s, results.truth_margin_m.filled(0.0)):
-            assert np.isfinite(values).all(), case
-        assert np.isfinite(results.guaranteed_miss_m.filled(0.0)).all(), case
-        assert scenario.information_set.model is Model.PAPER or sound(results), case
 
 
 # The band of a measured rate --------------------------------------------------------------------------------------
@@ -304,26 +237,6 @@ def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
     return model, np.array(measured), views[-1]
 
 
-@pytest.mark.thorough
-def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
-    """A bound that rises with range and the rectangle at the start: nothing lives for 150 km between them."""
-    model, _, information = two_intervals(15)
-    run = 2
-    assert not information.inconsistent[run]
-    labels = np.linspace(*model.label_limits_m, 120)
-    living = np.array([len(information.section_at(label, run).polygon.polygon()) > 0 for label in labels])
-    edges = labels[np.flatnonzero(np.diff(living.astype(int)))]
-    assert edges.size == 3  # dead, living, dead, living up to the maximum label
-    assert edges[2] - edges[1] > 150e3
-    # What is done: the stored sections that live are kept, on both sides, and the interval spans both.
-    stored = information.labels_m[run][information.living[run]]
-    assert not ((stored > edges[1] + 1e4) & (stored < edges[2])).any()
-    travelled = model.closing_speed_m_s * model.step_s * 15
-    minimum, maximum = (ends[run] + travelled for ends in information.living_range_interval_m())
-    assert edges[0] < minimum < edges[1]
-    assert maximum == pytest.approx(model.label_limits_m[1], rel=1e-9)
-
-
 @pytest.mark.parametrize("y", [None, "mirror of z", "bound that falls with range"])
 def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limits(y: str | None) -> None:
     """Two intervals of living labels, at 2400 km and above 2560 km; the measurement of step 16 empties the latter."""
@@ -438,60 +351,6 @@ def test_phi_is_extrapolated_from_labels_with_sections_only(
     phi_m, exists = information.guaranteed_miss()
     assert exists.all()
     assert phi_m[0] >= max(maximum.max(), -minimum.min())
-
-
-def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_speed() -> None:
-    """An impulse of 10 m/s along y, turned by 0.1 rad at most, changes V_z by up to 10 sin(0.1) m/s."""
-    box = StateBox((-1.0, 1.0), (1e4, 2e4), (0.0, 0.0), (-1e3, -1e3), (-1.0, 1.0), (0.0, 0.0))
-    sensor = AngleSensor(1.0, 1e-3, 1e-3, 1e4)
-    model = SetModel(1e3, 1.0, box, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED, pointing_error_rad=0.1)
-    information = InformationSet(model)
-    information.shift([10.0, 0.0])
-    for section in information.sections():
-        changes_m_s = section.polygon.polygon()[:, 0]
-        assert changes_m_s.max() >= 10.0 * math.sin(0.1)
-        assert changes_m_s.min() <= -10.0 * math.sin(0.1)
-
-
-@pytest.mark.parametrize("direction_rad", [0.0, np.pi])
-def test_flights_that_gravity_slows_down_reach_their_closest_approach(direction_rad: float) -> None:
-    parameter, distance_m, speed = 1.324948e20, 1.5e11, 1e3
-    flight_s = float(np.sqrt(0.15 * distance_m**3 / parameter))
-    start = speed * flight_s
-    offset = 0.05 * start
-    bounds = StateBox(
-        (-offset, offset),
-        (0.98 * start, 1.02 * start),
-        (-0.1 * offset / flight_s, 0.1 * offset / flight_s),
-        (-1.001 * speed, -0.999 * speed),
-    )
-    step_s = flight_s / 60.0
-    model = SetModel(
-        speed,
-        step_s,
-        bounds,
-        AngleSensor(step_s, 1e-4, 1e-4, start),
-        range_threshold_m=0.02 * start,
-        initial_set=InitialSet.BOX,
-        model=Model.GUARANTEED,
-        sections=9,
-    )
-    sun = Sun(parameter, distance_m, direction_rad)
-    results = simulate(
-        Scenario(
-            name="slow",
-            description="",
-            sun=sun,
-            nominal_range_m=start,
-            dispersion=bounds,
-            **of_model(model),
-            range_sensor=None,
-            thruster=Thruster(1.0, 0.0, 1.0),
-        ),
-        4,
-    )
-    assert sound(results)
-    assert (results.miss_m < 0.2 * start).all()
 
 
 @pytest.mark.parametrize("max_z_m", [0.0, 0.5, 10.0])

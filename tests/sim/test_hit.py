@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from experiments import load_scenario
-from sim import Body, Campaign, Outcome, Scenario, fly_one, simulate
+from sim import Body, Outcome, Scenario, simulate
 
 
 @pytest.fixture(scope="module")
 def published() -> Scenario:
     return load_scenario("asteroid-1997")
-
-
-def test_a_point_has_no_hits(brief: Scenario) -> None:
-    results = simulate(brief, 4)
-    assert results.hit.mask.all()
-    assert results.hits is None
-    assert "hit" not in repr(results)
 
 
 def test_hits_are_the_misses_of_at_max_the_radius(brief: Scenario) -> None:
@@ -66,15 +58,3 @@ def test_a_diverged_run_with_an_empty_set_is_counted_as_both(published: Scenario
 def test_a_body_is_smaller_than_the_min_range(published: Scenario) -> None:
     with pytest.raises(ValueError, match=r"body\.radius_m must be less than the minimum possible range, 5.3013e\+06 m"):
         replace(published, body=Body(6e6))
-
-
-def test_a_campaign_stores_the_hits(brief: Scenario, tmp_path: Path) -> None:
-    sized = replace(brief, body=Body(3.0))
-    hits = Campaign(sized, 12, tmp_path / "sized").run(workers=1).runs()["hit"]
-    assert hits.tolist() == simulate(sized, 12).hit.tolist()
-    assert Campaign(brief, 4, tmp_path / "point").run(workers=1).runs()["hit"].isna().all()
-
-
-def test_the_record_of_a_run_has_its_hit(brief: Scenario) -> None:
-    record = fly_one(replace(brief, body=Body(1e5)))
-    assert record.result.hit.tolist() == [True]

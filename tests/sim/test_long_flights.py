@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ import pytest
 from infoset import InformationSet, InitialSet, Model, guaranteed_miss
 from infoset.history import IMPULSE
 from sim import Scenario, simulate
-from sim.draws import Draws, draw
+from sim.draws import draw
 from sim.engagement import Engagements
 from sim.scenario import of_model
 
@@ -44,22 +43,6 @@ def test_the_history_of_a_long_flight_has_two_events_a_step(asteroid: Scenario) 
     results = flight.results(np.arange(2))
     assert results.truth_kept.all()
     assert results.phi_held.all()
-
-
-def test_a_batch_of_long_flights_is_smaller(asteroid: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The results do not depend on it."""
-    whole = simulate(asteroid, 5, guarantee=False)
-    batches: list[int] = []
-
-    def counted(scenario: Scenario, runs: list[int], seed: int) -> Draws:
-        batches.append(len(runs))
-        return draw(scenario, runs, seed)
-
-    module = import_module("sim.simulate")
-    monkeypatch.setattr(module, "draw", counted)
-    monkeypatch.setattr(module, "STEPS_AT_ONCE", 500)
-    assert simulate(asteroid, 5, guarantee=False).miss_m.tolist() == whole.miss_m.tolist()
-    assert batches == [2, 2, 1]
 
 
 @pytest.mark.thorough

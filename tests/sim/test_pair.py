@@ -22,7 +22,7 @@ from infoset.model import InitialSet, Model
 from infoset.sensor import Sensor
 from sim import Scenario, Sun
 from sim.bound import lower_bound, pair_at
-from sim.pair import PairNoise, ScheduledMotion, fly_pair, middle
+from sim.pair import PairNoise, ScheduledMotion, fly_pair
 from sim.scenario import of_model
 
 QUICK = 4
@@ -83,24 +83,6 @@ def test_pairs_in_space_have_one_measurement_with_equal_errors(nothing_known: In
     assert sizes[::2] == pytest.approx([0.6, 0.8])
 
 
-def test_only_sensors_that_measure_count(nothing_known: InformationSetView) -> None:
-    noise = PairNoise(3)
-    noise.measure(sight(3, METER), nothing_known)
-    assert noise.max_share == pytest.approx(1.0 / 50.0)  # 1 m of 50 m
-
-
-def test_what_is_not_measured_is_not_given(nothing_known: InformationSetView) -> None:
-    for step in (0, 9):
-        assert set(PairNoise(3).measure(sight(step, SENSOR), nothing_known)) == {"angle"}
-
-
-def test_middle_is_the_same_number_for_both() -> None:
-    values = np.random.default_rng(1).uniform(-1.0, 1.0, 1000)
-    found = middle(values)
-    assert (found[0::2] == found[1::2]).all()
-    assert found[0::2] == pytest.approx(values.reshape(-1, 2).mean(axis=1))
-
-
 def test_scheduled_motion_follows_its_schedule() -> None:
     schedule = np.array([[1.0, -2.0, 0.0], [0.0, 0.0, 4.0]])
     start = np.array([[0.0, 1e6], [5.0, 1e6]])
@@ -111,15 +93,6 @@ def test_scheduled_motion_follows_its_schedule() -> None:
     assert motion.velocity_m_s[:, 0] == pytest.approx([-2.0, 8.0])
     motion.advance(2.0)
     assert motion.velocity_m_s[:, 0] == pytest.approx([-2.0, 8.0])
-
-
-def test_scheduled_motion_in_space_follows_both_schedules() -> None:
-    schedule = np.array([[[1.0, -2.0], [0.0, 0.0]], [[0.0, 3.0], [0.0, 4.0]]])
-    motion = ScheduledMotion(np.tile([1.0, 2.0, 1e6], (2, 1)), np.tile([0.0, 0.0, -1e3], (2, 1)), None, schedule)
-    for _ in range(3):
-        motion.advance(2.0)
-    assert motion.position_m[:, 0] == pytest.approx([1.0 + 2.0 + 0.0 - 4.0, 1.0])
-    assert motion.velocity_m_s[:, :2] == pytest.approx(np.array([[-2.0, 6.0], [0.0, 8.0]]))
 
 
 def random_scenario(number: int) -> Scenario:

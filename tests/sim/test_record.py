@@ -12,9 +12,7 @@ from guidance import LineOfSight, NoiseKind
 from infoset import InformationSetView, InitialSet, Model, RangeSensor, Recovery, Sensor
 from infoset.arrays import Flags, Floats
 from infoset.sensor import Cuttable, Geometry, Measurements
-from infoset.sensors import SENSORS
 from sim import Outcome, Scenario, fly_one, lower_bound, simulate
-from sim.draws import EXECUTION, START, TARGET, TIE
 from sim.scenario import of_model
 from tests.space import in_space
 
@@ -52,12 +50,6 @@ def test_a_record_in_space_has_both_axes(brief: Scenario) -> None:
     assert abs(y.measured["angle"] - y.true_angle_rad) <= bound
     assert abs(z.measured["angle"] - z.true_angle_rad) <= bound
     assert {section.polygon_y is not None for section in first.sections} == {True}
-
-
-def test_each_kind_of_sensor_has_its_own_name_column_and_stream() -> None:
-    for key in ("name", "quantity", "stream"):
-        assert len({getattr(kind, key) for kind in SENSORS}) == len(SENSORS)
-    assert {kind.stream for kind in SENSORS}.isdisjoint({START, TIE, EXECUTION, TARGET})
 
 
 @dataclass(frozen=True)

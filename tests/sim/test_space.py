@@ -142,22 +142,6 @@ def test_an_exchange_of_the_axes_changes_nothing(
         np.testing.assert_array_equal(one.impulse_m_s, other.impulse_m_s[::-1])
 
 
-def test_an_exchange_of_the_axes_and_of_the_sun_changes_nothing(asteroid: Scenario) -> None:
-    assert asteroid.sun is not None
-    # In the plane (x, z) at 40 degrees from x, and in the plane (x, y).
-    in_z, in_y = (
-        replace(asteroid.sun, direction_rad=angle, elevation_rad=elevation)
-        for angle, elevation in ((0.7, 0.0), (0.0, 0.7))
-    )
-    scenario = in_model(in_space(with_long_steps(asteroid)), Model.GUARANTEED)
-    draws = draw(scenario, range(6), 3)
-    there, _ = fly(replace(scenario, sun=in_z), draws)
-    back, _ = fly(replace(scenario, sun=in_y), exchanged_draws(draws))
-    # The two directions are equal up to the rounding of sines and cosines.
-    np.testing.assert_allclose(back.miss_m, there.miss_m, rtol=1e-9)
-    np.testing.assert_allclose(back.impulse_m_s, there.impulse_m_s, rtol=1e-9)
-
-
 @pytest.mark.parametrize("axes", [(True, True), (True, False), (False, True)])
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize("noise", list(NoiseKind))
