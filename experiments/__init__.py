@@ -5,7 +5,9 @@ Every name is loaded when it is first used, so that the command line starts with
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # importing `typing` would take most of the time in which an interrupt cannot be caught
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 if TYPE_CHECKING:
     from experiments.interception.figures.bound import draw_bound
     from experiments.interception.figures.plot import plot
@@ -69,7 +71,5 @@ def __getattr__(name: str) -> object:
     """Load a public name when it is first used."""
     for module, names in _NAMES.items():
         if name in names:
-            from importlib import import_module
-
             return getattr(import_module(f"experiments.{module}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -34,9 +34,9 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
         if context.invoked_subcommand is None:
             list_files()
 
-    @app.command("list", help=f"List the built-in {noun}s.", epilog=f"Example: {name} list --json")
-    def list_files(json: AsJson = False, quiet: Quiet = False) -> None:
-        _print_list([file for file in built_in_files().values() if file.kind in kinds], json, quiet)
+    @app.command("list", help=f"List the built-in {noun}s.", epilog=f"Example: {name} list")
+    def list_files() -> None:
+        _print_list([file for file in built_in_files().values() if file.kind in kinds])
 
     @app.command(help=f"Print a built-in {noun} file.", epilog=f"Example: {name} show {example} > mine.toml")
     def show(name: BuiltInName) -> None:
@@ -66,31 +66,23 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
     return app
 
 
-def _print_list(files: Sequence[BuiltIn], json: bool, quiet: bool) -> None:
-    """List built-in files: as JSON, as names alone, or as a table."""
-    from experiments.common.output import to_json
+def _print_list(files: Sequence[BuiltIn]) -> None:
     from experiments.common.screen import number_table, show
 
-    has_kinds = any(file.kind != SCENARIO for file in files)
-    names = ("name", *(["kind"] if has_kinds else []), "description")
-    rows = [{name: getattr(file, name) for name in names} for file in files]
-    if json:
-        typer.echo(to_json(rows), nl=False)
-    elif quiet:
-        typer.echo("\n".join(file.name for file in files))
-    else:
-        table = number_table(*names, left=len(names))
-        for row in rows:
-            table.add_row(*row.values())
-        show([table], quiet)
+    names = ("name", "kind", "description")
+    table = number_table(*names, left=len(names))
+    for file in files:
+        table.add_row(file.name, file.kind, file.description)
+    show([table], quiet=False)
 
 
 def _print_check(file: str, kinds: Sequence[str], json: bool, quiet: bool) -> None:
     """Check a file of one of these kinds; print its name, fingerprint and warnings."""
-    from experiments.common.output import library_version, to_json
+    from experiments.common.output import to_json
     from experiments.common.screen import say_warnings
     from experiments.interception.scenario_file import load_scenario, scenario_warnings
     from sim.storage.codec import fingerprint
+    from sim.versions import versions
 
     if SCENARIO in kinds:
         read: Any = load_scenario(file)
@@ -100,7 +92,7 @@ def _print_check(file: str, kinds: Sequence[str], json: bool, quiet: bool) -> No
         read = getattr(import_module(f"experiments.{problem.folder}.file"), problem.loader)(file)
         head, warnings = {"kind": read.kind, "problem_hash": fingerprint(read)}, []
     if json:
-        typer.echo(to_json({"version": library_version(), "name": read.name, **head, "warnings": warnings}), nl=False)
+        typer.echo(to_json({"versions": versions(), "name": read.name, **head, "warnings": warnings}), nl=False)
     elif not quiet:
         typer.echo(f"ok  {read.name}  {fingerprint(read)}")
     say_warnings(warnings, quiet or json)

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.common.errors import on_a_screen
 from experiments.interception.page import interception_page
 from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario
@@ -48,11 +47,6 @@ def name_of(call: ast.Call) -> str:
     if isinstance(call.func, ast.Attribute):
         return call.func.attr
     return call.func.id if isinstance(call.func, ast.Name) else ""
-
-
-def test_there_are_sources() -> None:
-    assert len(SOURCES) >= 5
-    assert all(SOURCES.values())
 
 
 @pytest.fixture(scope="module", params=PACKAGES)
@@ -209,10 +203,6 @@ def test_keys_that_are_shown_cannot_steer_it_either(
     assert told.err.count("error: ") == 3
 
 
-def test_a_message_keeps_its_lines_and_its_letters() -> None:
-    assert on_a_screen("läuft:\n  Ü – 標\x1b[31m\r\u202e") == "läuft:\n  Ü – 標?[31m??"
-
-
 def test_pages_show_names_as_text(record: Record, tmp_path: Path) -> None:
     scenario = dataclasses.replace(record.scenario, description=SCRIPT)
     file = tmp_path / "x.npz"
@@ -222,11 +212,3 @@ def test_pages_show_names_as_text(record: Record, tmp_path: Path) -> None:
     text = interception_page([found])
     assert "<script>alert" not in text
     assert "<img src" not in text
-
-
-def test_names_in_figures_are_no_formulas(record: Record) -> None:
-    from experiments.common.figure_style import figure_bytes
-    from experiments.interception.figures.process import draw_process
-
-    odd = dataclasses.replace(record, noise=r"$\frac{$")
-    assert all(content for _, content in figure_bytes(draw_process([odd])))

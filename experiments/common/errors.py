@@ -6,8 +6,6 @@ import contextlib
 import difflib
 from collections.abc import Iterator, Sequence
 
-INTERRUPTED = 130
-"""Exit code of a program that Ctrl-C ends."""
 LONGEST_SHOWN = 60
 """Maximum length of a value in a message."""
 _LONGEST_WORD = 100
@@ -48,11 +46,6 @@ def shown(value: object) -> str:
             text = "[" + ", ".join("[...]" if isinstance(item, list) else shown(item) for item in value) + "]"
     else:
         text = str(value).lower().replace("infinity", "inf")
-    return shortened(text)
-
-
-def shortened(text: str) -> str:
-    """Return a text with dots at its end if it is longer than `LONGEST_SHOWN`."""
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
 
 

@@ -60,10 +60,7 @@ Html = Annotated[
         help="Write an interactive page: one file that opens in any browser, offline.",
     ),
 ]
-Overwrite = Annotated[
-    bool,
-    typer.Option("--overwrite", help="Replace existing files."),
-]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
 Quiet = Annotated[
     bool,
     typer.Option("--quiet", "-q", callback=_silence_the_compile_notice, help="Print no progress and no tables."),

@@ -9,7 +9,6 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from enum import Enum
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -143,11 +142,6 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
     _check_new(file, overwrite)
     file.parent.mkdir(parents=True, exist_ok=True)
     replace_file(file, content.encode() if isinstance(content, str) else content)
-
-
-def library_version() -> str:
-    """Return the version of the installed distribution."""
-    return version("infoset")
 
 
 def outcome_columns(results: Results) -> dict[str, list[Cell]]:

@@ -16,7 +16,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
 
-from experiments.common.output import json_value, library_version
+from experiments.common.output import json_value
+from sim.versions import versions
 
 BLOCKS = ("dom.js", "chart.js", "scene.js", "player.js")
 """What every page is built from, in this order."""
@@ -36,10 +37,10 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_scr
     programs = [asset(name) for name in (*BLOCKS, *scripts)] + ([] if own_script is None else [own_script])
     parts = {
         "title": html.escape(title),
-        "version": html.escape(library_version()),
+        "version": html.escape(versions()["infoset"]),
         "policy": _policy(style, programs),
         "style": style,
-        "data": embedded_json({"version": library_version(), **data}),
+        "data": embedded_json({"version": versions()["infoset"], **data}),
         "scripts": "\n".join(f"<script>{program}</script>" for program in programs),
     }
     return _MARKER.sub(lambda marker: parts[marker[1]], asset("page.html"))

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from experiments.common.input_file import read_file
-from experiments.common.problems import check_angle, check_orbit, check_rate
+from experiments.common.orbit_checks import check_angle, check_orbit, check_rate
 from infoset.arrays import Floats
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
 from rendezvous.multipoint import DriftingTargets, KeplerTargets, KeplerTour, Meet, Target, TimeLimits, Tour

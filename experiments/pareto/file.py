@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from experiments.common.input_file import read_file
-from experiments.common.problems import check_angle, check_rate
+from experiments.common.orbit_checks import check_angle, check_rate
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Positive
 from rendezvous.pareto import Component, Craft, Encounter, Meeting
 from rendezvous.relative_motion import ClohessyWiltshire

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from experiments.common.input_file import read_file
-from experiments.common.problems import check_angle, check_orbit
+from experiments.common.orbit_checks import check_angle, check_orbit
 from infoset.arrays import Floats
 from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive
 from rendezvous.reachability import (

@@ -258,13 +258,6 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     assert names_in(tmp_path) == []
 
 
-def test_angle_is_null_where_nothing_is_measured(infoset: Command, tmp_path: Path) -> None:
-    file = tmp_path / "slow.toml"
-    file.write_text(scenario_text("asteroid-1997-single").replace("period_s = 0.5", "period_s = 1.0"))
-    steps = infoset.json("engage", file)["steps"]
-    assert [step["measured_angle_rad"] is None for step in steps[:4]] == [False, True, False, True]
-
-
 def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
     folder = tmp_path / "figures"
     record = tmp_path / "flight.npz"
@@ -406,16 +399,6 @@ def test_interrupt_of_a_process(tmp_path: Path) -> None:
     assert (process.returncode, out) == (130, b"")
     assert err.decode().splitlines()[-1].startswith("interrupted; the stored runs are complete")
     assert b"Traceback" not in err
-
-
-@pytest.mark.parametrize(
-    "command", [["experiment"], ["compare", "--strategies", "patient"], ["campaign", "--out", "o"]]
-)
-def test_one_run_is_singular(command: list[str], infoset: Command, brief_file: Path) -> None:
-    code, out, _ = infoset(*command, brief_file, "--runs", "1")
-    assert code == 0
-    assert "1 run is too few for " in out
-    assert "1 runs" not in out
 
 
 @pytest.mark.parametrize("command", [["experiment"], ["compare", "--strategies", "patient"]])

@@ -28,9 +28,7 @@ def test_the_list_has_every_built_in_file(noun: str, infoset: Command) -> None:
     code, out, err = infoset(noun)
     assert (code, err) == (0, "")
     assert [line.split()[0] for line in out.splitlines()[1:] if not line.startswith(" ")] == names
-    assert infoset(noun, "list", "--quiet") == (0, "\n".join(names) + "\n", "")
-    found = json.loads(infoset(noun, "list", "--json")[1])
-    assert [(row["name"], row["description"]) for row in found] == [(file.name, file.description) for file in files]
+    assert infoset(noun, "list") == (0, out, "")
 
 
 @pytest.mark.parametrize("name", FILES)

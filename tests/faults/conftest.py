@@ -5,17 +5,28 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from experiments.cli import main
 from experiments.common.input_file import to_toml
 from experiments.interception.record_file import load_record
 from sim import Scenario
 from sim.storage import CampaignFolder
+from tests.experiments.command_line import Command
+
+ENDS = {
+    ".png": b"IEND\xaeB`\x82",
+    ".pdf": b"%%EOF\n",
+    ".html": b"</html>\n",
+    ".gif": b";",
+    ".parquet": b"PAR1",
+    ".csv": b"\n",
+    ".toml": b"\n",
+}
+"""Last bytes of complete files."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +38,6 @@ class Left:
     err: str
 
 
-Infoset = Callable[..., Left]
-
-
 @pytest.fixture
 def file(brief: Scenario, tmp_path: Path) -> Path:
     path = tmp_path / "brief.toml"
@@ -38,20 +46,12 @@ def file(brief: Scenario, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
+def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Command:
     """Run the command in this process, in an empty folder."""
     monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> Left:
-        with pytest.raises(SystemExit) as left:
-            main([str(each) for each in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return Left(int(left.value.code or 0), captured.out, captured.err)
-
-    return run
+    return Command(capsys)
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 def begin(
     *arguments: object, folder: Path, environment: Mapping[str, str] | None = None, prefix: tuple[str, ...] = ()
 ) -> subprocess.Popen[str]:
-    """Begin the command in a process of its own."""
+    """Begin the command in another process."""
     return subprocess.Popen(
         [*prefix, sys.executable, "-m", "experiments", *map(str, arguments)],
         cwd=folder,
@@ -91,41 +91,25 @@ def ended(process: subprocess.Popen[str], patience_s: float = 300.0) -> Left:
 
 
 def need_whole(folder: Path) -> None:
-    """Check that whatever lies in a folder is whole, and nothing is left of what was being written."""
-    for path in folder.rglob("*"):
+    """Check that every file in a folder is complete, and no temporary file is left."""
+    for path in filter(Path.is_file, folder.rglob("*")):
         assert path.suffix != ".tmp", path
-        if not path.is_file() or path.name == ".lock":
-            continue
-        content = path.read_bytes()
-        match path.suffix:
-            case ".json":
-                json.loads(content)
-            case ".png":
-                assert content.endswith(b"IEND\xaeB`\x82"), path
-            case ".pdf":
-                assert content.endswith(b"%%EOF\n"), path
-            case ".html":
-                assert content.rstrip().endswith(b"</html>"), path
-            case ".gif":
-                assert content.endswith(b";"), path
-            case ".parquet":
-                assert content.endswith(b"PAR1"), path
-            case ".npz":
-                load_record(path)
-            case ".csv" | ".toml":
-                assert content.endswith(b"\n"), path
-            case other:
-                pytest.fail(f"{path}: how does a whole {other} end?")
+        if path.suffix == ".json":
+            json.loads(path.read_bytes())
+        elif path.suffix == ".npz":
+            load_record(path)
+        elif path.name != ".lock":
+            assert path.read_bytes().endswith(ENDS[path.suffix]), path
     if (folder / "manifest.json").exists():
-        CampaignFolder.read(folder).runs()
+        assert CampaignFolder.read(folder).runs() is not None
 
 
 @pytest.fixture
 def ordinary() -> tuple[str, ...]:
-    """What makes a command one of an ordinary user, whom permissions bind: root without the rights beyond them."""
+    """A prefix that runs a command without the rights of root to ignore permissions."""
     if os.getuid() != 0:
         return ()
     prefix = ("setpriv", "--bounding-set=-dac_override,-dac_read_search,-fowner")
     if shutil.which("setpriv") is None or subprocess.run([*prefix, "true"], check=False).returncode != 0:
-        pytest.skip("root may write everywhere, and cannot lay that down here")
+        pytest.skip("root cannot give up its rights here")
     return prefix

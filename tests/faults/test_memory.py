@@ -1,4 +1,4 @@
-"""Memory that ends: one message, and a campaign that goes on when there is enough."""
+"""Not enough memory: one message, and a campaign that is continued when there is enough."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import pytest
 from sim import Campaign, Results, Scenario
 from sim.parallel import Task, simulate_task
 from sim.storage import CampaignFolder
-from tests.faults.conftest import Infoset, Left, need_whole
+from tests.experiments.command_line import Command
+from tests.faults.conftest import Left, need_whole
 
 pytestmark = pytest.mark.thorough
 
@@ -26,9 +27,9 @@ LIMITED = (
     "resource.setrlimit(resource.RLIMIT_AS, (used + int(sys.argv[1]),) * 2)\n"
     "main(sys.argv[2:])\n"
 )
-"""A process that may take so many bytes more than it has after loading, as under `ulimit -v`.
+"""A process that may allocate so many bytes more than it has after loading, as under `ulimit -v`.
 
-(OpenBLAS, which Numba loads with scipy.linalg, turns in a circle for ever where it finds no memory.)
+OpenBLAS, which Numba loads with scipy.linalg, does not end where it finds no memory, and is loaded before.
 """
 
 
@@ -47,7 +48,7 @@ def with_room(room_bytes: int, *arguments: object, folder: Path) -> Left:
 
 
 def test_no_memory_is_a_message_that_says_how_to_go_on(
-    infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    infoset: Command, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     flown: list[Task] = []
 
@@ -60,12 +61,11 @@ def test_no_memory_is_a_message_that_says_how_to_go_on(
     asked = ("campaign", file, "--runs", 24, "--chunk", 8, "--out", "runs", "--workers", 1)
     with monkeypatch.context() as patched:
         patched.setattr("sim.parallel.simulate_task", fly)
-        left = infoset(*asked)
-    assert (left.code, left.out) == (2, "")
-    assert left.err.splitlines()[-1].startswith("error: not enough memory (Unable to allocate 7.45 GiB); ")
-    assert left.err.splitlines()[-1].endswith("the stored runs are complete: continue with --resume")
+        message = infoset.refused(*asked).splitlines()[-1]
+    assert message.startswith("error: not enough memory (Unable to allocate 7.45 GiB); ")
+    assert message.endswith("the stored runs are complete: continue with --resume")
     need_whole(tmp_path / "runs")
-    assert infoset(*asked, "--resume", "-q").code == 0
+    assert infoset(*asked, "--resume", "-q")[0] == 0
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="how much memory is taken is told here otherwise")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from hypothesis import strategies as st
 
-from experiments.common.problems import EARTH_M3_S2, EARTH_RADIUS_M
+from experiments.common.orbit_checks import EARTH_M3_S2, EARTH_RADIUS_M
 from experiments.pareto.file import TERMINAL
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset.model import InitialSet, Model, Recovery
