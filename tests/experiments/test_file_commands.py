@@ -79,7 +79,6 @@ def test_warnings_of_a_check(infoset: Command, tmp_path: Path) -> None:
         ("problems check odd", "kind: must be one of"),
         ("problems check broken", "is not valid TOML"),
         ("replay empty", "empty: is not a readable record"),
-        ("report empty", "empty: is a file"),
     ],
 )
 def test_what_is_wrong_is_one_message(line: str, message: str, infoset: Command) -> None:
