@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments import load_scenario
-from experiments.interception.curves import curve_scenarios
+from experiments.interception.study import curve_scenarios
 from guidance import NoiseKind, TieRule
 from infoset import InitialSet
 from sim import Results, Scenario, simulate

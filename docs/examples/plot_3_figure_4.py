@@ -11,8 +11,8 @@ game noise with a range sensor (4). All have the same fifty starts.
 import numpy as np
 
 from experiments import load_scenario
-from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.figures.distributions import draw_distributions
+from experiments.interception.study import Curve, curve_scenarios
 from sim import simulate
 
 curves = [

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.common.printed_numbers import Ours, Progress, read_paper
-from experiments.interception.curves import curve_scenarios
 from experiments.interception.scenario_file import load_scenario
+from experiments.interception.study import curve_scenarios
 from guidance import NoiseKind, TieRule
 from infoset import Recovery
 from infoset.arrays import Floats

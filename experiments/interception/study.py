@@ -1,18 +1,115 @@
-"""What a study reports about the sets and the hits of its runs, next to its quantiles."""
+"""Studies of many runs: curves of the experiment, comparisons of strategies, and what is reported about their sets."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from experiments.common.screen import some_runs
+from guidance import NoiseKind, Strategy, TieRule
 from infoset import Bias, Model
-from infoset.arrays import Flags
-from sim import HitEstimate, Results, Scenario
+from infoset.arrays import Flags, Floats
+from sim import HitEstimate, Results, Scenario, estimate_hits
+from sim.statistics import shown_quantiles
 
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 """Levels of the quantiles in tables and JSON, by name."""
+
+
+def summary(sample: Floats) -> dict[str, float | None]:
+    """Return the quantiles of a sample by name; None if the sample is too small to show one."""
+    return dict(zip(QUANTILES, shown_quantiles(sample, [*QUANTILES.values()]), strict=True))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Curve of the experiment: 1 random noise, 2 random with range sensor, 3 game noise, 4 game with range sensor."""
+
+    number: int
+    noise: NoiseKind
+    range_sensor: bool
+    results: Results
+
+
+def curve_scenarios(scenario: Scenario) -> Sequence[tuple[int, Scenario]]:
+    """Return number and scenario of each curve, as in the paper's figure 4; without a range sensor curves 1 and 3."""
+    numbered = (
+        (1, replace(scenario, noise=NoiseKind.RANDOM, range_sensor=None)),
+        (2, replace(scenario, noise=NoiseKind.RANDOM)),
+        (3, replace(scenario, noise=NoiseKind.GAME, range_sensor=None)),
+        (4, replace(scenario, noise=NoiseKind.GAME)),
+    )
+    return [(number, flown) for number, flown in numbered if scenario.range_sensor is not None or number in (1, 3)]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One strategy with one kind of noise: results by tie rule of the game noise, or one result with random noise.
+
+    All strategies have the same runs. The properties are those of each run, shape (N,), with its worst tie rule.
+    """
+
+    strategy: str
+    noise: NoiseKind
+    results: Mapping[TieRule | None, Results]
+
+    def _worst(self, column: str, over_ties: Callable[..., Any]) -> Any:
+        return over_ties(np.ma.stack([getattr(each, column) for each in self.results.values()]), axis=0)
+
+    @property
+    def miss_m(self) -> Floats:
+        """Maximum miss, m."""
+        return np.asarray(self._worst("miss_m", np.max))
+
+    @property
+    def impulse_m_s(self) -> Floats:
+        """Maximum impulse spent, m/s."""
+        return np.asarray(self._worst("impulse_m_s", np.max))
+
+    @property
+    def truth_kept(self) -> Flags:
+        """Whether the true state stayed in its section with every tie rule."""
+        return np.asarray(self._worst("truth_kept", np.all))
+
+    @property
+    def set_emptied(self) -> Flags:
+        """Whether the set became empty with a tie rule."""
+        return np.asarray(self._worst("set_emptied", np.any))
+
+    @property
+    def phi_held(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]:
+        """Whether the miss was within the guaranteed miss with every tie rule; masked without a guarantee."""
+        return np.ma.asarray(self._worst("phi_held", np.ma.all))
+
+    @property
+    def hits(self) -> HitEstimate | None:
+        """Runs that hit with every tie rule; None if the body has no size."""
+        hit = self._worst("hit", np.ma.all)
+        return estimate_hits(int(hit.sum()), len(hit)) if hit.count() else None
+
+
+def compared_scenarios(
+    scenario: Scenario, strategies: Mapping[str, Strategy | None]
+) -> dict[tuple[str, TieRule | None], Scenario]:
+    """Return the scenarios of a comparison by strategy and tie rule; None is random noise."""
+    flown: dict[tuple[str, TieRule | None], Scenario] = {}
+    for name, own in strategies.items():
+        guided = scenario if own is not None else replace(scenario, strategy=name)
+        flown[name, None] = replace(guided, noise=NoiseKind.RANDOM)
+        flown |= {(name, tie): replace(guided, noise=NoiseKind.GAME, tie=tie) for tie in TieRule}
+    return flown
+
+
+def comparisons(flown: Mapping[tuple[str, TieRule | None], Results]) -> list[Comparison]:
+    """Return results by strategy and noise, in the order of the strategies, random noise first."""
+    compared = []
+    for name in dict.fromkeys(name for name, _ in flown):
+        compared.append(Comparison(name, NoiseKind.RANDOM, {None: flown[name, None]}))
+        compared.append(Comparison(name, NoiseKind.GAME, {tie: flown[name, tie] for tie in TieRule}))
+    return compared
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.interception.comparison import Comparison
 from experiments.interception.course import Clock, Courses
-from experiments.interception.curves import Curve
 from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import cloud, draw_b_plane
 from experiments.interception.figures.comparison import draw_comparison
@@ -17,6 +15,7 @@ from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.distributions import draw_distributions
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
+from experiments.interception.study import Comparison, Curve
 from guidance import NoiseKind
 from sim import Record, Scenario
 

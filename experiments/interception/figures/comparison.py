@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from experiments.common.figure_style import INK, SET, legend_below, letters, style, subplots
 from experiments.common.screen import some_runs
-from experiments.interception.comparison import Comparison
 from experiments.interception.figures.distributions import draw_radius
+from experiments.interception.study import Comparison
 from guidance import NoiseKind
 from infoset.arrays import Floats
 from sim.statistics import shows

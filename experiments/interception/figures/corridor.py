@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from experiments.common.figure_style import IMPULSE, SET_EDGE, SET_FILL, TRUTH, legend_below, letters, style, subplots
 from experiments.common.screen import some_runs
 from experiments.interception.course import Courses
-from experiments.interception.curves import Curve
 from experiments.interception.figures.shared import count_down, draw_levels, name_events
-from experiments.interception.study import max_guarantee_m
+from experiments.interception.study import Curve, max_guarantee_m
 from sim.statistics import shows
 
 _DECADES = 4.0

@@ -13,8 +13,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from experiments.common.figure_style import CURVE_LOOKS, LIMIT, legend_below, letters, style, subplots
 from experiments.common.screen import some_runs
-from experiments.interception.curves import Curve
 from experiments.interception.figures.shared import RADIUS
+from experiments.interception.study import Curve
 from infoset.arrays import Floats
 from sim import empirical_distribution
 

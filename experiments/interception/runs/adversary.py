@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
-from experiments.common.input_file import to_toml
-from experiments.common.output import output_of, to_json
-from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, say_warnings, show
+from experiments.common.screen import Part, figure_files, number, number_table, show
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import steps_csv
 from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, need_times, read_times
-from experiments.interception.runs.shared import WorstMisses, find_worst_misses, summary_head
-from experiments.interception.scenario_file import scenario_warnings, study_scenario
+from experiments.interception.runs.shared import WorstMisses, find_worst_misses, work_of
+from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import own_strategy
 from experiments.interception.study import scenario_title
 from sim import Scenario
@@ -34,20 +32,17 @@ def run(options: Adversary) -> None:
     scenario, notes = study_scenario(options)
     own = own_strategy(options.strategy, scenario)
     times_s = read_times(options.times, options.out)
-    names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(*FIGURES))
-    with output_of(options, names, {"--record": options.record}) as written, progress_bar(options.quiet) as begin:
-        warnings = scenario_warnings(scenario)
-        say_warnings(warnings, options.quiet, notes)
-        began_s = perf_counter()
+    names = ("steps.csv", RECORD, *figure_files(*FIGURES))
+    with work_of(options, scenario, names, {"--record": options.record}, notes) as work:
         worst = find_worst_misses(
             scenario,
             own,
             objective=Objective(options.objective),
             budget=options.budget,
             seed=options.seed,
-            begin=begin,
+            begin=work.begin,
         )
-        elapsed_s = perf_counter() - began_s
+        elapsed_s = perf_counter() - work.began_s
         chosen = worst.set_kept if options.keep_set else worst.overall
         if chosen is None:
             raise InputError(
@@ -55,30 +50,23 @@ def run(options: Adversary) -> None:
                 f"{'omit --keep-set, or ' if options.keep_set else ''}check the units of the scenario with: infoset "
                 "scenarios check FILE"
             )
-        files = [options.record, None if options.out is None else options.out / RECORD]
-        records = [chosen.record(own)] if any(files) else []
+        files = [file for file in (options.record, options.out and options.out / RECORD) if file is not None]
+        records = [chosen.record(own)] if files else []
         if records:
             need_times(options.times, times_s, records)
-        summary = {**summary_head(scenario, warnings), **_summary(scenario, worst, chosen, options, elapsed_s)}
-        written.save("scenario.toml", to_toml(scenario))
-        written.save("results.json", to_json(summary), "--json")
+        work.save(_summary(worst, chosen, options))
         for record in records:
-            written.save("steps.csv", steps_csv([record]))
-            for file in filter(None, files):
+            work.written.save("steps.csv", steps_csv([record]))
+            for file in files:
                 write_record(record, file, overwrite=options.overwrite)
-                written.add(file)
-            draw_engagements([record], times_s, written, begin)
-    show(_parts(scenario, worst, options, elapsed_s), options.quiet, stdout_taken=written.stdout_taken)
+                work.written.add(file)
+            draw_engagements([record], times_s, work.written, work.begin)
+    show(_parts(scenario, worst, options, elapsed_s), options.quiet, stdout_taken=work.written.stdout_taken)
 
 
-def _summary(
-    scenario: Scenario, worst: WorstMisses, chosen: WorstEngagement, options: Adversary, elapsed_s: float
-) -> dict[str, object]:
+def _summary(worst: WorstMisses, chosen: WorstEngagement, options: Adversary) -> dict[str, object]:
     return {
         "seed": chosen.seed,
-        "model": scenario.information_set.model.value,
-        "range_sensor": scenario.range_sensor is not None,
-        "elapsed_s": elapsed_s,
         "strategy": chosen.strategy,
         "objective": chosen.objective.value,
         "searched_accelerations_m_s2": chosen.max_acceleration_m_s2,
@@ -111,8 +99,6 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
         ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
         (f"initial {position}, km", lambda found: _texts(found.position_m / M_PER_KM)),
         (f"initial {velocity}, km/s", lambda found: _texts(found.velocity_m_s / M_PER_KM)),
-        ("errors at the start of the search", lambda found: found.construction),
-        ("rounds of improvement", lambda found: str(found.changes)),
         ("objective after half the budget, m", lambda found: number(_halfway_m(found))),
     ]
 
@@ -125,44 +111,30 @@ def _halfway_m(found: WorstEngagement) -> float | None:
     return max((value for count, value in found.history if 2 * count <= found.evaluations), default=None)
 
 
-def _notes(found: WorstEngagement) -> Iterator[str]:
-    """Return lines about what was searched and what the two misses mean."""
-    bounds = found.max_acceleration_m_s2
-    each = ", ".join(
-        f"{number(bound)} m/s^2" + (f" along {axis}" if len(bounds) > 1 else "") for axis, bound in bounds.items()
+def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> Iterator[Part]:
+    first = worst.engagements[0]
+    is_same = worst.set_kept is worst.overall
+    columns = {"set never empty, set also empty" if is_same else "set never empty": worst.set_kept}
+    if not is_same:
+        columns["set also empty"] = worst.overall
+    table = number_table("", *columns)
+    for title, text in _rows(scenario):
+        table.add_row(title, *("-" if found is None else text(found) for found in columns.values()))
+    count = sum(found.evaluations for found in worst.engagements)
+    yield (
+        f"{scenario_title(scenario)}, strategy {first.strategy}: "
+        f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
     )
-    target = f"target accelerations up to {each}" if bounds else "the target of the scenario"
-    objective = {
-        Objective.ANY_STATE: "any state of the set",
-        Objective.FIXED_TRUTH: "the simulated truth",
-    }[found.objective]
-    yield f"searched: starts in the uncertainty, errors within their bounds, {target}; objective: {objective}"
+    yield table
+    bounds = [f"{number(bound)} m/s^2 along {axis}" for axis, bound in first.max_acceleration_m_s2.items()]
+    target = f"target accelerations up to {', '.join(bounds)}" if bounds else "the target of the scenario"
+    yield f"searched: starts in the uncertainty, errors within their bounds, {target}; objective: {options.objective}"
     yield (
         "any state of the set: maximum miss of a state that a section contained when control ended for it; the "
         "sections contain at least all states that agree with the measurements"
     )
-    yield (
-        "simulated truth: the simulated miss of the same engagement; the strategy cannot guarantee a smaller one, and "
-        "greater misses may exist"
-    )
-
-
-def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> Iterator[Part]:
-    same = worst.set_kept is worst.overall
-    columns = [("set never empty, set also empty" if same else "set never empty", worst.set_kept)]
-    columns += [] if same else [("set also empty", worst.overall)]
-    table = number_table("", *(title for title, _ in columns))
-    for title, text in _rows(scenario):
-        table.add_row(title, *("-" if found is None else text(found) for _, found in columns))
-    strategy = worst.engagements[0].strategy
-    count = sum(found.evaluations for found in worst.engagements)
-    yield (
-        f"{scenario_title(scenario)}, strategy {strategy}: "
-        f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
-    )
-    yield table
-    yield from _notes(worst.engagements[0])
-    if not same:
+    yield "simulated truth: the strategy cannot guarantee a smaller miss, and greater misses may exist"
+    if not is_same:
         emptied = max(found.sets_emptied for found in worst.engagements)
         yield (
             f"the set became empty in {emptied} engagements of a search; these misses show a failure of the model"

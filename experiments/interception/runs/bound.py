@@ -3,73 +3,88 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from time import perf_counter
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
-from experiments.common.input_file import to_toml
-from experiments.common.output import output_of, to_json
-from experiments.common.screen import (
-    BeginProgress,
-    Part,
-    figure_files,
-    number,
-    number_table,
-    progress_bar,
-    say_warnings,
-    show,
-)
+from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, show
 from experiments.interception.command import Bound
-from experiments.interception.runs.game_value import GameValue, WorstOfStrategy, value_of
-from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, summary_head
-from experiments.interception.scenario_file import scenario_warnings, study_scenario
+from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, work_of
+from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import chosen_strategies
+from experiments.interception.study import max_guarantee_m
 from guidance import Strategy
-from sim import BoundError, Scenario
+from sim import BoundError, Record, Results, Scenario
 from sim.bound import LowerBound, lower_bound, pair_at
-from sim.pair import fly_pair
+from sim.game_value import ValueReserve, value_reserve, why_no_value
+from sim.pair import PairFlight, fly_pair
+from sim.results import join
 from sim.truth_pair import TruthPair
 
 FIGURE = "figure-bound"
+
+
+@dataclass(frozen=True)
+class WorstOfStrategy:
+    """Simulations of one strategy: the pairs of the bound, and the worst engagements of the searches."""
+
+    name: str
+    flights: tuple[tuple[TruthPair, PairFlight], ...]
+    searched: WorstMisses
+    records: tuple[Record, ...]
+
+    @property
+    def results(self) -> Results:
+        """Results of all simulations."""
+        return join([*(flight.results for _, flight in self.flights), *(record.result for record in self.records)])
+
+    @property
+    def pairs_m(self) -> float:
+        """Maximum miss of the pairs, m."""
+        return max(float(flight.results.miss_m.max()) for _, flight in self.flights)
+
+    @property
+    def worst_m(self) -> float:
+        """Maximum miss of all simulations, m."""
+        return float(self.results.miss_m.max())
+
+    @property
+    def set_kept_m(self) -> float | None:
+        """Maximum miss of the engagements whose set never became empty, m; None if there is none."""
+        results = self.results
+        return max(results.miss_m[~results.set_emptied].tolist(), default=None)
+
+    def over(self, lower: LowerBound) -> float | None:
+        """Return the maximum miss with the set never empty, divided by the bound; None if one of them is missing."""
+        return self.set_kept_m / lower.bound_m if lower.bound_m > 0.0 and self.set_kept_m is not None else None
 
 
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
     scenario, notes = study_scenario(options)
     strategies = chosen_strategies(scenario, options.strategies)
-    names = ("scenario.toml", "results.json", *figure_files(FIGURE))
-    with output_of(options, names) as written, progress_bar(options.quiet) as begin:
-        warnings = scenario_warnings(scenario)
-        say_warnings(warnings, options.quiet, notes)
-        began_s = perf_counter()
+    with work_of(options, scenario, figure_files(FIGURE), notes=notes) as work:
         try:
-            lower = lower_bound(scenario, progress=begin("lower bound"))
+            lower = lower_bound(scenario, progress=work.begin("lower bound"))
             nominal = _nominal(scenario)
         except BoundError as error:
             raise InputError(
                 f"{scenario.name}: a linear program of the bound has no solution ({error}); check the units of the "
                 "scenario with: infoset scenarios check FILE"
             ) from None
-        worst = _simulate(scenario, lower, strategies, options, begin)
-        value = value_of(scenario, lower, worst)
-        summary = {
-            **summary_head(scenario, warnings),
-            "model": scenario.information_set.model.value,
-            "elapsed_s": perf_counter() - began_s,
-            **_summary(scenario, lower, nominal, worst),
-            "value": value.summary(),
-        }
-        written.save("scenario.toml", to_toml(scenario))
-        written.save("results.json", to_json(summary), "--json")
+        worst = _simulate(scenario, lower, strategies, options, work.begin)
+        value = GameValue.of(scenario, lower, worst)
+        work.save({**_summary(scenario, lower, nominal, worst), "value": value.summary()})
         if options.out is not None:
             from experiments.interception.figures.bound import draw_bound
 
-            written.figure(FIGURE, draw_bound(scenario, lower, {strategy.name: strategy.worst_m for strategy in worst}))
-    show(_parts(scenario, lower, nominal, worst, value, options), options.quiet, stdout_taken=written.stdout_taken)
+            worst_m = {strategy.name: strategy.worst_m for strategy in worst}
+            work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))
+    parts = [*_parts(scenario, lower, nominal, worst), *value.lines(), *_notes(lower, options)]
+    show(parts, options.quiet, stdout_taken=work.written.stdout_taken)
 
 
 def _simulate(
@@ -104,9 +119,8 @@ def _part_of(report: Progress, index: int, parts: int) -> BeginProgress:
 def _nominal(scenario: Scenario) -> TruthPair:
     """Return the best pair at the nominal range and closing speed, or at the possible ones nearest to them."""
     box = scenario.set_model.bounds
-    nominal = ((box.x_m, scenario.nominal_range_m), (box.vx_m_s, -scenario.set_model.closing_speed_m_s))
-    label_m, vx_m_s = (min(max(value, minimum), maximum) for (minimum, maximum), value in nominal)
-    return pair_at(scenario, label_m, vx_m_s)
+    label_m = float(np.clip(scenario.nominal_range_m, *box.x_m))
+    return pair_at(scenario, label_m, float(np.clip(-scenario.set_model.closing_speed_m_s, *box.vx_m_s)))
 
 
 def _summary(
@@ -136,7 +150,7 @@ def _summary(
                 "name": strategy.name,
                 "worst_found_m": strategy.worst_m,
                 "worst_found_set_kept_m": strategy.set_kept_m,
-                "guaranteed_m": strategy.guaranteed_m,
+                "guaranteed_m": max_guarantee_m(strategy.results),
                 "worst_over_bound": strategy.over(lower),
                 "outcome": strategy.results.outcomes[int(strategy.results.miss_m.argmax())].value,
                 "worst_of_pairs_m": strategy.pairs_m,
@@ -172,11 +186,8 @@ def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
 
 def _by_axis(quantity: str, values_m: NDArray[np.float64], scenario: Scenario) -> dict[str, object]:
     """Return values by axis, m, with the names of their keys; nothing in a plane."""
-    if not scenario.is_spatial:
-        return {}
-    return {
-        f"{quantity}_{axis}_m": value for axis, value in zip(scenario.set_model.axes, values_m.tolist(), strict=True)
-    }
+    axes = scenario.set_model.axes if scenario.is_spatial else ()
+    return {f"{quantity}_{axis}_m": values_m[index].tolist() for index, axis in enumerate(axes)}
 
 
 def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
@@ -184,14 +195,68 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
     return pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
 
 
+@dataclass(frozen=True)
+class GameValue:
+    """The minimum miss that a strategy can guarantee: its lower end, and how much greater it can be.
+
+    `reserve` is None for `reasons`: assumptions of the proof that the scenario does not meet. `best` is the strategy
+    whose maximum miss found is minimum; None without a search.
+    """
+
+    lower_m: float
+    reserve: ValueReserve | None
+    reasons: tuple[str, ...]
+    best: WorstOfStrategy | None
+
+    @classmethod
+    def of(cls, scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy]) -> GameValue:
+        """Return what is known of the value of a game."""
+        searched = [strategy for strategy in worst if strategy.searched.engagements]
+        best = min(searched, key=lambda strategy: strategy.worst_m, default=None)
+        reasons = why_no_value(scenario)
+        reserve = None if reasons else value_reserve(scenario, lower)
+        if isinstance(reserve, str):
+            return cls(lower.bound_m, None, (reserve,), best)
+        return cls(lower.bound_m, reserve, reasons, best)
+
+    @property
+    def parts_m(self) -> dict[str, float]:
+        """Parts of the reserve by name, m."""
+        parts = {} if self.reserve is None else asdict(self.reserve)
+        return {name.removesuffix("_m"): value for name, value in parts.items()}
+
+    def summary(self) -> dict[str, object]:
+        """Return the value as JSON."""
+        reserve = self.reserve
+        return {
+            "at_least_m": self.lower_m,
+            "at_most_m": None if reserve is None else self.lower_m + reserve.total_m,
+            "reserve_m": None if reserve is None else {"total": reserve.total_m, **self.parts_m},
+            "not_proved_because": list(self.reasons),
+            "best_strategy": None if self.best is None else self.best.name,
+            "best_strategy_worst_found_m": None if self.best is None else self.best.worst_m,
+        }
+
+    def lines(self) -> Iterator[str]:
+        """Return the lines for the screen."""
+        if self.reserve is not None:
+            parts = ", ".join(f"{name.replace('_', ' ')} {number(part)}" for name, part in self.parts_m.items())
+            yield (
+                f"the bound is the value of the game up to a reserve of {number(self.reserve.total_m)} m: no strategy "
+                f"guarantees less than {number(self.lower_m)} m, and symmetric-miss guarantees at most the reserve more"
+            )
+            yield f"reserve, m: {parts}"
+            return
+        best = self.best
+        found = f"; minimum of the maximum misses found: {number(best.worst_m)} m, of {best.name}" if best else ""
+        yield f"the value of the game is at least {number(self.lower_m)} m{found}"
+        yield f"no upper end is proved, because of: {', '.join(self.reasons)}"
+
+
 def _parts(
-    scenario: Scenario,
-    lower: LowerBound,
-    nominal: TruthPair,
-    worst: Sequence[WorstOfStrategy],
-    value: GameValue,
-    options: Bound,
+    scenario: Scenario, lower: LowerBound, nominal: TruthPair, worst: Sequence[WorstOfStrategy]
 ) -> Iterator[Part]:
+    model = scenario.set_model
     titles = ("closing speed\nkm/s", "bound\nm", "range at t = 0\nkm", "equal measurements until\ns before arrival")
     bounds = number_table(*titles)
     for pair in lower.pairs:
@@ -205,30 +270,29 @@ def _parts(
     strategies = number_table("strategy", *heads)
     for strategy in worst:
         searched = strategy.searched.misses().values()
-        values = (strategy.pairs_m, *searched, strategy.over(lower), strategy.guaranteed_m)
-        strategies.add_row(strategy.name, *(number(value) for value in values))
-    model = scenario.information_set.model.value
-    yield f"{scenario.name}, model {model}: no strategy can guarantee a miss below {number(lower.bound_m)} m"
+        values = (strategy.pairs_m, *searched, strategy.over(lower), max_guarantee_m(strategy.results))
+        strategies.add_row(strategy.name, *map(number, values))
+    bound_m = number(lower.bound_m)
+    yield f"{scenario.name}, model {model.model.value}: no strategy can guarantee a miss below {bound_m} m"
     yield (
         f"at the range {nominal.label_m / M_PER_KM:.1f} km and closing speed {-nominal.vx_m_s / M_PER_KM:g} km/s, the "
         f"nominal ones: {number(nominal.bound_m)} m"
     )
-    for axis in scenario.set_model.axes:
-        maximum = scenario.set_model.axis(axis).disturbance_m_s2
+    for axis in model.axes:
+        maximum = model.axis(axis).disturbance_m_s2
         yield f"acceleration of the object along {axis} in these pairs: at most {maximum:.3g} m/s^2"
     yield from (bounds, "", strategies, "")
-    yield from value.lines()
+    if any(strategy.results.set_emptied.any() for strategy in worst):
+        hint = "" if model.is_guaranteed else "; try --model guaranteed"
+        yield f"in some engagements a measurement contradicted all states of the set, which became empty{hint}"
+
+
+def _notes(lower: LowerBound, options: Bound) -> Iterator[str]:
+    """Return lines about the columns of the tables."""
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
     yield "pairs: maximum miss of the states that prove the bound"
-    searched_by = (
-        f"`infoset adversary` with --objective fixed-truth --model {model} --budget {options.budget} --seed "
-        f"{options.seed}"
-    )
-    found = f"maximum misses found by {searched_by}" if options.budget else "not searched"
-    yield f"set never empty, also empty: {found}"
+    search = f"maximum misses found by `infoset adversary --objective fixed-truth --budget {options.budget}`"
+    yield f"set never empty, also empty: {search if options.budget else 'not searched'}"
     yield "miss / bound: maximum miss of pairs and search, without sets that became empty, divided by the bound"
     yield "guaranteed: maximum bound Phi on the miss, computed during these engagements"
-    if any(strategy.results.set_emptied.any() for strategy in worst):
-        hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
-        yield f"in some engagements a measurement contradicted all states of the set, which became empty{hint}"

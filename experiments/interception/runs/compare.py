@@ -4,36 +4,27 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from time import perf_counter
 
-from experiments.common.input_file import to_toml
-from experiments.common.output import Cell, hit_key, output_of, to_csv, to_json
-from experiments.common.screen import (
-    Part,
-    figure_files,
-    number,
-    number_table,
-    progress_bar,
-    quantile_notes,
-    say_warnings,
-    show,
-    some_runs,
-)
+from experiments.common.output import Cell, hit_key, to_csv
+from experiments.common.screen import Part, figure_files, number, number_table, quantile_notes, show, some_runs
 from experiments.interception.command import Compare
-from experiments.interception.comparison import Comparison, Flight, flights, gather, summary
-from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_all, summary_head
-from experiments.interception.scenario_file import scenario_warnings, study_scenario
+from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_all, work_of
+from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import chosen_strategies
 from experiments.interception.study import (
     QUANTILES,
+    Comparison,
     SetCounts,
+    compared_scenarios,
+    comparisons,
     game_note,
     percent,
     scenario_title,
     set_counts,
     set_warnings,
+    summary,
 )
-from guidance import NoiseKind, Strategy
+from guidance import NoiseKind, Strategy, TieRule
 from sim import Scenario
 from sim.parallel import Task
 
@@ -47,42 +38,33 @@ def run(options: Compare) -> None:
     scenario, notes = study_scenario(options)
     strategies = chosen_strategies(scenario, options.strategies)
     figures = [FIGURE, *b_plane_figures(scenario)]
-    names = ("scenario.toml", "results.json", "results.csv", *figure_files(*figures))
-    with output_of(options, names) as written, progress_bar(options.quiet) as begin:
-        warnings = scenario_warnings(scenario)
-        say_warnings(warnings, options.quiet, notes)
-        began_s = perf_counter()
-        reports = {name: begin(name) for name in strategies}
+    with work_of(options, scenario, ["results.csv", *figure_files(*figures)], notes=notes) as work:
+        reports = {name: work.begin(name) for name in strategies}
         compared = _simulate(scenario, strategies, options.runs, options.seed, reports)
-        result = {
-            **summary_head(scenario, warnings),
-            "model": scenario.information_set.model.value,
-            "range_sensor": scenario.range_sensor is not None,
-            "seed": options.seed,
-            "runs": options.runs,
-            "elapsed_s": perf_counter() - began_s,
-            "strategies": [_summary(comparison) for comparison in compared],
-            "notes": [game_note(scenario, TIES)],
-        }
-        written.save("scenario.toml", to_toml(scenario))
-        written.save("results.json", to_json(result), "--json")
-        if written.wants("--csv"):
-            columns = (*COLUMNS, "miss_y_m", "miss_z_m") if scenario.is_spatial else COLUMNS
-            written.save("results.csv", _csv(compared, columns), "--csv")
+        work.save(
+            {
+                "seed": options.seed,
+                "runs": options.runs,
+                "strategies": [_summary(comparison) for comparison in compared],
+                "notes": [game_note(scenario, TIES)],
+            }
+        )
+        columns = (*COLUMNS, "miss_y_m", "miss_z_m") if scenario.is_spatial else COLUMNS
+        work.written.save("results.csv", _csv(compared, columns), "--csv")
         if options.out is not None:
             from experiments.interception.figures.commands import draw_compared
 
-            written.draw(figures, draw_compared(scenario, compared), begin("figure"))
-    show(_parts(scenario, compared), options.quiet, stdout_taken=written.stdout_taken)
+            work.written.draw(figures, draw_compared(scenario, compared), work.begin("figure"))
+    show(_parts(scenario, compared), options.quiet, stdout_taken=work.written.stdout_taken)
 
 
 def _simulate(
     scenario: Scenario, strategies: Mapping[str, Strategy | None], runs: int, seed: int, reports: Mapping[str, Progress]
 ) -> list[Comparison]:
-    wanted = flights(scenario, strategies)
+    wanted = compared_scenarios(scenario, strategies)
     done = dict.fromkeys(wanted, 0.0)
 
-    def progress_of(flight: Flight) -> Progress:
+    def progress_of(flight: tuple[str, TieRule | None]) -> Progress:
         def progress(share: float) -> None:
             done[flight] = share
             shares = [each for (name, _), each in done.items() if name == flight[0]]
@@ -94,7 +76,7 @@ def _simulate(
         Task(flown, range(runs), seed, strategy=strategies[flight[0]], progress=progress_of(flight))
         for flight, flown in wanted.items()
     ]
-    return gather(dict(zip(wanted, simulate_all(tasks), strict=True)))
+    return comparisons(dict(zip(wanted, simulate_all(tasks), strict=True)))
 
 
 def _summary(comparison: Comparison) -> dict[str, object]:
@@ -108,7 +90,7 @@ def _summary(comparison: Comparison) -> dict[str, object]:
         **hit_key(comparison.hits),
         "truth_kept": int(comparison.truth_kept.sum()),
         "set_emptied": int(comparison.set_emptied.sum()),
-        "phi_held": None if phi_held.mask.all() else int(phi_held.filled(False).sum()),
+        "phi_held": int(phi_held.sum()) if phi_held.count() else None,
         "outcomes": dict(outcomes),
         "ties": {
             tie.value: {"miss_m": summary(results.miss_m), "impulse_m_s": summary(results.impulse_m_s)}
@@ -135,22 +117,16 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
         titles += [f"hit: miss at\nmost {scenario.body.radius_m:g} m", "95 % CI\nof a hit"]
     sets = number_table("noise", "strategy", *titles, left=2)
     total = SetCounts()
-    for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
-        title = noise.value
-        for comparison in compared:
-            if comparison.noise is not noise:
-                continue
-            for quantity, sample in (("miss, m", comparison.miss_m), ("impulse, m/s", comparison.impulse_m_s)):
-                heads = (title, comparison.strategy) if quantity == "miss, m" else ("", "")
-                table.add_row(*heads, quantity, *(number(value) for value in summary(sample).values()))
-            counts, hits = set_counts(comparison.truth_kept, comparison.set_emptied), comparison.hits
-            total += counts
-            shares = [f"{count} ({percent(count / counts.runs)})" for count in (counts.truth_kept, counts.set_emptied)]
-            if hits is not None:
-                shares.append(f"{hits.hits} ({percent(hits.probability)})")
-                shares.append(f"{percent(hits.lower)} to {percent(hits.upper)}")
-            sets.add_row(title, comparison.strategy, *shares)
-            title = ""
+    for comparison in sorted(compared, key=lambda each: [*NoiseKind].index(each.noise)):
+        head = (comparison.noise.value, comparison.strategy)
+        table.add_row(*head, "miss, m", *map(number, summary(comparison.miss_m).values()))
+        table.add_row("", "", "impulse, m/s", *map(number, summary(comparison.impulse_m_s).values()))
+        counts, hits = set_counts(comparison.truth_kept, comparison.set_emptied), comparison.hits
+        total += counts
+        shares = [f"{count} ({percent(count / counts.runs)})" for count in (counts.truth_kept, counts.set_emptied)]
+        if hits is not None:
+            shares += [f"{hits.hits} ({percent(hits.probability)})", f"{percent(hits.lower)} to {percent(hits.upper)}"]
+        sets.add_row(*head, *shares)
     runs = len(compared[0].miss_m)
     yield f"{scenario_title(scenario)}: quantiles of {some_runs(runs)}; game noise: {TIES}"
     yield table

@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from time import perf_counter
+from collections import Counter
+from collections.abc import Iterator, Sequence
 
 from rich.table import Table
 
-from experiments.common.input_file import to_toml
-from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
-from experiments.common.screen import (
-    Part,
-    figure_files,
-    number,
-    number_table,
-    progress_bar,
-    quantile_notes,
-    say,
-    say_warnings,
-    show,
-    some_runs,
-)
+from experiments.common.output import hit_key, outcome_columns, to_csv
+from experiments.common.screen import Part, figure_files, number, number_table, quantile_notes, say, show, some_runs
 from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
-from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.published import MANY, SINGLE, printed_single_runs
 from experiments.interception.runs.shared import (
     THEOREM_8_NAME,
@@ -33,18 +19,30 @@ from experiments.interception.runs.shared import (
     bound_name,
     certificate,
     simulate_all,
-    summary_head,
+    work_of,
 )
-from experiments.interception.scenario_file import scenario_warnings, scenario_with
+from experiments.interception.scenario_file import scenario_with
 from experiments.interception.strategies import own_strategy
-from experiments.interception.study import QUANTILES, SetCounts, game_note, hit_text, set_counts, set_warnings
-from infoset import Recovery
-from sim import Outcome, Results, Scenario
+from experiments.interception.study import (
+    QUANTILES,
+    Curve,
+    SetCounts,
+    curve_scenarios,
+    game_note,
+    hit_text,
+    set_counts,
+    set_warnings,
+    summary,
+)
+from sim import Results, Scenario
 from sim.parallel import Task
+from sim.scenario import strategy_name
 from sim.statistics import shown_quantiles
 
 FIGURE = "figure-4-distributions"
 CORRIDOR = "figure-corridor"
+LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
+"""Levels of the quantiles of a burn, by key in JSON."""
 
 
 def run(options: Experiment) -> None:
@@ -52,55 +50,51 @@ def run(options: Experiment) -> None:
     scenario = scenario_with(options)
     own = own_strategy(options.strategy, scenario)
     figures = [FIGURE, CORRIDOR, *b_plane_figures(scenario)]
-    names = ("scenario.toml", "results.json", "results.csv", *figure_files(*figures))
-    with output_of(options, names) as written, progress_bar(options.quiet) as begin:
-        warnings = scenario_warnings(scenario)
-        say_warnings(warnings, options.quiet)
+    with work_of(options, scenario, ["results.csv", *figure_files(*figures)]) as work:
         if scenario.range_sensor is None:
             say(f"{scenario.name} has no [range_sensor]: curves 1 and 3 only", options.quiet)
-        began_s = perf_counter()
         slowest_first = [
             (curve, flown, f"curve {curve}: {flown.noise.value}{' + range sensor' if flown.range_sensor else ''}")
             for curve, flown in reversed(curve_scenarios(scenario))
         ]
-        courses = [Courses(flown, options.runs) for _, flown, _ in slowest_first] if options.out is not None else []
+        courses = [Courses(flown, options.runs) for _, flown, _ in slowest_first]
         tasks = [
-            Task(flown, range(options.runs), options.seed, strategy=own, progress=begin(title))
-            for _, flown, title in slowest_first
+            Task(
+                *(flown, range(options.runs), options.seed),
+                strategy=own,
+                progress=work.begin(title),
+                observe=course.observe if options.out is not None else None,
+            )
+            for (_, flown, title), course in zip(slowest_first, courses, strict=True)
         ]
-        if courses:
-            tasks = [replace(task, observe=course.observe) for task, course in zip(tasks, courses, strict=True)]
         results = simulate_all(tasks)
-        elapsed_s = perf_counter() - began_s
         curves = [
             Curve(curve, flown.noise, flown.range_sensor is not None, result)
             for (curve, flown, _), result in zip(slowest_first, results, strict=True)
         ][::-1]
-        summary = {
-            **summary_head(scenario, warnings, own),
-            "seed": options.seed,
-            "runs": options.runs,
-            "elapsed_s": elapsed_s,
-            "curves": [
-                {
-                    **_key(curve),
-                    **hit_key(curve.results.hits),
-                    **burns_key(scenario, curve.results),
-                    **outcome_columns(curve.results),
-                }
-                for curve in curves
-            ],
-            "notes": [game_note(scenario)],
-        }
-        written.save("scenario.toml", to_toml(scenario))
-        written.save("results.json", to_json(summary), "--json")
-        if written.wants("--csv"):
-            written.save("results.csv", _csv(curves), "--csv")
+        work.save(
+            {
+                "strategy": strategy_name(scenario, own),
+                "seed": options.seed,
+                "runs": options.runs,
+                "curves": [
+                    {
+                        **_key(curve),
+                        **hit_key(curve.results.hits),
+                        **burns_key(scenario, curve.results),
+                        **outcome_columns(curve.results),
+                    }
+                    for curve in curves
+                ],
+                "notes": [game_note(scenario)],
+            }
+        )
+        work.written.save("results.csv", _csv(curves), "--csv")
         if options.out is not None:
             from experiments.interception.figures.commands import draw_experiment
 
-            written.draw(figures, draw_experiment(scenario, curves, courses[::-1]), begin("figure"))
-    show(_parts(scenario, curves), options.quiet, stdout_taken=written.stdout_taken)
+            work.written.draw(figures, draw_experiment(scenario, curves, courses[::-1]), work.begin("figure"))
+    show(_parts(scenario, curves), options.quiet, stdout_taken=work.written.stdout_taken)
 
 
 def _key(curve: Curve) -> dict[str, int | str | bool]:
@@ -108,66 +102,50 @@ def _key(curve: Curve) -> dict[str, int | str | bool]:
 
 
 def _csv(curves: Sequence[Curve]) -> str:
-    columns = [curve.results.to_dict() for curve in curves]
     rows = [
         [*_key(curve).values(), *values]
-        for curve, by_name in zip(curves, columns, strict=True)
-        for values in zip(*by_name.values(), strict=True)
+        for curve in curves
+        for values in zip(*curve.results.to_dict().values(), strict=True)
     ]
-    return to_csv((*_key(curves[0]), *columns[0]), rows)
+    return to_csv((*_key(curves[0]), *curves[0].results.to_dict()), rows)
 
 
-def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
-    table, levels = number_table("curve", "quantity", *QUANTILES, left=2), [*QUANTILES.values()]
-    enlarged = scenario.set_model.recovery is Recovery.WIDENED
-    endings = {
-        Outcome.BUDGET_SPENT: "too little of the impulse budget was left",
-        Outcome.DIVERGED: "the closest approach was farther than the nominal range",
-    }
-    notes = []
+def _parts(scenario: Scenario, curves: Sequence[Curve]) -> Iterator[Part]:
+    table, runs = number_table("curve", "quantity", *QUANTILES, left=2), len(curves[0].results)
     for curve in curves:
         results = curve.results
-        bounds, of_theorem_8 = results.guaranteed_miss_m.compressed(), results.theorem_8_miss_m.compressed()
-        rows = (
-            (f"{curve.number} {curve.noise.value}", "miss, m", results.miss_m),
-            ("  + range sensor" if curve.range_sensor else "", "impulse, m/s", results.impulse_m_s),
-        )
-        for title, quantity, values in rows:
-            table.add_row(title, quantity, *(number(value) for value in shown_quantiles(values, levels)))
-        (median,) = shown_quantiles(bounds, [0.5]) if len(bounds) else (None,)
-        table.add_row("", bound_name(scenario), "", number(median))
-        if len(of_theorem_8):
-            table.add_row("", THEOREM_8_NAME, "", number(shown_quantiles(of_theorem_8, [0.5])[0]))
-        lines = [
-            f"in {some_runs(count)} {text} ({outcome.value})"
-            for outcome, text in endings.items()
-            if (count := results.outcomes.count(outcome))
-        ]
-        hits = hit_text(results.hits, scenario)
-        notes.append(f"curve {curve.number}: " + "; ".join([*([hits] if hits else []), certificate(results), *lines]))
-    counts = sum((set_counts(curve.results.truth_kept, curve.results.set_emptied) for curve in curves), SetCounts())
-    if counts.set_emptied:
-        notes.append(f"an empty set {'was enlarged, and guidance continued' if enlarged else 'ended guidance'}")
-    notes += set_warnings(scenario.information_set.model, counts)
-    notes.append(f"{game_note(scenario)}; infoset compare shows the worst of all tie rules")
-    if allowed := allowance(scenario):
-        notes.append(allowed)
-    if scenario.name in (MANY, SINGLE):
-        figures = "; ".join(
-            f"{noise} noise: miss {miss} m, impulse {fuel} m/s" for noise, (miss, fuel) in printed_single_runs().items()
-        )
-        notes.append(f"paper (one run from z = -8 km, no range sensor): {figures}")
-    runs = len(curves[0].results)
-    notes += quantile_notes(runs, levels)
-    burns = [burn_table(scenario, curves)] if scenario.thruster.impulses_s else []
-    title = (
+        bounds = {bound_name(scenario): results.guaranteed_miss_m, THEOREM_8_NAME: results.theorem_8_miss_m}
+        head = f"{curve.number} {curve.noise.value}"
+        table.add_row(head, "miss, m", *map(number, summary(results.miss_m).values()))
+        ranging = "  + range sensor" if curve.range_sensor else ""
+        table.add_row(ranging, "impulse, m/s", *map(number, summary(results.impulse_m_s).values()))
+        for title, values in bounds.items():
+            if values.count():
+                table.add_row("", title, "", number(summary(values.compressed())["p50"]))
+    yield (
         f"{scenario.name}: quantiles of {some_runs(runs)} per curve; game noise with the tie rule {scenario.tie.value}"
     )
-    return [title, table, *burns, *notes]
-
-
-LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
-"""Levels of the quantiles of a burn, by key in JSON."""
+    yield table
+    if scenario.thruster.impulses_s:
+        yield burn_table(scenario, curves)
+    counts = SetCounts()
+    for curve in curves:
+        results = curve.results
+        counts += set_counts(results.truth_kept, results.set_emptied)
+        outcomes = Counter(outcome.value for outcome in results.outcomes)
+        lines = [hit_text(results.hits, scenario), certificate(results)]
+        lines += [f"{outcome}: {count}" for outcome, count in outcomes.items()]
+        yield f"curve {curve.number}: {'; '.join(filter(None, lines))}"
+    yield from set_warnings(scenario.information_set.model, counts)
+    yield f"{game_note(scenario)}; infoset compare shows the worst of all tie rules"
+    if allowed := allowance(scenario):
+        yield allowed
+    if scenario.name in (MANY, SINGLE):
+        printed = "; ".join(
+            f"{noise} noise: miss {miss} m, impulse {fuel} m/s" for noise, (miss, fuel) in printed_single_runs().items()
+        )
+        yield f"paper (one run from z = -8 km, no range sensor): {printed}"
+    yield from quantile_notes(runs, [*QUANTILES.values()])
 
 
 def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, float | None]]]:

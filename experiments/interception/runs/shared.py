@@ -1,13 +1,20 @@
-"""What the interception commands share: parallel simulation, the head of a summary, and lines about results."""
+"""What the interception commands share: files, parallel simulation, searches, and lines about results."""
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
 
 from experiments.common.errors import InputError
-from experiments.common.screen import NOT_FINITE, BeginProgress, some_runs
+from experiments.common.input_file import to_toml
+from experiments.common.output import Output, output_of, to_json
+from experiments.common.screen import NOT_FINITE, BeginProgress, progress_bar, say_warnings, some_runs
+from experiments.interception.scenario_file import scenario_warnings
 from experiments.interception.study import set_counts
 from guidance import NoiseKind, Strategy
 from sim import Results, Scenario
@@ -36,15 +43,52 @@ def need_finite(results: Results) -> None:
         raise InputError(NOT_FINITE)
 
 
-def summary_head(scenario: Scenario, warnings: Sequence[str], own: Strategy | None = None) -> dict[str, object]:
-    """Return the first keys of a summary; ``strategy`` only if it is not the scenario's."""
-    return {
-        "versions": versions(),
-        "scenario": scenario.name,
-        "scenario_hash": fingerprint(scenario),
-        **({"warnings": warnings} if warnings else {}),
-        **({"strategy": strategy_name(scenario, own)} if own is not None else {}),
-    }
+@dataclass(frozen=True)
+class Work:
+    """What a running command has: its scenario with warnings, its files and its progress."""
+
+    scenario: Scenario
+    warnings: Sequence[str]
+    written: Output
+    begin: BeginProgress
+    began_s: float
+
+    def save(self, results: Mapping[str, object]) -> None:
+        """Write the scenario, and results as JSON after the keys that all commands share."""
+        self.written.save("scenario.toml", to_toml(self.scenario))
+        self.written.save("results.json", to_json({**self.head(), **results}), "--json")
+
+    def head(self) -> dict[str, object]:
+        """Return the keys that the results of all commands share."""
+        return {
+            "versions": versions(),
+            "scenario": self.scenario.name,
+            "scenario_hash": fingerprint(self.scenario),
+            **({"warnings": self.warnings} if self.warnings else {}),
+            "model": self.scenario.information_set.model.value,
+            "range_sensor": self.scenario.range_sensor is not None,
+            "elapsed_s": perf_counter() - self.began_s,
+        }
+
+
+@contextlib.contextmanager
+def work_of(
+    options: Any,
+    scenario: Scenario,
+    names: Sequence[str] = (),
+    files: Mapping[str, Path | None] | None = None,
+    notes: Sequence[str] = (),
+) -> Iterator[Work]:
+    """Check the files of a command, and print notes and the warnings of its scenario.
+
+    `names` are those of files in the folder of ``--out`` after the scenario and the results; `files` are single files
+    by option.
+    """
+    wanted = ("scenario.toml", "results.json", *names)
+    with output_of(options, wanted, files) as written, progress_bar(options.quiet) as begin:
+        warnings = scenario_warnings(scenario)
+        say_warnings(warnings, options.quiet, notes)
+        yield Work(scenario, warnings, written, begin, perf_counter())
 
 
 def b_plane_figures(scenario: Scenario) -> list[str]:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.interception.comparison import Comparison, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.scenario_file import load_scenario, with_model
+from experiments.interception.study import Comparison, compared_scenarios, comparisons, summary
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset import Model
 from sim import Scenario, simulate
@@ -169,7 +169,7 @@ def test_help_has_an_example(infoset: Infoset) -> None:
 @pytest.fixture(scope="module")
 def compared(brief: Scenario) -> list[Comparison]:
     strategies = dict.fromkeys(["symmetric-miss", "patient"])
-    return gather({flight: simulate(flown, 6) for flight, flown in flights(brief, strategies).items()})
+    return comparisons({flight: simulate(flown, 6) for flight, flown in compared_scenarios(brief, strategies).items()})
 
 
 def test_the_figure_shows_the_quantiles_of_every_strategy(compared: list[Comparison]) -> None:

@@ -15,13 +15,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from experiments.common.figure_style import figure_bytes
-from experiments.interception.comparison import Comparison
-from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.figures.distributions import axis_limit, draw_distributions
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, choose_sections, draw_sets
 from experiments.interception.scenario_file import load_scenario
+from experiments.interception.study import Comparison, Curve, curve_scenarios
 from guidance import NoiseKind, TieRule
 from infoset import ConvexPolygons
 from infoset.arrays import Floats

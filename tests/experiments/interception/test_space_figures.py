@@ -16,7 +16,6 @@ from PIL import Image, ImageSequence
 
 from experiments.common.input_file import to_toml
 from experiments.interception.course import Clock, Courses, duration_text, possible_misses, true_predicted_misses
-from experiments.interception.curves import Curve
 from experiments.interception.figures.animation import animate
 from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, max_guarantee
@@ -24,6 +23,7 @@ from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import choose_sections, draw_sets
 from experiments.interception.scenario_file import load_scenario
+from experiments.interception.study import Curve
 from guidance import NoiseKind
 from infoset.arrays import Floats
 from sim import Record, Results, Scenario, fly_one, simulate
