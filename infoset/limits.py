@@ -136,35 +136,6 @@ Fraction = Annotated[float, FRACTION]
 Part = Annotated[float, PART]
 
 
-@dataclass(frozen=True)
-class _Rule:
-    """Type and limits that the annotation of a field requires."""
-
-    field: str
-    name: str
-    limits: Limits | None
-    pair: bool
-    many: bool
-    kind: type | None
-    optional: bool
-
-    def check(self, value: object) -> None:
-        if value is None and self.optional:
-            return
-        if self.limits is None:
-            if self.kind is not None and not isinstance(value, self.kind):
-                raise TypeError(f"{self.name} must be of the type {self.kind.__name__}: got {shown(value)}")
-        elif self.many:
-            if not isinstance(value, tuple):
-                raise TypeError(f"{self.name} must be a tuple of numbers: got {shown(value)}")
-            for number in value:
-                self.limits.need(self.name, number)
-        elif not self.pair:
-            self.limits.need(self.name, value)
-        else:
-            need_pair(self.name, value, self.limits)
-
-
 def check_fields(owner: object) -> None:
     """Check the values of a dataclass against the annotations of its fields; raise TypeError or ValueError.
 
@@ -173,8 +144,8 @@ def check_fields(owner: object) -> None:
     field, the value, and what is allowed.
     """
     kind: Any = type(owner)
-    for rule in _rules(kind):
-        rule.check(getattr(owner, rule.field))
+    for field, hint in _hints(kind).items():
+        _check(f"{kind.__name__}: {field}", getattr(owner, field), hint)
 
 
 class Checked:
@@ -185,33 +156,32 @@ class Checked:
 
 
 @cache
-def _rules(owner: type) -> tuple[_Rule, ...]:
+def _hints(owner: type) -> dict[str, Any]:
     hints = get_type_hints(owner, include_extras=True)
-    return tuple(_rule(field.name, f"{owner.__name__}: {field.name}", hints[field.name]) for field in fields(owner))
+    return {field.name: hints[field.name] for field in fields(owner)}
 
 
-def _rule(field: str, name: str, hint: Any) -> _Rule:
-    optional = get_origin(hint) in (Union, types.UnionType)
-    if optional:
+def _check(name: str, value: Any, hint: Any) -> None:
+    if get_origin(hint) in (Union, types.UnionType):
+        if value is None:
+            return
         (hint,) = (kind for kind in get_args(hint) if kind is not types.NoneType)
-    inner, *more = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    limits = next((note for note in more if isinstance(note, Limits)), None)
-    many = get_args(inner)[1:] == (...,)
-    kind = inner if isinstance(inner, type) else None
-    return _Rule(field, name, limits, get_origin(inner) is tuple, many, kind, optional)
-
-
-def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:
-    """Raise an error, which starts with `name`, if a value is not a pair (minimum, maximum) of numbers within limits.
-
-    TypeError for a value that is not a tuple of two real numbers, ValueError for a number outside the limits and for a
-    reversed pair.
-    """
-    if not isinstance(value, tuple) or len(value) != 2:
-        raise TypeError(f"{name} must be a pair (minimum, maximum): got {shown(value)}")
-    for end in value:
-        limits.need(name, end)
-    if value[0] > value[1]:
+    inner, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    limits = next((note for note in notes if isinstance(note, Limits)), None)
+    if limits is None:
+        if isinstance(inner, type) and not isinstance(value, inner):
+            raise TypeError(f"{name} must be of the type {inner.__name__}: got {shown(value)}")
+        return
+    if get_origin(inner) is not tuple:
+        limits.need(name, value)
+        return
+    is_pair = get_args(inner)[1:] != (...,)
+    if not isinstance(value, tuple) or (is_pair and len(value) != 2):
+        wanted = "pair (minimum, maximum)" if is_pair else "tuple of numbers"
+        raise TypeError(f"{name} must be a {wanted}: got {shown(value)}")
+    for number in value:
+        limits.need(name, number)
+    if is_pair and value[0] > value[1]:
         raise ValueError(f"{name} must be a pair (minimum, maximum), and is reversed: got {shown(value)}")
 
 
