@@ -120,13 +120,6 @@ def test_an_error_beyond_its_bound_is_refused(bad: float) -> None:
             ScriptedNoise({"angle": good} | {name: spoilt})
 
 
-def test_scripts_of_another_shape_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"one shape \(B, steps\) for all sensors: got \[\(2, 3\), \(2, 4\)\]"):
-        ScriptedNoise({"angle": np.zeros((2, 3)), "range": np.zeros((2, 4))})
-    with pytest.raises(ValueError, match=r"errors\['angle'\] must have the shape"):
-        ScriptedNoise({"angle": np.zeros(3)})
-
-
 def test_a_script_that_ends_before_the_flight_is_refused() -> None:
     with pytest.raises(ValueError, match=r"errors\['angle'\] has 3 steps, none for step 3"):
         ScriptedNoise({"angle": np.zeros((1, 3))}).measure(sight(0.0, 3e6, step=3), looked_at())

@@ -252,13 +252,3 @@ def test_draws_of_a_wrong_shape_are_refused() -> None:
     for bad in ((TieRule.UPPER,) * 3, (), ("upper", "lower"), "upper"):
         with pytest.raises(TypeError, match=r"tie must be a TieRule, .* or a pair of them"):
             GameNoise(bad, draws())  # type: ignore[arg-type]
-
-
-def test_measurements_of_a_wrong_shape_are_refused() -> None:
-    seen = sight(all_sensors(SENSOR))
-    for measured in ({"angle": seen.alpha_rad[0]}, {"rate": seen.omega_rad_s[1]}, {"range": seen.alpha_rad}):
-        (name,) = measured
-        shape = r"\(4,\)" if name == "range" else r"\(2, 4\)"
-        with pytest.raises(ValueError, match=rf"step 0: {name} must be a number or have the shape {shape}"):
-            checked_measurements(measured, seen, self_named := object())
-    assert checked_measurements({"angle": 0.1}, seen, self_named)["angle"].shape == (2, BATCH)  # type: ignore[dict-item]

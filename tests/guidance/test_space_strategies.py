@@ -224,19 +224,6 @@ class VectorReturns(Returns):
     spatial = True
 
 
-@pytest.mark.parametrize("value", [np.zeros(2), np.zeros((2, 4)), 1.0, None, np.full(BATCH, np.nan), ["a"] * BATCH])
-def test_impulses_of_another_shape_are_refused(value: Any) -> None:
-    now, one_state = situations(MODEL)[2], [None]
-    with pytest.raises(
-        ValueError, match=r"Returns must return 3 finite impulses \(m/s\), one for each engagement, .* step 2"
-    ):
-        decide(Returns(value), now, [None, None], ALL)
-    with pytest.raises(
-        ValueError, match=r"VectorReturns must return finite impulses \(m/s\) of the shape \(2, 3\), along y and z"
-    ):
-        decide(VectorReturns(value), now, one_state, ALL)
-
-
 def test_a_vector_without_the_attribute_is_refused_with_a_hint() -> None:
     now = situations(MODEL)[0]
     with pytest.raises(ValueError, match=r"must return 3 finite impulses .*set `spatial = True` in its class"):

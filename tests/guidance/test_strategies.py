@@ -121,12 +121,6 @@ def test_patient_ends_as_the_symmetric_strategy() -> None:
     assert wanted(situation(-6.0, 8.0, 3.1, 3.1)) == 0.0
 
 
-@pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
-def test_a_share_is_from_none_to_all(share: float) -> None:
-    with pytest.raises(ValueError, match="share must lie from 0 to 1"):
-        Patient(share)
-
-
 class Straight:
     """Straight motion, as the estimators assume it."""
 

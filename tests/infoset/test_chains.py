@@ -30,9 +30,9 @@ from infoset import chain_storage, chains, location, replays
 from infoset.arrays import Floats
 from infoset.chain_storage import FIRST_RING, TAKEN
 from infoset.chains import CAPACITY
+from tests.infoset.test_polygon_oracle import AXES, Exact, dot, hull
 from tests.rationals import Fraction
 
-Exact = tuple[Fraction, Fraction]
 Level = tuple[float, float, float]
 
 RIGHT, LEFT = range(2)
@@ -45,36 +45,12 @@ briefly = settings(checked, max_examples=12)
 # The oracle: convex polygons with rational vertices (V, m), counter-clockwise, no three of them on a line.
 
 
-def cross(a: Exact, b: Exact, c: Exact) -> Fraction:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def hull(points: Sequence[Exact]) -> list[Exact]:
-    ordered = sorted(set(points))
-    if len(ordered) < 3:
-        return ordered
-    made: list[list[Exact]] = []
-    for row in (ordered, ordered[::-1]):
-        chain: list[Exact] = []
-        for point in row:
-            while len(chain) > 1 and cross(chain[-2], chain[-1], point) <= 0:
-                chain.pop()
-            chain.append(point)
-        made.append(chain[:-1])
-    return made[0] + made[1]
-
-
-def along(normal: Exact, point: Exact) -> Fraction:
-    return normal[0] * point[0] + normal[1] * point[1]
-
-
 def upward(tau: float) -> Exact:
     """The normal that tells heights: z = m - tau V."""
     return -Fraction(tau), Fraction(1)
 
 
 MISS: Exact = (Fraction(0), Fraction(1))
-AXES: list[Exact] = [(Fraction(x), Fraction(y)) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))]
 
 
 def rounded(points: Sequence[Exact]) -> Floats:
@@ -92,7 +68,7 @@ def may_reach(points: Floats, normal: Exact, height: Fraction | None = None) -> 
 
 def highest(points: Sequence[Exact], about: Floats, normal: Exact) -> Fraction:
     """Return the maximum height; `about` are the points, rounded."""
-    return max(along(normal, points[i]) for i in may_reach(about, normal))
+    return max(dot(normal, points[i]) for i in may_reach(about, normal))
 
 
 def reaches(polygon: Sequence[Exact], normal: Exact) -> tuple[Fraction, Fraction]:
@@ -103,7 +79,7 @@ def reaches(polygon: Sequence[Exact], normal: Exact) -> tuple[Fraction, Fraction
 def clip(polygon: Sequence[Exact], normal: Exact, lower: Fraction, upper: Fraction) -> list[Exact]:
     kept = list(polygon)
     for sign, bound in ((1, lower), (-1, upper)):
-        heights = [sign * (along(normal, point) - bound) for point in kept]
+        heights = [sign * (dot(normal, point) - bound) for point in kept]
         new: list[Exact] = []
         for i, here in enumerate(kept):
             before = kept[i - 1]
@@ -137,7 +113,7 @@ def outside_by(points: Sequence[Exact], polygon: Sequence[Exact], box: Exact) ->
         reach = highest(polygon, about, normal)
         reach += abs(normal[0]) * box[0] + abs(normal[1]) * box[1]
         for i in may_reach(about_points, normal, reach):
-            if along(normal, points[i]) > reach:
+            if dot(normal, points[i]) > reach:
                 return points[i]
     return None
 
@@ -330,7 +306,7 @@ class Life:
             return
         tolerance = self.tolerance
         for chain, sign in ((right, 1), (left, -1)):
-            rises = [sign * along(normal, point) for point in chain]
+            rises = [sign * dot(normal, point) for point in chain]
             assert all(after >= before - tolerance for before, after in pairwise(rises))
         self.check_extremes(right, left)
 
@@ -548,7 +524,7 @@ def test_extremal_bands_never_lose_the_truth(corner: int, story: list[tuple[Step
         section.shift(0.1 * step.kick)
         kick = Fraction(0.1 * step.kick)
         truth = (truth[0] + kick, truth[1] + kick * Fraction(section.tau))
-        level = float(along(upward(section.tau), truth))
+        level = float(dot(upward(section.tau), truth))
         max_m += abs(0.1 * step.kick) * section.tau + 0.01 * step.half_v * section.tau
         slack = 16.0 * chains.EPSILON * (max_m + 300.0 * section.reach)
         band = (level - slack, level + width + slack) if from_below else (level - width - slack, level + slack)

@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 
 from infoset import polygon, polygon_hull, polygon_sum
 from infoset.arrays import Floats
+from tests.infoset.test_polygon_oracle import Exact, dot, exact, exact_sum, hull, turn
 from tests.rationals import Fraction
 
 pytestmark = pytest.mark.thorough
 
-Exact = tuple[Fraction, Fraction]
 
 EPS = Fraction(1, 2**52)
 GUARD = -7.25e77
@@ -30,29 +30,6 @@ checked = settings(max_examples=30, deadline=None)
 
 
 # The oracle: convex polygons with rational vertices, counter-clockwise, no three of them on a line.
-
-
-def cross(a: Exact, b: Exact, c: Exact) -> Fraction:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def hull(points: Iterable[Exact]) -> list[Exact]:
-    ordered = sorted(set(points))
-    if len(ordered) < 3:
-        return ordered
-    chains: list[list[Exact]] = []
-    for row in (ordered, ordered[::-1]):
-        chain: list[Exact] = []
-        for point in row:
-            while len(chain) > 1 and cross(chain[-2], chain[-1], point) <= 0:
-                chain.pop()
-            chain.append(point)
-        chains.append(chain[:-1])
-    return chains[0] + chains[1]
-
-
-def exact(points: Floats | Sequence[Floats | tuple[float, float]]) -> list[Exact]:
-    return [(Fraction(float(x)), Fraction(float(y))) for x, y in points]
 
 
 def edges(corners: Sequence[Exact]) -> list[tuple[Exact, Exact]]:
@@ -72,11 +49,11 @@ def squared_from_edge(point: Exact, a: Exact, b: Exact) -> Fraction:
         return squared(point, a)
     if along >= length:
         return squared(point, b)
-    return cross(a, b, point) ** 2 / length
+    return turn(a, b, point) ** 2 / length
 
 
 def is_inside(point: Exact, corners: Sequence[Exact]) -> bool:
-    return len(corners) > 2 and all(cross(a, b, point) >= 0 for a, b in edges(corners))
+    return len(corners) > 2 and all(turn(a, b, point) >= 0 for a, b in edges(corners))
 
 
 def squared_from_boundary(point: Exact, corners: Sequence[Exact]) -> Fraction:
@@ -97,10 +74,6 @@ def agree(made: Floats, right: Sequence[Exact], tolerance: Fraction) -> bool:
     return lies_within(corners, right, tolerance) and lies_within(right, corners, tolerance)
 
 
-def height(point: Exact, normal: Exact) -> Fraction:
-    return point[0] * normal[0] + point[1] * normal[1]
-
-
 def exact_clip(
     corners: Sequence[Exact], normal: Exact, lower: float | Fraction, upper: float | Fraction
 ) -> list[Exact]:
@@ -111,28 +84,14 @@ def exact_clip(
         if level == -math.inf:
             return []
         bound = Fraction(level)
-        new = [point for point in kept if height(point, direction) <= bound]
+        new = [point for point in kept if dot(direction, point) <= bound]
         for a, b in edges(kept):
-            over_a, over_b = height(a, direction) - bound, height(b, direction) - bound
+            over_a, over_b = dot(direction, a) - bound, dot(direction, b) - bound
             if over_a * over_b < 0:
                 part = over_a / (over_a - over_b)
                 new.append((a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])))
         kept = hull(new)
     return kept
-
-
-def exact_sum(first: Iterable[Exact], second: Iterable[Exact]) -> list[Exact]:
-    others = list(second)
-    return hull((a[0] + b[0], a[1] + b[1]) for a in first for b in others)
-
-
-def exact_map(matrix: Floats, corners: Iterable[Exact]) -> list[Exact]:
-    rows = exact(matrix)
-    return hull((height(point, rows[0]), height(point, rows[1])) for point in corners)
-
-
-def exact_area(corners: Sequence[Exact]) -> Fraction:
-    return sum((a[0] * b[1] - a[1] * b[0] for a, b in edges(corners)), Fraction(0)) / 2
 
 
 def reach(*arrays: Floats) -> Fraction:
@@ -247,17 +206,6 @@ def add_segment(corners: Floats, half: Floats) -> Floats:
     return written(corners, 2, kernel)
 
 
-def add_polygon(corners: Floats, other: Floats) -> Floats:
-    return written(
-        corners, len(other) + 1, lambda out: polygon_sum.add_polygon(corners, len(corners), other, len(other), out)
-    )
-
-
-def map_linearly(corners: Floats, matrix: Floats) -> Floats:
-    (xx, xy), (yx, yy) = matrix
-    return written(corners, 0, lambda out: polygon.map_linearly(corners, len(corners), xx, xy, yx, yy, out))
-
-
 def reduce_outward(corners: Floats, cap: int) -> Floats:
     reduced = corners.copy()
     return reduced[: polygon_hull.reduce_outward(reduced, len(reduced), cap)]
@@ -296,8 +244,8 @@ def test_a_cut_is_exact_for_a_polygon_and_a_band_off_by_rounding(data: st.DataOb
     result = hull(exact(made))
     assert lies_within(result, whole, tolerance)
     for point in result:
-        assert lower == -math.inf or height(point, direction) >= Fraction(lower) - noise
-        assert upper == math.inf or height(point, direction) <= Fraction(upper) + noise
+        assert lower == -math.inf or dot(direction, point) >= Fraction(lower) - noise
+        assert upper == math.inf or dot(direction, point) <= Fraction(upper) + noise
     narrow_lower = lower if math.isinf(lower) else Fraction(lower) + noise
     narrow_upper = upper if math.isinf(upper) else Fraction(upper) - noise
     if narrow_lower <= narrow_upper:
@@ -323,43 +271,6 @@ def test_a_border_that_wavers_by_rounding_does_not_overflow_the_room() -> None:
 # Maps.
 
 
-@st.composite
-def matrices(draw: st.DrawFn) -> Floats:
-    """Shears, reflections, singular and nearly singular matrices, any, of any magnitude."""
-    kind = draw(st.sampled_from(["shear", "reflection", "singular", "nearly", "zero", "any"]))
-    rows = np.reshape(draw(st.lists(unit_floats(), min_size=4, max_size=4)), (2, 2))
-    if kind == "shear":
-        rows = np.array([[1.0, 0.0], [rows[0, 0], 1.0]])
-    elif kind == "reflection":
-        rows = np.array([[-1.0, 0.0], [rows[0, 0], 1.0]])
-    elif kind in ("singular", "nearly"):
-        factor = float(draw(st.sampled_from([0.0, 1.0, -2.0, 0.25])))
-        rows = np.array([rows[0], factor * rows[0]])
-        if kind == "nearly":
-            rows[1, 1] *= 1.0 + 2.0**-52
-    elif kind == "zero":
-        rows = np.zeros((2, 2))
-    return np.asarray(rows * float(draw(magnitudes)))
-
-
-@checked
-@given(any_polygons, matrices())
-def test_a_linear_image_is_the_exact_one(corners: Floats, matrix: Floats) -> None:
-    made = map_linearly(corners, matrix)
-    tolerance = 4 * EPS * reach(matrix) * reach(corners)
-    assert agree(made, exact_map(matrix, hull(exact(corners))), tolerance)
-
-
-def test_a_singular_map_gives_a_segment_or_a_point_and_a_small_one_does_not() -> None:
-    square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
-    np.testing.assert_array_equal(map_linearly(square, np.array([[1.0, 1.0], [2.0, 2.0]])), [[0.0, 0.0], [3.0, 6.0]])
-    np.testing.assert_array_equal(map_linearly(square, np.zeros((2, 2))), [[0.0, 0.0]])
-    for scale in (1e-200, 1e200):
-        np.testing.assert_array_equal(map_linearly(square, scale * np.eye(2)), scale * square)
-        mirrored = map_linearly(square, scale * np.diag([-1.0, 1.0]))
-        np.testing.assert_array_equal(mirrored, scale * square[::-1] * [-1, 1])
-
-
 # Sums.
 
 
@@ -371,14 +282,6 @@ def test_the_sum_with_a_segment_is_the_exact_one(data: st.DataObject) -> None:
     made = add_segment(corners, half)
     right = exact_sum(hull(exact(corners)), exact([half, -half]))
     assert agree(made, right, 16 * EPS * (reach(corners) + reach(half)))
-
-
-@checked
-@given(any_polygons, any_polygons)
-def test_the_sum_with_a_polygon_is_the_exact_one(corners: Floats, other: Floats) -> None:
-    made = add_polygon(corners, other)
-    right = exact_sum(hull(exact(corners)), hull(exact(other)))
-    assert agree(made, right, 8 * EPS * (reach(corners) + reach(other)))
 
 
 NEEDLES = [
@@ -438,53 +341,6 @@ def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: f
         if trial % 200 == 0:
             right = exact_sum(hull(exact(corners)), exact([0.1 * along, -0.1 * along]))
             assert agree(made, right, 16 * EPS * (reach(corners) + 1))
-
-
-@st.composite
-def probes(draw: st.DrawFn, corners: Floats) -> Floats:
-    """A point: a vertex, one on an edge, a combination of vertices, or one outside."""
-    kind = draw(st.sampled_from(["vertex", "edge", "inside", "outside", "level"]))
-    i = int(draw(st.integers(0, len(corners) - 1)))
-    if kind == "vertex":
-        return np.array(corners[i])
-    if kind == "edge":
-        made: Floats = corners[i] + float(draw(st.floats(0.0, 1.0))) * (corners[i - 1] - corners[i])
-        return made
-    if kind == "inside":
-        weights = np.array(draw(st.lists(st.floats(0.01, 1.0), min_size=len(corners), max_size=len(corners))))
-        return np.asarray(weights @ corners / weights.sum())
-    extent = np.ptp(corners, axis=0) + 1e-3 * float(reach(corners))
-    away = np.array(draw(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)))) * extent
-    return np.asarray(corners[i] + away * ([1.0, 0.0] if kind == "level" else [1.0, 1.0]))
-
-
-@checked
-@given(st.data())
-def test_the_margin_is_the_exact_signed_distance_to_the_boundary(data: st.DataObject) -> None:
-    corners = data.draw(any_polygons)
-    x, y = data.draw(probes(corners))
-    margin = polygon.margin(corners, len(corners), x, y)
-    whole, point = hull(exact(corners)), (Fraction(float(x)), Fraction(float(y)))
-    distance = math.sqrt(squared_from_boundary(point, whole))
-    tolerance = float(16 * EPS * max(reach(corners), abs(point[0]), abs(point[1])))
-    assert abs(abs(margin) - distance) <= tolerance
-    if distance > tolerance:
-        assert (margin > 0.0) == is_inside(point, whole)
-
-
-@checked
-@given(worn_polygons())
-def test_the_area_of_a_worn_polygon_is_that_of_its_hull(corners: Floats) -> None:
-    error = abs(Fraction(polygon.area(corners, len(corners))) - exact_area(hull(exact(corners))))
-    far = reach(corners)
-    assert error <= 8 * len(corners) * EPS * far * (Fraction(float(np.sum(np.ptp(corners, axis=0)))) + EPS * far)
-
-
-@checked
-@given(any_polygons)
-def test_the_centroid_lies_in_the_hull(corners: Floats) -> None:
-    middle = exact([polygon.centroid(corners, len(corners))])
-    assert lies_within(middle, hull(exact(corners)), 4 * EPS * reach(corners))
 
 
 # Reduction.
