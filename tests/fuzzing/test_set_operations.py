@@ -1,23 +1,13 @@
-"""Laws that set operations obey whatever the sets: what is shown where.
+"""Laws that information sets obey, and so the chains they are made of.
 
-`tests/infoset/test_polygon_oracle.py` holds every operation of `ConvexPolygons` to exact rationals (cut, map, shift,
-both sums, support, margin, area, centroid, outward reduction), and shows that cuts are idempotent and monotone, that
-sums commute with maps and that supports add; `test_polygon_wear.py` the same of worn and needle-thin polygons, and of
-the hull; `test_chains.py` the life of a section, cuts and reduction included, its mirror image bit for bit.
-
-Here are the laws that tie operations to one another. Polygons: cuts commute with maps, all operations are monotone and
-include what they must, hulls and boxes are idempotent, areas add, scale and obey Brunn and Minkowski, mirrors and
-powers of two are exact. Information sets, and so the chains they are made of: measuring again tells nothing new, more
-data and narrower bounds give smaller sets, the order of measurements does not matter, impulses add, prediction is a
-shear that keeps areas, sections are concave in the label, mirrors hold, powers of two are exact to the last bit.
-
-Sets of the other problems are in `test_polytope_operations.py`.
+Measuring again tells nothing new, more data and narrower bounds give smaller sets, the order of measurements does not
+matter, impulses add, prediction is a shear that keeps areas, sections are concave in the label, mirrors hold, powers of
+two are exact to the last bit. `tests/infoset/test_polygon_oracle.py` and `test_set_library.py` compare the operations
+of `ConvexPolygons` with exact rationals. Sets of the other problems are in `test_polytope_operations.py`.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,28 +16,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Model, SetModel, StateBox
-from infoset.arrays import Floats
 
 pytestmark = pytest.mark.thorough
 
 some = settings(max_examples=10, deadline=None)
 few = settings(max_examples=3, deadline=None)
 
-# Whole numbers up to a thousand: shifts, shears and sums of them are exact, only cuts round.
-REACH = 1000
-WHOLE = st.integers(-REACH, REACH).map(float)
-POINT = st.tuples(WHOLE, WHOLE)
-POLYGON = st.lists(POINT, min_size=1, max_size=9).map(ConvexPolygons.from_points)
-FAT = POLYGON.filter(lambda polygon: float(polygon.area()) >= 1.0)
-NORMAL = st.tuples(st.integers(-9, 9), st.integers(-9, 9)).filter(any).map(lambda n: (float(n[0]), float(n[1])))
-BAND = st.tuples(WHOLE, WHOLE).map(lambda ends: (8.0 * min(ends), 8.0 * max(ends)))
-ROUNDING = 1e-12 * 20 * REACH
-"""Of a coordinate, or of a height over a normal of length 13, several times over."""
-
-SHEAR = st.integers(-5, 5).map(lambda part: np.array([[1.0, 0.0], [float(part), 1.0]]))
-MIRROR = st.sampled_from([np.diag([-1.0, 1.0]), np.diag([1.0, -1.0]), np.array([[0.0, 1.0], [1.0, 0.0]])])
-SCALING = st.tuples(st.integers(-40, 40), st.integers(-40, 40)).map(lambda powers: np.diag(2.0 ** np.array(powers)))
-MAP = st.one_of(SHEAR, MIRROR, st.tuples(SHEAR, MIRROR).map(lambda two: two[0] @ two[1]))
+ROUNDING = 2e-8
+"""Of a coordinate, or of a height, several times over."""
 
 
 def lies_in(inner: ConvexPolygons, outer: ConvexPolygons, by: float = ROUNDING) -> bool:
@@ -57,143 +33,6 @@ def lies_in(inner: ConvexPolygons, outer: ConvexPolygons, by: float = ROUNDING) 
 
 def same(one: ConvexPolygons, other: ConvexPolygons) -> bool:
     return lies_in(one, other) and lies_in(other, one)
-
-
-def vertices(polygon: ConvexPolygons) -> list[tuple[float, float]]:
-    return sorted((float(x), float(y)) for x, y in polygon.polygon())
-
-
-def matched(
-    polygon: ConvexPolygons, image: Callable[[tuple[float, float]], tuple[float, float]]
-) -> list[tuple[float, float]]:
-    return sorted(image(vertex) for vertex in vertices(polygon))
-
-
-# Polygons -------------------------------------------------------------------------------------------------------
-
-
-@some
-@given(POLYGON, NORMAL, BAND, MAP, POINT)
-def test_a_cut_commutes_with_shears_mirrors_and_shifts(
-    polygon: ConvexPolygons, normal: tuple[float, float], band: tuple[float, float], matrix: Floats, offset: Floats
-) -> None:
-    """Up to rounding of the band: each lies in the other, cut by a band wider by that."""
-    shifted = np.asarray(offset)
-    other = np.linalg.inv(matrix).T @ normal
-    level = float(other @ shifted)
-    moved = polygon.linear_map(matrix).translate(shifted)
-
-    def cut_then_moved(by: float) -> ConvexPolygons:
-        return polygon.cut(normal, band[0] - by, band[1] + by).linear_map(matrix).translate(shifted)
-
-    def moved_then_cut(by: float) -> ConvexPolygons:
-        return moved.cut(other, band[0] + level - by, band[1] + level + by)
-
-    wider = 1e-12 * 13 * 13 * 10 * REACH
-    assert lies_in(cut_then_moved(0.0), moved_then_cut(wider))
-    assert lies_in(moved_then_cut(0.0), cut_then_moved(wider))
-
-
-@some
-@given(POLYGON, NORMAL, BAND, SCALING)
-def test_scaling_by_powers_of_two_is_exact_in_a_cut(
-    polygon: ConvexPolygons, normal: tuple[float, float], band: tuple[float, float], scaling: Floats
-) -> None:
-    scaled = polygon.linear_map(scaling).cut(normal / np.diag(scaling), *band)
-    assert scaled.polygon().tolist() == polygon.cut(normal, *band).linear_map(scaling).polygon().tolist()
-
-
-@some
-@given(POLYGON, POLYGON, NORMAL, st.tuples(st.integers(-5, 5), st.integers(-5, 5)), MIRROR)
-def test_mirrors_are_exact(
-    polygon: ConvexPolygons, other: ConvexPolygons, normal: Floats, half: tuple[int, int], mirror: Floats
-) -> None:
-    """In sums of whole numbers; a cut that is along an axis is exact, too."""
-    image = polygon.linear_map(mirror)
-
-    def reflect(point: tuple[float, float]) -> tuple[float, float]:
-        x, y = mirror @ point
-        return float(x) + 0.0, float(y) + 0.0
-
-    assert vertices(image) == matched(polygon, reflect)
-    total = polygon.minkowski_sum(other)
-    assert set(matched(total, reflect)) == set(vertices(image.minkowski_sum(other.linear_map(mirror))))
-    stretched = polygon.add_segment(half)
-    assert same(image.add_segment(mirror @ half), stretched.linear_map(mirror))
-    assert float(image.area()) == pytest.approx(float(polygon.area()), rel=1e-12)
-    assert float(image.support_function(mirror @ np.asarray(normal))) == float(polygon.support_function(normal))
-
-
-@some
-@given(FAT, st.lists(st.floats(0.0, 1.0), min_size=9, max_size=9), POLYGON, NORMAL, BAND, MAP, st.integers(4, 9))
-def test_every_operation_is_monotone(
-    outer: ConvexPolygons,
-    parts: list[float],
-    other: ConvexPolygons,
-    normal: tuple[float, float],
-    band: tuple[float, float],
-    matrix: Floats,
-    cap: int,
-) -> None:
-    """A smaller set in, a smaller set out; outward reduction is not monotone, but always outside of what went in."""
-    middle = outer.polygon().mean(axis=0)
-    corners = outer.polygon()
-    shrunk = middle + (corners - middle) * np.resize(parts, len(corners))[:, None]
-    inner = ConvexPolygons.from_points(shrunk)
-    assert lies_in(inner, outer)
-    assert lies_in(inner.cut(normal, *band), outer.cut(normal, band[0] - 1e-9, band[1] + 1e-9))
-    assert lies_in(inner.linear_map(matrix), outer.linear_map(matrix))
-    assert lies_in(inner.translate(normal), outer.translate(normal))
-    assert lies_in(inner.add_segment(normal), outer.add_segment(normal))
-    assert lies_in(inner.minkowski_sum(other), outer.minkowski_sum(other))
-    assert lies_in(inner, outer.reduce_outward(cap))
-    assert float(inner.support_function(normal)) <= float(outer.support_function(normal)) + ROUNDING
-    assert float(inner.area()) <= float(outer.area()) * (1.0 + 1e-12)
-
-
-@some
-@given(POLYGON, NORMAL, BAND, st.integers(4, 9))
-def test_hulls_boxes_and_reductions_are_idempotent_and_outward(
-    polygon: ConvexPolygons, normal: tuple[float, float], band: tuple[float, float], cap: int
-) -> None:
-    once = ConvexPolygons.from_points(polygon.polygon())
-    assert vertices(once) == vertices(polygon)
-    reduced = polygon.reduce_outward(cap)
-    assert reduced.reduce_outward(cap).polygon().tolist() == reduced.polygon().tolist()
-    assert lies_in(polygon, reduced)
-    minimum, maximum = polygon.bounding_box()
-    box = ConvexPolygons.from_box((minimum[0], minimum[1]), (maximum[0], maximum[1]))
-    again = box.bounding_box()
-    np.testing.assert_array_equal(again, (minimum, maximum))
-    assert lies_in(polygon, box, 0.0)
-    assert lies_in(polygon, polygon.add_segment(normal))
-    assert lies_in(polygon.cut(normal, *band), polygon)
-    assert vertices(ConvexPolygons.from_shapely(polygon.to_shapely())) == vertices(polygon)
-    assert float(polygon.margin(polygon.centroid())) >= -ROUNDING
-
-
-@some
-@given(FAT, FAT, NORMAL, st.floats(0.0, 1.0), MAP, st.integers(4, 9))
-def test_areas_add_scale_and_obey_brunn_and_minkowski(
-    first: ConvexPolygons, second: ConvexPolygons, normal: tuple[float, float], part: float, matrix: Floats, cap: int
-) -> None:
-    area, other = float(first.area()), float(second.area())
-    low, high = -float(first.support_function(np.negative(normal))), float(first.support_function(normal))
-    level = low + part * (high - low)
-    pieces = float(first.cut(normal, upper=level).area()) + float(first.cut(normal, lower=level).area())
-    assert pieces == pytest.approx(area, rel=1e-9)
-    assert float(first.linear_map(matrix).area()) == pytest.approx(area, rel=1e-12)
-    assert float(first.linear_map(3.0 * matrix).area()) == pytest.approx(9.0 * area, rel=1e-12)
-    # A segment sweeps the width across it; a sum is at least as large as Brunn and Minkowski say.
-    across = np.array([-normal[1], normal[0]])
-    width = float(first.support_function(across)) + float(first.support_function(-across))
-    assert float(first.add_segment(normal).area()) == pytest.approx(area + 2.0 * width, rel=1e-12)
-    total = float(first.minkowski_sum(second).area())
-    assert math.sqrt(total) >= (math.sqrt(area) + math.sqrt(other)) * (1.0 - 1e-12)
-    assert float(first.minkowski_sum(first).area()) == pytest.approx(4.0 * area, rel=1e-12)
-    minimum, maximum = first.bounding_box()
-    assert area <= float(np.prod(maximum - minimum)) <= 2.0 * float(np.abs(maximum - minimum).max()) ** 2
-    assert float(first.reduce_outward(cap).area()) >= area * (1.0 - 1e-12)
 
 
 # Information sets -----------------------------------------------------------------------------------------------
