@@ -166,13 +166,6 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
     ]
     if answers:
         yield f"captures if the evader deviates and the pursuer responds: {', '.join(answers)}"
-    if certificate.directions_tried:
-        excess = certificate.max_excess_m
-        largest = "no other extremal" if excess is None else f"largest excess over the capture radius {excess:.2g} m"
-        yield (
-            f"directions: {certificate.directions_found} of {certificate.directions_tried} compared; {largest}, "
-            f"tolerance {certificate.excess_tolerance_m:.2g} m"
-        )
     yield saddle_point(certificate)
 
 

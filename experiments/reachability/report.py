@@ -185,33 +185,25 @@ def _robust_json(robustness: Robustness) -> dict[str, object]:
 
 
 def report_lines(report: Report) -> Iterator[Part]:
-    """Yield the summary, the tables, and the simulations in closed loop, for the screen."""
-    yield from _summary(report)
-    yield from _tables(report)
-    yield from _feedback(report)
-
-
-def _summary(report: Report) -> Iterator[str]:
-    solution, minimum = report.solution, report.min_periods
-    dimension = solution.optimal.dimension
+    """Yield the minimum norm, the tube, the selected controls and the simulations in closed loop, for the screen."""
+    rendezvous, solution, minimum = report.rendezvous, report.solution, report.min_periods
     reached = f"norm 0 not reached in {report.searched_periods} periods"
     if minimum is not None:
         reached = f"norm 0 needs at least {minimum} period{'s' if minimum > 1 else ''}"
-    yield f"{report.rendezvous.name}: minimum terminal norm {solution.optimal.miss:.9g} {NORM}; {reached}"
+    dimension = solution.optimal.dimension
+    yield f"{rendezvous.name}: minimum terminal norm {solution.optimal.miss:.9g} {NORM}; {reached}"
     yield f"route: {solution.route.value} ({solution.reason})"
     yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
     yield f"axes: {AXES}"
-    ball = report.rendezvous.problem.thrust is ThrustShape.BALL
-    engines = "the periods, of one engine that turns" if ball else "the three axes"
-    yield (
-        f"units: {NORM} is the norm of a state whose components are in m and m/s; controls u are in units of "
-        f"{report.rendezvous.acceleration_m_s2:g} m/s^2; Delta-v is the sum over {engines}"
-    )
-
-
-def _feedback(report: Report) -> Iterator[str]:
+    yield f"units: {NORM} is the norm of a state in m and m/s; u is in units of {rendezvous.acceleration_m_s2:g} m/s^2"
+    table = number_table("period", *(f"{axis} of the tube\nm" for axis in "xyz"))
+    for t in range(1, solution.problem.periods + 1):
+        table.add_row(str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0))
+    yield from ("", table)
+    if report.members:
+        yield from ("", _members_table(report))
     if report.flight is not None:
-        used = delta_v(report.rendezvous, report.flight.controls)["sum"]
+        used = delta_v(rendezvous, report.flight.controls)["sum"]
         yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)} {NORM}, Delta-v {used:.4f} m/s"
     if report.noisy:
         misses = [flight.miss for flight in report.noisy]
@@ -227,35 +219,12 @@ def _feedback(report: Report) -> Iterator[str]:
         yield f"with disturbances, with feedback: {bound}"
 
 
-def _tables(report: Report) -> Iterator[Part]:
-    sets, periods = report.solution.sets, range(1, report.solution.problem.periods + 1)
-    axes = (f"{axis} of the tube\nm" for axis in "xyz")
-    counted = ("forward\nvertices", "forward\nfacets", "tube\nvertices", "tube\nfacets")
-    counts = [[sets.counts(kind, t) for kind in (SetKind.FORWARD, SetKind.TUBE)] for t in periods]
-    known = any(count is not None for row in counts for count in row)
-    table = number_table("period", *axes, *(counted if known else ()))
-    for t, row in zip(periods, counts, strict=True):
-        cells = [f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0]
-        for count in row if known else ():
-            cells += ["-", "-"] if count is None else [str(count.vertices), str(count.facets)]
-        table.add_row(str(t), *cells)
-    yield from ("", table)
-    if report.members:
-        yield from ("", _members_table(report))
-
-
 def _members_table(report: Report) -> Table:
-    titles = (
-        *(f"{name}\n{unit}" for name, unit in (("energy", "u^2"), ("L1", "u"), ("norms", "u"), ("peak", "u"))),
-        "Delta-v\nm/s",
-        *(f"along {axis}\nm/s" for axis in "xyz"),
-        f"nonlinear miss\n{NORM}",
-        "violation between\nperiods",
+    table = number_table(
+        "control", "energy\nu^2", "peak\nu", "Delta-v\nm/s", f"nonlinear miss\n{NORM}", "violation between\nperiods"
     )
-    table = number_table("control", *titles)
     for member in report.members:
-        costs = (f"{value:.6f}" for value in vars(effort(member.controls)).values())
-        used = (f"{value:.4f}" for value in delta_v(report.rendezvous, member.controls).values())
-        violation = f"{max(member.between, 0.0):.2%}"
-        table.add_row(member.name, *costs, *used, f"{member.nonlinear_miss:.4g}", violation)
+        spent, used = effort(member.controls), delta_v(report.rendezvous, member.controls)["sum"]
+        costs = (f"{spent.energy:.6f}", f"{spent.peak:.6f}", f"{used:.4f}", f"{member.nonlinear_miss:.4g}")
+        table.add_row(member.name, *costs, f"{max(member.between, 0.0):.2%}")
     return table
