@@ -186,6 +186,18 @@ def test_simulated_errors_are_within_their_bounds(errors: Errors) -> None:
     np.testing.assert_array_equal(again.measured, data.measured)
 
 
+def test_a_set_may_be_given_by_its_vertices(infoset: Command) -> None:
+    corners = "vertices = [[-10.0, 0.0], [10.0, 0.0], [10.0, 20.0], [-10.0, 20.0]]"
+    Path("mine.toml").write_text(changed("lower = [-10.0, 0.0]\nupper = [10.0, 20.0]", corners))
+    Path("data.csv").write_text("y1,u1\n0.0,1.0\n1.0,0.0\n")
+    one, other = (infoset.json("observe", name, "--data", "data.csv")["final"] for name in ("mine.toml", "vehicle"))
+    np.testing.assert_allclose(one["lower"] + one["upper"], other["lower"] + other["upper"])
+    for errors in Errors:
+        states = simulate(load_observer("mine.toml"), errors, 1).states
+        assert states is not None
+        assert (np.abs(states[0] - [0.0, 10.0]) <= 10.0).all()
+
+
 def test_six_states_are_polytopes(infoset: Command) -> None:
     Path("six.toml").write_text(SIX_STATES)
     results = infoset.json("observe", "six.toml")

@@ -144,7 +144,10 @@ def test_the_cone_is_inside_its_angle_and_kept() -> None:
     away = points[inside] - [0.0, 15.0, 0.0]
     angles = np.degrees(np.arctan2(np.linalg.norm(away[:, ::2], axis=1), -away[:, 1]))
     assert 19.0 < angles.max() <= 20.0 + 1e-9
-    report = COMMAND.report(Reach(problem="approach-cone", select="energy,analytic"))
+    report = COMMAND.report(Reach(problem="approach-cone", select="energy,analytic", replan=True))
+    printed = "\n".join(map(str, COMMAND.lines(report)))
+    assert "with navigation errors, 10 simulations: median" in printed
+    assert "with disturbances, with feedback: terminal norm at most" in printed
     for each in report.members:
         gaps = each.linear @ problem.normals.T - problem.offsets
         assert gaps.max() < 1e-6
