@@ -173,11 +173,9 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
         axes.set_xticks(columns, names, rotation=90)
         axes.set_ylabel(f"excess, {_COST}")
         return
-    first, second = _widest_pair(excess)
     if len(names) == 3:
-        third = 3 - first - second
-        shade = axes.scatter(excess[:, first], excess[:, second], c=excess[:, third], s=4.0, cmap="cividis")
-        axes.figure.colorbar(shade, ax=axes, location="top", label=f"$e$ of {names[third]}, {_COST}")
+        shade = axes.scatter(excess[:, 0], excess[:, 1], c=excess[:, 2], s=4.0, cmap="cividis")
+        axes.figure.colorbar(shade, ax=axes, location="top", label=f"$e$ of {names[2]}, {_COST}")
     elif solution.same_matrix:
         distance = float(distances(solution)[0, 1])
         along = np.linspace(0.0, distance**2, _POINTS)
@@ -185,16 +183,8 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
     else:
         axes.plot(excess[:, 0], excess[:, 1], color=SET_EDGE)
     for choice, values in chosen.items():
-        axes.plot(values[first], values[second], marker=_CHOICES[choice][0], markersize=7.0, **_HOLLOW)
-    label_axes(axes, [f"excess $e$ of {names[index]}, {_COST}" for index in (first, second)])
-
-
-def _widest_pair(excess: Floats) -> tuple[int, int]:
-    """Return the two craft whose excesses are least correlated: they show the front best."""
-    if excess.shape[1] < 3:
-        return 0, 1
-    correlation = np.abs(np.corrcoef(excess.T))
-    return min(((0, 1), (0, 2), (1, 2)), key=lambda pair: float(correlation[pair]))
+        axes.plot(*values[:2], marker=_CHOICES[choice][0], markersize=7.0, **_HOLLOW)
+    label_axes(axes, [f"excess $e$ of {name}, {_COST}" for name in names[:2]])
 
 
 def _draw_sweep(axes: Axes, solution: EncounterSolution, sweep: DurationSweep) -> None:

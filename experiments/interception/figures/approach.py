@@ -36,8 +36,6 @@ _POSSIBLE = "possible miss without further impulses"
 _TRUE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "label": "miss of the true state without further impulses"}
 _CENTRED: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
 _END: dict[str, Any] = {"color": INK, "marker": "x", "markersize": 6.0, "markeredgewidth": 1.4, "linestyle": "none"}
-_LOGARITHMIC_FROM = 10.0
-"""Ratio of the maximum and the minimum impulse above which their axis is logarithmic."""
 _MIN_SHOWN = 1e-3
 """Minimum miss of a logarithmic axis, as a multiple of the minimum possible miss."""
 
@@ -100,11 +98,8 @@ def _guaranteed_m(record: Record) -> float | None:
 def _draw_moduli(axes: Axes, record: Record) -> None:
     moduli = np.abs([step.impulse_m_s for step in record.steps])
     draw_impulses(axes, Clock(counts_down=True).at(record), moduli, color=IMPULSE, linewidth=0.9, label="impulse")
-    given = moduli[moduli > 0.0]
-    if len(given) and given.max() > _LOGARITHMIC_FROM * given.min():
-        axes.set(yscale="log", ylim=(0.4 * given.min(), 2.5 * given.max()))
-    else:
-        axes.set_ylim(0.0, 1.15 * float(moduli.max()) or 1.0)
+    if moduli.any():
+        axes.set(yscale="log", ylim=(0.4 * moduli[moduli > 0.0].min(), 2.5 * moduli.max()))
     axes.set_ylabel("impulse, m/s")
 
 

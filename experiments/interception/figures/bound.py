@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 
-from experiments.common.figure_style import BOUND, CURVE_LOOKS, INK, LIMIT, SET_EDGE, SET_FILL, letters, style, subplots
+from experiments.common.figure_style import BOUND, CURVE_LOOKS, INK, SET_EDGE, SET_FILL, letters, style, subplots
 from experiments.common.screen import number
 from infoset.arrays import Floats
 from sim import Scenario
@@ -18,7 +18,10 @@ from sim.bound import LowerBound
 from sim.truth_pair import TruthPair, later_impulses
 
 _FIRST, _SECOND = CURVE_LOOKS[3], CURVE_LOOKS[2]
-_LOOKS = (_FIRST | {"marker": "o"}, CURVE_LOOKS[1] | {"marker": "s"}, _SECOND | {"marker": "^"})
+_LOOKS = tuple(
+    {"color": look["color"], "marker": marker, "markersize": 3.0}
+    for look, marker in zip((_FIRST, CURVE_LOOKS[1], _SECOND), "os^", strict=True)
+)
 _CORRECTED: dict[str, Any] = {"linewidth": 0.8, "linestyle": ":"}
 _COLUMN_MM = 88.0
 _WIDE = 8.0
@@ -50,36 +53,17 @@ def draw_bound(scenario: Scenario, lower: LowerBound, worst_m: Mapping[str, floa
     return figure
 
 
-def ripples(labels_m: Floats, bounds_m: Floats) -> list[tuple[Floats, Floats]]:
-    """Split a curve over rising labels where labels were not evaluated: those of a stretch lie close together."""
-    gaps = np.diff(labels_m)
-    if not len(gaps):
-        return [(labels_m, bounds_m)]
-    cuts = np.flatnonzero(gaps > 3.0 * np.median(gaps)) + 1
-    return list(zip(np.split(labels_m, cuts), np.split(bounds_m, cuts), strict=True))
-
-
 def _draw_labels(axes: Axes, lower: LowerBound) -> None:
-    banded = False
     for look, speed in zip(_LOOKS, lower.speeds_m_s, strict=False):
-        stretches = ripples(*lower.curve(speed))
-        labels_m, most = stretches[0]
-        if len(stretches) > 1:
-            # The bound ripples over the distance of one step: the largest value of each ripple, and its range.
-            banded = True
-            labels_m = np.array([0.5 * (labels[0] + labels[-1]) for labels, _ in stretches])
-            most = np.array([bounds.max() for _, bounds in stretches])
-            least = [bounds.min() for _, bounds in stretches]
-            axes.fill_between(labels_m / 1e3, least, most, facecolor=look["color"], alpha=0.16, linewidth=0.0)
-        axes.plot(labels_m / 1e3, most, label=f"{-speed / 1e3:g} km/s", markersize=3.0, **look)
-    if banded:
-        axes.fill_between([], [], facecolor=LIMIT, alpha=0.25, label="spread within one step")
+        labels_m, bounds_m = lower.curve(speed)
+        # No lines: the bound ripples over the distance of one step, and only some stretches of labels are evaluated.
+        axes.plot(labels_m / 1e3, bounds_m, label=f"{-speed / 1e3:g} km/s", linestyle="none", **look)
     pair = lower.pair
     axes.plot(pair.label_m / 1e3, pair.bound_m, marker="*", markersize=9.0, color=INK, linestyle="none", zorder=5)
     place: dict[str, Any] = {"xytext": (7.0, 3.0), "textcoords": "offset points"}
     axes.annotate(f"{pair.bound_m:.1f} m", (pair.label_m / 1e3, pair.bound_m), color=INK, **place)
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.8 * (high - low))  # space for the legend
+    axes.set_ylim(low, high + 0.6 * (high - low))  # space for the legend
     axes.set(xlabel="label: range at $t = 0$, km", ylabel="bound of the miss, m")
     axes.legend(title="closing speed", loc="upper right")
 
@@ -103,11 +87,9 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     for sign, look, name in ((1.0, _FIRST, without), (-1.0, _SECOND, "second state"))[: 1 if pair.is_single else 2]:
         axes.plot(to_go, sign * half, label=name, **look, **mark)
         axes.plot(to_go[after], sign * corrected[after], color=look["color"], **_CORRECTED)
-    axes.plot([], [], color=INK, label="with the largest correction", **_CORRECTED)
-    _bracket(axes, shown, float(half[-1]), pair.correction_m)
-    axes.set_xlim(shown, -0.4 * shown)
+    axes.plot([], [], color=INK, label=f"after the largest correction, {pair.correction_m:.1f} m", **_CORRECTED)
+    axes.set_xlim(shown, 0.0)
     axes.set_ylim(0.0 if pair.is_single else -1.12 * top, 2.2 * top)  # space for the legend
-    axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
     offset = "offset" if scenario.is_spatial else "$z$"
     axes.set_xlabel("time to go, s")
     axes.set_ylabel(f"{offset} without impulses, m" if pair.is_single else f"{offset} from the midpoint, m")
@@ -155,15 +137,3 @@ def _draw_equal_measurements(axes: Axes, scenario: Scenario, pair: TruthPair, sh
     for sign in (-1.0, 1.0):
         axes.plot(fine, sign * corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
     return float(corridor[-1])
-
-
-def _bracket(axes: Axes, shown: float, half: float, correction: float) -> None:
-    """Mark at the arrival the largest correction and the bound."""
-    at, bound = -0.03 * shown, max(half - correction, 0.0)
-    for low, high, colour, text, side in (
-        (0.0, bound, INK, f"bound\n{bound:.1f} m", "top"),
-        (bound, half, LIMIT, f"correction\n{half - bound:.1f} m", "bottom"),
-    ):
-        arrow = {"arrowstyle": "<->", "color": colour, "linewidth": 0.9, "shrinkA": 0.0, "shrinkB": 0.0}
-        axes.annotate("", (at, high), xytext=(at, low), arrowprops=arrow)
-        axes.text(at - 0.02 * shown, 0.5 * (low + high), text, ha="left", va=side, color=colour, fontsize="small")

@@ -80,11 +80,8 @@ def draw_samples(samples: Sequence[Sample], radius_m: float | None = None) -> Fi
     draw_radius(left, radius_m)
     left.set_ylabel("share of runs")
     letters(panels, ("miss", "impulse spent"))
-    for axes, label, values in ((left, "miss, m", misses), (right, "impulse spent, m/s", impulses)):
-        notes = [beyond("runs", values, axes.get_xlim()[1])]
-        if axes is left:
-            notes.append(beyond("guaranteed misses", bounds, axes.get_xlim()[1]))
-        axes.set_xlabel("\n".join([label, *filter(None, notes)]))
+    left.set_xlabel("\n".join(["miss, m", *_beyond(left, "runs", misses), *_beyond(left, "guaranteed misses", bounds)]))
+    right.set_xlabel("\n".join(["impulse spent, m/s", *_beyond(right, "runs", impulses)]))
     legend_below(figure, 2)
     return figure
 
@@ -115,10 +112,10 @@ def axis_limit(samples: Sequence[Floats]) -> float:
     return max(float(sample[sample <= 1.5 * fence].max(initial=0.0)) for sample in samples)
 
 
-def beyond(name: str, samples: Sequence[Floats], end: float) -> str:
-    """Return a note with the number of values beyond the end of an axis, or an empty text without such values."""
-    count = sum(int((sample > end).sum()) for sample in samples)
-    return f"{name} beyond the axis: {count} of {sum(sample.size for sample in samples)}" if count else ""
+def _beyond(axes: Axes, name: str, samples: Sequence[Floats]) -> list[str]:
+    """Return a note with the number of values beyond a horizontal axis; none without such values."""
+    count = sum(int((sample > axes.get_xlim()[1]).sum()) for sample in samples)
+    return [f"{name} beyond the axis: {count} of {sum(sample.size for sample in samples)}"] if count else []
 
 
 def draw_radius(axes: Axes, radius_m: float | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,8 +30,6 @@ from sim import Record
 
 RANGE_SHARE = 0.1
 """Share of the first range below which values do not set the limits: angle and rate grow as 1/x and 1/x^2."""
-_SMALL_IMPULSES = 0.2
-"""Share of the maximum impulse: if no impulse is greater, the axis extends to the impulses."""
 _MIN_RATE = 0.02
 """Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be zero."""
 _MODULUS = "#c9c9c9"
@@ -51,7 +49,8 @@ def draw_process(records: Sequence[Record]) -> Figure:
     """
     if not records:
         raise ValueError("at least one record is needed")
-    clock, span_m_s = Clock.of(records), _impulse_span_m_s(records)
+    clock = Clock.of(records)
+    impulse_m_s = max(abs(step.impulse_m_s) for record in records for step in record.steps) or 1.0
     figure = new_figure(190.0)
     parts = figure.subfigures(1, len(records), squeeze=False)[0]
     grids = []
@@ -70,7 +69,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
                 _draw_sight(angle, trace, clock, "angle")
                 _draw_sight(rate, trace, clock, "rate")
                 miss.set_xlabel("time t, s")
-            _draw_impulse(impulse, trace, clock, span_m_s)
+            _draw_impulse(impulse, trace, clock, impulse_m_s)
             draw_predicted_miss(miss, trace, clock)
             if record.scenario.is_spatial:
                 angle.set_title(f"along {trace[1]}")
@@ -84,7 +83,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
         _level(angles, traces_of(records), "angle", "mrad")
         _level(rates, traces_of(records), "rate", "µrad/s")
     for axes in impulses:
-        axes.set_ylim(-1.2 * span_m_s, 1.2 * span_m_s)
+        axes.set_ylim(-1.2 * impulse_m_s, 1.2 * impulse_m_s)
     level_predicted_miss(misses)
     legend_below(figure, 3)
     return figure
@@ -127,7 +126,7 @@ def _draw_sight(axes: Axes, trace: Trace, clock: Clock, sensor: str, *, is_modul
     steps, values = _measured(trace, sensor)
     if steps:
         _dots(axes, times[steps], change(values), f"measured {sensor}")
-    axes.plot(times, change(_true(trace, sensor)), color=TRUTH, marker=_marker(trace[0]), label="true value")
+    axes.plot(times, change(_true(trace, sensor)), color=TRUTH, label="true value")
 
 
 def _dots(axes: Axes, times: Floats, values: Floats, label: str) -> None:
@@ -149,7 +148,7 @@ def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
 
 
 def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
-    """Give axes of angle errors the same limits: logarithmic beyond ten times the power of ten of the first bound."""
+    """Give axes of angle errors the same limits: logarithmic beyond the power of ten of the first bound."""
     bounds = [np.abs(axes.dataLim.intervaly).max() for axes in row]
     firsts = []
     for record, axis in traces:
@@ -157,8 +156,7 @@ def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
         firsts.append(1e6 * float(sensor.error_bound(record.steps[0].true_range_m)))
     maximum, first = max(bounds), 10.0 ** np.ceil(np.log10(max(firsts)))
     for axes in row:
-        if maximum > 10.0 * first:
-            axes.set_yscale("symlog", linthresh=first)
+        axes.set_yscale("symlog", linthresh=first)
         axes.set_ylim(-1.3 * maximum, 1.3 * maximum)
 
 
@@ -169,13 +167,13 @@ def _level_moduli(row: Sequence[Axes]) -> None:
         axes.set(yscale="log", ylim=(0.5 * float(np.quantile(known, _MIN_RATE)), 2.0 * float(known.max())))
 
 
-def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, span_m_s: float) -> None:
-    """Draw the impulses along an axis; in space, behind them, their moduli, all upward."""
+def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) -> None:
+    """Draw the impulses along an axis, on axes for a maximum; in space, behind them, their moduli, all upward."""
     record, axis = trace
     maximum, times = record.scenario.thruster.max_impulse_m_s, clock.at(record)
     axes.axhline(0.0, **_ZERO)
     label = f"maximum impulse, {maximum:g} m/s"
-    if maximum > 1.2 * span_m_s:
+    if maximum > 1.2 * impulse_m_s:
         label = f"maximum {maximum:g} m/s, beyond the axis"
     for limit in (-maximum, maximum):
         axes.axhline(limit, label=label, **BOUND)
@@ -187,13 +185,6 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, span_m_s: float) -> No
     draw_impulses(axes, times, components, color=IMPULSE, linewidth=0.9, label=label)
 
 
-def _impulse_span_m_s(records: Sequence[Record]) -> float:
-    """Return the maximum impulse that the axis shows: the limit of the engine unless all are small."""
-    maximum = max(record.scenario.thruster.max_impulse_m_s for record in records)
-    given = max(abs(step.impulse_m_s) for record in records for step in record.steps)
-    return given if 0.0 < given < _SMALL_IMPULSES * maximum else maximum
-
-
 def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
     """Draw the predicted-miss interval over time."""
     record, axis = trace
@@ -203,7 +194,7 @@ def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
     axes.axhline(0.0, **_ZERO)
     axes.fill_between(times[steps], lower, upper, facecolor=SET_FILL, linewidth=0.0, label="predicted-miss interval")
     for bound in (lower, upper):
-        axes.plot(times[steps], bound, color=SET_EDGE, linewidth=0.9, marker=_marker(record), markersize=3.0)
+        axes.plot(times[steps], bound, color=SET_EDGE, linewidth=0.9)
     if clock.counts_down:
         axes.plot(times, true_predicted_misses(record)[axis], color=TRUTH, linewidth=1.0, label="true value")
 
@@ -218,7 +209,12 @@ def level_predicted_miss(row: Sequence[Axes]) -> None:
 
 def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str, unit: str) -> None:
     """Give axes of a row the same limits, those of the first part of the way, and say what a curve beyond reaches."""
-    far = np.concatenate([[*_far(trace, sensor)] for trace in traces])
+    values = []
+    for trace in traces:
+        ranges = np.array([step.true_range_m for step in trace[0].steps])
+        shown, (steps, measured) = ranges >= RANGE_SHARE * ranges.max(), _measured(trace, sensor)
+        values += [_true(trace, sensor)[shown], measured[shown[steps]]]
+    far = np.concatenate(values)
     margin = 0.12 * float(np.ptp(far)) or 0.1 * float(np.abs(far).max()) or 1.0
     low, high = float(far.min()) - margin, float(far.max()) + margin
     for axes, trace in zip(row, traces, strict=True):
@@ -229,16 +225,3 @@ def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str, unit: str)
         note = "" if low <= worst <= high else f"to {text}".replace("-", "\N{MINUS SIGN}")
         # Every axes has a title, so that the rows of two records are at the same height.
         axes.set_title(", ".join(filter(None, [axes.get_title(), note])) or " ", fontsize="small")
-
-
-def _far(trace: Trace, sensor: str) -> Iterator[float]:
-    """Return the values, true and measured, at ranges above `RANGE_SHARE` of the first."""
-    ranges = np.array([step.true_range_m for step in trace[0].steps])
-    shown = ranges >= RANGE_SHARE * ranges.max()
-    steps, values = _measured(trace, sensor)
-    yield from _true(trace, sensor)[shown]
-    yield from values[shown[steps]]
-
-
-def _marker(record: Record) -> str:
-    return "o" if len(record.steps) == 1 else ""

@@ -12,9 +12,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+from matplotlib.transforms import Bbox
 
 from experiments.common.figure_style import HALO, INK, MEASURED, WIDTH_MM, legend_below, letters, plain, style, subplots
-from experiments.interception.course import Clock, record_titles
+from experiments.interception.course import Clock, evenly, record_titles
 from infoset import Section
 from infoset.arrays import Floats
 from sim import AxisStep, Record, StepRecord
@@ -50,9 +51,10 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
     figure, grid = subplots(15.0 + 60.0 * len(rows), len(rows), columns, width_mm=WIDTH_MM if columns > 1 else 100.0)
     for row, planes in zip(grid, rows, strict=True):
         for axes, plane in zip(row, planes, strict=True):
-            _shade_allowed(axes, plane)
             draw_plane(axes, plane)
         level_planes(row, planes)
+        for axes, plane in zip(row, planes, strict=True):
+            _shade_allowed(axes, plane)
     titles = [plane.title for planes in rows for plane in planes]
     letters([*grid.flat], [title.replace(", ", ",\n") for title in titles] if columns > 2 else titles)
     legend_below(figure, 2)
@@ -102,12 +104,7 @@ def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
     """Return at most `most` sections in their order, evenly distributed over the range, with the first and the last."""
     if len(sections) <= most:
         return list(sections)
-    if most == 1:
-        return [sections[len(sections) // 2]]
-    ranges = np.array([section.range_m for section in sections])
-    wanted = np.linspace(ranges[0], ranges[-1], most)
-    chosen = np.unique(np.abs(ranges[None, :] - wanted[:, None]).argmin(axis=1))
-    return [sections[index] for index in chosen]
+    return [sections[index] for index in evenly(np.array([section.range_m for section in sections]), most)]
 
 
 def draw_plane(axes: Axes, plane: Plane) -> None:
@@ -150,9 +147,7 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
     """Give the planes of each lateral axis the same limits, those of the sets and marks."""
     for axis in {plane.axis for plane in planes}:
         same = [(axes, plane) for axes, plane in zip(row, planes, strict=True) if plane.axis == axis]
-        points = [*(outline for _, plane in same for outline in plane.outlines)]
-        points += [np.asarray(line.get_xydata(), dtype=np.float64) for axes, _ in same for line in axes.lines]
-        low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
+        low, high = Bbox.union([axes.dataLim for axes, _ in same]).get_points()
         margin = 0.07 * (high - low)
         margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(high), 1e-6))
         for axes, _ in same:

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,7 +13,7 @@ import pytest
 
 from experiments.common.input_file import to_toml
 from experiments.common.screen import number
-from experiments.interception.figures.bound import draw_bound, ripples
+from experiments.interception.figures.bound import draw_bound
 from experiments.interception.scenario_file import load_scenario
 from guidance import strategy_names
 from infoset import StateBox
@@ -269,22 +268,13 @@ def test_a_program_without_a_solution_is_one_message(
     assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")
 
 
-def test_figure_of_few_labels_and_of_many(short: Scenario, planar: LowerBound) -> None:
+def test_figure_of_the_labels(short: Scenario, planar: LowerBound) -> None:
     few = planar
     left, right = draw_bound(short, few).axes
     assert [line.get_label() for line in left.get_lines()[:2]] == ["58 km/s", "57.5 km/s"]
     assert f"{few.bound_m:.1f} m" in {text.get_text() for text in left.texts}
     assert "s" in right.get_xlabel()
-    places = np.concatenate([first + np.linspace(0.0, 29e3, 9) for first in (5.3e6, 5.8e6, 6.2e6)])
-    pair = pair_at(short, 1745e3, -58e3)
-    many = LowerBound(
-        (pair,),
-        tuple(replace(pair, label_m=at, correction_m=2.0 * math.sin(at)) for at in places),
-        0.005,
-    )
-    (left, _) = draw_bound(short, many).axes
-    assert len(left.collections) == 2  # the ripple as a band, and its entry in the legend
-    assert len(left.get_lines()[0].get_xydata()) == 3  # type: ignore[arg-type]
+    np.testing.assert_array_equal(np.asarray(left.get_lines()[0].get_ydata()), few.curve(few.speeds_m_s[0])[1])
 
 
 @pytest.mark.parametrize("max_m", [40.0, 4e3])
@@ -321,14 +311,6 @@ def test_bound_by_one_motion(infoset: Infoset, short: Scenario, tmp_path: Path) 
     (_, right) = draw_bound(weak, lower_bound(weak)).axes
     assert right.get_title("left") == "(b) state that proves the bound"
     assert right.get_lines()[0].get_ydata()[-1] > found["lower_bound_m"]  # type: ignore[index]
-
-
-def test_ripples_are_split_where_no_label_was_looked_at() -> None:
-    labels = np.array([0.0, 1.0, 2.0, 10.0, 11.0, 11.5, 12.0])
-    found = ripples(labels, 2.0 * labels)
-    assert [each.tolist() for each, _ in found] == [[0.0, 1.0, 2.0], [10.0, 11.0, 11.5, 12.0]]
-    assert all((2.0 * each == values).all() for each, values in found)
-    assert len(ripples(np.array([1.0]), np.array([2.0]))) == 1
 
 
 @pytest.mark.thorough
