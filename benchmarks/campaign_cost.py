@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments import load_scenario
-from experiments.common.figure_style import CURVE_LOOKS, new_figure, place_axes, style
+from experiments.common.figure_style import CURVE_LOOKS, legend_below, letters, style, subplots
 from experiments.common.output import Output
 from guidance import NoiseKind
 from sim import Campaign, Scenario, simulate
@@ -45,8 +45,7 @@ def main() -> None:
     out: Path = parser.parse_args().out
     paper = replace(load_scenario("asteroid-1997"), range_sensor=None)
     with style():
-        figure = new_figure(height_mm=78.0)
-        ((left, right),) = place_axes(figure, 1, 2, margins_mm=(16.0, 4.0, 24.0, 7.0), gaps_mm=(18.0, 0.0))
+        figure, ((left, right),) = subplots(80.0, 1, 2)
         for noise in NoiseKind:
             scenario = replace(paper, noise=noise)
             simulate(scenario, 64)
@@ -67,19 +66,14 @@ def main() -> None:
                 print(f"{noise.value}: {name}: {fixed:.3g} + {rise:.3g} n, within {off:.0%}: {np.round(values, 3)}")  # noqa: T201
                 axes.plot(ticks, values, linestyle="", marker="o", markersize=4.0, color=look["color"])
                 axes.plot(ticks, line, label=f"{noise.value} noise", **look)
-        for axes, ticks, title, label in (
-            (left, RUNS, "(a) a campaign, 29 sections", "runs"),
-            (right, SECTIONS, f"(b) a run, of {64 * BATCHES}", "sections at the start"),
-        ):
+        for axes, ticks, label in ((left, RUNS, "runs"), (right, SECTIONS, "sections at the start")):
             axes.set_xlim(0.0, 1.05 * ticks[-1])
             axes.set_ylim(bottom=0.0)
-            axes.set_title(title)
             axes.set_xlabel(label)
         left.set_ylabel("time, s")
         right.set_ylabel("time per run, ms")
-        figure.legend(
-            *left.get_legend_handles_labels(), loc="lower center", ncols=2, title="points: measured, lines: fitted"
-        )
+        letters((left, right), ["a campaign, 29 sections", f"a run, of {64 * BATCHES}"])
+        legend_below(figure, 2, title="points: measured, lines: fitted")
     out.mkdir(parents=True, exist_ok=True)
     Output(out, {}, overwrite=True).figure("figure-campaign-cost", figure)
 
