@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from infoset.arrays import Floats
 
 STYLE: list[Any] = [Path(__file__).with_name("infoset.mplstyle")]
-WIDTH_MM = 180.0
+WIDTH_MM = 170.0
 """Width of a figure over two columns of a page."""
 _MM_PER_INCH = 25.4
 

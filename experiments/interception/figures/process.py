@@ -85,7 +85,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
     for axes in impulses:
         axes.set_ylim(-1.2 * impulse_m_s, 1.2 * impulse_m_s)
     level_predicted_miss(misses)
-    legend_below(figure, 3)
+    legend_below(figure, 3, markerscale=2.0)
     return figure
 
 
@@ -222,6 +222,6 @@ def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str, unit: str)
         true = _true(trace, sensor)
         worst = true[np.abs(true - 0.5 * (low + high)).argmax()]
         text = f"{1e-3 * worst:.3g} {unit.replace('µ', 'm')}" if abs(worst) >= 1e3 else f"{worst:.3g} {unit}"
-        note = "" if low <= worst <= high else f"to {text}".replace("-", "\N{MINUS SIGN}")
+        note = "" if low <= worst <= high else f"reaches {text}".replace("-", "\N{MINUS SIGN}")
         # Every axes has a title, so that the rows of two records are at the same height.
-        axes.set_title(", ".join(filter(None, [axes.get_title(), note])) or " ", fontsize="small")
+        axes.set_title("\n".join(filter(None, [axes.get_title(), note])) or " ", fontsize="small")

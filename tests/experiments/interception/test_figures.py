@@ -94,7 +94,7 @@ def test_process_has_four_rows_of_equal_limits_and_units(records: list[Record]) 
 def test_process_says_what_a_curve_beyond_the_axes_reaches(records: list[Record]) -> None:
     last = records[1].steps[-1]
     title = draw_process(records).axes[5].get_title()
-    assert title == f"to \N{MINUS SIGN}{abs(last.true_rate_rad_s) * 1e3:.3g} mrad/s"
+    assert title == f"reaches \N{MINUS SIGN}{abs(last.true_rate_rad_s) * 1e3:.3g} mrad/s"
 
 
 def test_sets_show_truth_measurement_and_sections(records: list[Record]) -> None:
