@@ -123,7 +123,7 @@ def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
     axes.set_xlabel(f"initial $V_{letter[1:]}$, m/s" if is_speed else f"initial ${letter}$, km")
     axes.ticklabel_format(axis="x", useOffset=False)
     axes.locator_params(axis="x", nbins=3)
-    axes.tick_params(axis="x", pad=5.0)  # apart from the lowest label of the miss
+    axes.tick_params(axis="x", pad=7.0)  # apart from the lowest label of the miss
     limit = 1.04 * axis_limit([miss_m]) or 1.0
     axes.set_ylim(0.0, limit)
     if beyond := int((miss_m > limit).sum()):

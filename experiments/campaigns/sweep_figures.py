@@ -51,7 +51,7 @@ QUANTITY_NAMES = {
     "hit": "probability of a hit",
 }
 _PANEL_MM, _LEGEND_MM = 66.0, 24.0
-_MAX_TICKS, _MAX_LETTERS = 6, 42
+_MAX_TICKS, _MAX_LETTERS = 6, 40
 """Maximum numbers of ticks of an axis, and of letters in a line of its label."""
 _DARK = 0.55
 """Part of the scale of colours from which numbers are white."""
@@ -76,7 +76,9 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> 
 
 def _panels(count: int) -> tuple[Figure, Any]:
     rows, columns = -(-count // 2), min(2, count)
-    figure, grid = subplots(rows * _PANEL_MM + _LEGEND_MM, rows, columns, width_mm=0.5 * WIDTH_MM * columns)
+    figure, grid = subplots(
+        rows * _PANEL_MM + _LEGEND_MM, rows, columns, width_mm=WIDTH_MM if columns > 1 else 0.7 * WIDTH_MM
+    )
     return figure, first_panels(grid, count)
 
 
@@ -150,7 +152,7 @@ def _maps(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName])
         notes.append(f"numbers in (a): {QUANTITY_NAMES[table.required.quantity]}{level}")
     if cells[["required_value", *columns.values()]].isna().any(axis=None):
         notes.append(f"{_NO_VALUE} or no map: too few runs for the quantile")
-    legend_below(figure, 3, title="; ".join(notes))
+    legend_below(figure, 2, title="; ".join(notes))
     return figure
 
 
