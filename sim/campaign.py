@@ -49,8 +49,8 @@ class Campaign:
     chunk : int or None
         Engagements per file; results do not depend on it. None chooses a value for the number of runs.
     until : StoppingRule, Requirement, HitRequirement or None
-        A campaign stops at the end of a chunk once this rule is met; a cell of a sweep, once this requirement is
-        decided.
+        A campaign, or a cell of a sweep, stops at the end of a chunk once this rule is met or this requirement is
+        decided for each noise.
     axes : tuple of Axis
         Keys and values that a sweep varies, as in a scenario file; stored as a description.
     cells : tuple of Scenario
@@ -63,8 +63,8 @@ class Campaign:
     Raises
     ------
     TypeError, ValueError
-        If a number is out of its range, the noise is not a `CampaignNoise`, the axes and the cells do not fit together,
-        or `until` does not fit.
+        If a number is out of its range, the noise is not a `CampaignNoise`, or the axes and the cells do not fit
+        together.
     """
 
     scenario: Scenario
@@ -90,8 +90,6 @@ class Campaign:
             raise TypeError(f"noise must be None or one of {choices}: got {self.noise!r}")
         if len(self.cells) != (math.prod(len(axis.values) for axis in self.axes) if self.axes else 0):
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
-        if self.until is not None and isinstance(self.until, AnyRequirement) != bool(self.axes):
-            raise ValueError("until must be a stopping rule of a campaign, or a requirement of a sweep")
         if self.max_runs is not None:
             Limits(minimum=self.runs, whole=True).need("max_runs", self.max_runs)
 

@@ -145,7 +145,7 @@ class UndecidedCells:
                 self._folder.write(number, runs, cell.waiting.pop(runs))
             elif not self._folder.has(number, runs):
                 return
-            frame = self._folder.chunk(number, runs, ["noise", self._rule.quantity])
+            frame = self._folder.read_chunks([(number, runs)], ["noise", self._rule.quantity])
             for noise, sample in cell.samples.items():
                 values = frame.loc[frame["noise"] == noise, self._rule.quantity]
                 sample.add(values.to_numpy(dtype=np.float64, na_value=np.nan))

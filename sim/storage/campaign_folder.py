@@ -76,11 +76,15 @@ class CampaignFolder:
         Unknown numbers are NaN, unknown flags NA. StorageError, which names the file, if one cannot be read.
         """
         stored = [chunk for chunk in self.manifest.chunks() if cell in (None, chunk[0]) and self.has(*chunk)]
-        return self._read(sorted(stored, key=lambda chunk: (chunk[0], chunk[1][0])), columns)
+        return self.read_chunks(sorted(stored, key=lambda chunk: (chunk[0], chunk[1][0])), columns)
 
-    def chunk(self, cell: int, runs: Sequence[int], columns: Sequence[str]) -> pd.DataFrame:
-        """Return some columns of a stored chunk."""
-        return self._read([(cell, runs)], columns)
+    def read_chunks(
+        self, chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None = None
+    ) -> pd.DataFrame:
+        """Return some columns of stored chunks, one after the other; see `runs`."""
+        names = [_name(*chunk) for chunk in chunks]
+        files = {self.path / SHARDS / name: self._metadata(name) for name in names}
+        return need_arrow().read(files, columns)
 
     @classmethod
     @contextlib.contextmanager
@@ -96,19 +100,17 @@ class CampaignFolder:
         with reporting(path):
             path.mkdir(parents=True, exist_ok=True)
         with locked(path):
-            need_free(path, resume=resume)
-            if (path / MANIFEST).is_file():
-                manifest = read_manifest(path).continued(manifest, path)
-            manifest.write(path)
             with reporting(path):
+                if (path / MANIFEST).is_file():
+                    stored = read_manifest(path)
+                    manifest = stored.continued(manifest, path)
+                    # With more runs, the last chunk of a cell is a larger one.
+                    for name in _names(stored) - _names(manifest):
+                        (path / SHARDS / name).unlink(missing_ok=True)
+                manifest.write(path)
                 (path / SHARDS).mkdir(exist_ok=True)
                 for file in filter(is_leftover, [*path.iterdir(), *(path / SHARDS).iterdir()]):
                     file.unlink()
-                # With more runs, the last chunk of a cell is a larger one.
-                chunks = {_name(*chunk) for chunk in replace(manifest, cell_runs=()).chunks()}
-                for file in (path / SHARDS).glob("*.parquet"):
-                    if file.name not in chunks:
-                        file.unlink()
             yield cls(path, manifest)
 
     def write(self, cell: int, runs: Sequence[int], results: Results) -> None:
@@ -122,11 +124,6 @@ class CampaignFolder:
         """Store the number of runs of each cell after a rule has stopped some of them."""
         self.manifest = replace(self.manifest, cell_runs=cell_runs)
         self.manifest.write(self.path)
-
-    def _read(self, chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None) -> pd.DataFrame:
-        names = [_name(*chunk) for chunk in chunks]
-        files = {self.path / SHARDS / name: self._metadata(name) for name in names}
-        return need_arrow().read(files, columns)
 
     def _metadata(self, name: str) -> dict[str, str]:
         return {"campaign": self._identity, "name": name}
@@ -167,6 +164,11 @@ class CampaignFolder:
         import pandas as pd
 
         return bytes(pd.DataFrame(columns).to_parquet())
+
+
+def _names(manifest: Manifest) -> set[str]:
+    """Return the names of the files of all chunks, also of those after a rule has stopped their cell."""
+    return {_name(*chunk) for chunk in replace(manifest, cell_runs=()).chunks()}
 
 
 def _name(cell: int, runs: Sequence[int]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim import Campaign, CampaignNoise, QuantileName, Requirement, Scenario, StoppingRule
+from sim import Campaign, CampaignNoise, QuantileName, Requirement, Scenario
 from sim.requirement import Decision, judge
 from sim.scenario import of_model
 from sim.storage import Axis, CampaignFolder, read_manifest
@@ -136,7 +136,5 @@ def test_more_runs_in_each_cell_change_no_decision(asked: Campaign, flown: Campa
 def test_what_does_not_fit_together(asked: Campaign) -> None:
     with pytest.raises(ValueError, match="max_runs must be at least 16"):
         replace(asked, max_runs=15)
-    with pytest.raises(ValueError, match="a stopping rule of a campaign, or a requirement of a sweep"):
-        replace(asked, until=StoppingRule(REQUIRED.quantile, 1.0))
     with pytest.raises(ValueError, match="cell_runs must contain 4 numbers"):
         replace(asked.manifest(), cell_runs=(1, 2))
