@@ -5,11 +5,8 @@ from __future__ import annotations
 import ast
 import dataclasses
 import json
-import sys
-from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +15,7 @@ from experiments.cli import main
 from experiments.interception.page import interception_page
 from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario
-from infoset import StateBox
-from sim import Campaign, Record, fly_one
-from sim.scenario import of_model
+from sim import Record, fly_one
 from tests.built_in import scenario_text
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
@@ -84,27 +79,6 @@ def test_arrays_are_read_and_written_without_pickle(trees: dict[Path, ast.Module
 ESCAPE = "\x1b]0;owned\x07\x1b[2J"
 SCRIPT = "<script>alert(1)</script><img src=x onerror=alert(1)>"
 
-_opened: list[str] | None = None
-
-
-def _listen(event: str, arguments: tuple[Any, ...]) -> None:
-    if _opened is not None and event in ("open", "os.listdir", "os.scandir", "os.chdir", "os.mkdir", "os.remove"):
-        _opened.append(str(arguments[0]))
-
-
-sys.addaudithook(_listen)
-
-
-def opened_by(work: Callable[[], object]) -> list[str]:
-    """Every file and folder that Python opens while something is done."""
-    global _opened  # noqa: PLW0603 - an audit hook cannot be taken away
-    _opened = []
-    try:
-        work()
-    finally:
-        found, _opened = _opened, None
-    return found
-
 
 def infoset(*arguments: object) -> int:
     """Run the command; its exit code."""
@@ -119,57 +93,16 @@ def record() -> Record:
     return dataclasses.replace(whole, steps=whole.steps[:6])
 
 
-def test_no_path_from_inside_a_file_is_ever_opened(
-    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Every text that a file may hold is a path to a decoy, and nobody looks there."""
-    decoy = tmp_path / "decoy"
-    decoy.mkdir()
+def test_no_code_that_a_file_names_is_run(record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A strategy that is a class in a Python file is loaded only if an option names it."""
     monkeypatch.chdir(tmp_path)
-    path = str(decoy / "secret.toml")
-    Path(path).write_text(scenario_text("asteroid-1997"))
-    scenario = dataclasses.replace(record.scenario, description=path)
-    write_record(dataclasses.replace(record, scenario=scenario, strategy=path, noise=path), "x.npz")
-    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
-    sensor = dataclasses.replace(scenario.set_model.angle_sensor, nominal_range_m=595e3)
-    model = dataclasses.replace(scenario.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    brief = dataclasses.replace(scenario, **of_model(model), dispersion=box, nominal_range_m=595e3)
-    Campaign(brief, 8, "runs").run(workers=1)
-    manifest = Path("runs/manifest.json")
-    value = json.loads(manifest.read_text())
-    value["versions"]["python"] = value["scenario"]["description"] = path
-    manifest.write_text(json.dumps(value))
-    Path("mine.toml").write_text(
-        scenario_text("asteroid-1997").replace('description = "', f'description = "{path} ', 1)
-    )
-
-    def read_all() -> None:
-        assert infoset("replay", "x.npz", "--html", "page.html") == 0
-        assert infoset("report", "runs", "--json", "report.json") == 0
-        assert infoset("scenarios", "check", "mine.toml") == 0
-
-    opened = opened_by(read_all)
-    assert any(each.endswith("x.npz") for each in opened)
-    assert any(each.endswith("manifest.json") for each in opened)
-    assert [each for each in opened if "decoy" in each] == []
-    assert path in capsys.readouterr().out + Path("page.html").read_text()
-
-
-@pytest.mark.parametrize("key", ["until", "strategy", "name", "description", "versions"])
-def test_a_manifest_cannot_steer_the_terminal(
-    key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("runs").mkdir()
-    Campaign(load_scenario("asteroid-1997"), 8, "runs").manifest().write(Path("runs"))
-    plain = json.loads(Path("runs/manifest.json").read_text())
-    place = plain["scenario"] if key in ("name", "description") else plain
-    place[key] = {f"x{ESCAPE}": ESCAPE} if key == "versions" else f"x{ESCAPE}"
-    Path("runs/manifest.json").write_text(json.dumps(plain))
-    assert infoset("report", "runs") == 2
-    told = capsys.readouterr()
-    assert "control characters" in told.err
-    assert "\x1b" not in told.out + told.err
+    Path("decoy.py").write_text("open('executed', 'w')\n\nclass Mine:\n    pass\n")
+    name = "decoy.py:Mine"
+    write_record(dataclasses.replace(record, strategy=name, noise=name), "x.npz")
+    Path("mine.toml").write_text(scenario_text("asteroid-1997").replace('"symmetric-miss"', f'"{name}"', 1))
+    assert infoset("replay", "x.npz", "--html", "page.html") == 0
+    assert infoset("engage", "mine.toml") == 2
+    assert not Path("executed").exists()
 
 
 @pytest.mark.parametrize("key", ["strategy", "noise"])

@@ -126,7 +126,7 @@ def output_of(
     if output.written and not options.quiet:
         for parent in dict.fromkeys(file.parent for file in output.written):
             written = ", ".join(file.name for file in output.written if file.parent == parent)
-            say(f"wrote {written}" + (f" in {parent}" if parent != Path() else ""), options.quiet)
+            say(f"wrote {written}" + (f" in {parent}" if parent != Path() else ""), quiet=False)
 
 
 def _check_new(file: Path, overwrite: bool) -> None:

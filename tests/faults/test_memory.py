@@ -21,7 +21,7 @@ LIMITED = (
     "import resource, sys\n"
     "from experiments.cli import main\n"
     "import numpy, pyarrow, scipy.linalg, sim.storage.tables, sim.simulate\n"
-    "import experiments.campaigns.samples, experiments.interception.scenario_file\n"
+    "import experiments.campaigns.run_campaign, experiments.interception.scenario_file\n"
     "from infoset import section_passes, location\n"
     "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
     "resource.setrlimit(resource.RLIMIT_AS, (used + int(sys.argv[1]),) * 2)\n"
@@ -61,7 +61,9 @@ def test_no_memory_is_a_message_that_says_how_to_go_on(
     asked = ("campaign", file, "--runs", 24, "--chunk", 8, "--out", "runs", "--workers", 1)
     with monkeypatch.context() as patched:
         patched.setattr("sim.parallel.simulate_task", fly)
-        message = infoset.refused(*asked).splitlines()[-1]
+        code, _, err = infoset(*asked)
+    message = err.splitlines()[-1]
+    assert code == 2
     assert message.startswith("error: not enough memory (Unable to allocate 7.45 GiB); ")
     assert message.endswith("the stored runs are complete: continue with --resume")
     need_whole(tmp_path / "runs")
