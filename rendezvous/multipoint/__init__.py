@@ -1,8 +1,9 @@
 """Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their order."""
 
+from rendezvous.multipoint._shooting import Flown
 from rendezvous.multipoint.kepler import KeplerTargets, KeplerTour
 from rendezvous.multipoint.order import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
-from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, solve_segments
+from rendezvous.multipoint.segments import Nodes, NotSettledError, Path, solve_segments
 from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times
 from rendezvous.multipoint.tour import DriftingTargets, Meet, MovingTargets, Target, Tour, Visits, nodes_of
 

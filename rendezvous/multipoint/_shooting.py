@@ -236,6 +236,10 @@ class ShotPath:
         return states
 
 
+Flown = Path | ShotPath
+"""A path that the choice of times compares: its cost and its slopes by the times; `settled` completes it."""
+
+
 def shoot(block: Block, near: Floats | None = None) -> Shot | None:
     """Find the trajectory of a block by Newton's method, with the residual reduced in steps; None if it fails.
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats, Integers
-from rendezvous.multipoint._shooting import MIN_RADIUS, ROUNDING, ShotPath, blocks_of, shoot, unknowns_of
-from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, check_times, solve_segments
+from rendezvous.multipoint._shooting import MIN_RADIUS, ROUNDING, Flown, ShotPath, blocks_of, shoot, unknowns_of
+from rendezvous.multipoint.segments import Nodes, NotSettledError, Path, check_times, solve_segments
 from rendezvous.multipoint.tour import MovingTargets, Target, Visits, nodes_of
 from rendezvous.relative_motion import TimeVaryingMotion
 from rendezvous.two_body import coast, coasting_rates, gravity_gradient

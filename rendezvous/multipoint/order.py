@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Flags, Floats
-from rendezvous.multipoint.segments import Flown, NotSettledError, Path, check_times, solve_segments
+from rendezvous.multipoint._shooting import Flown
+from rendezvous.multipoint.segments import NotSettledError, Path, check_times
 from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times, room_s
-from rendezvous.multipoint.tour import SMOOTH, Meet, Tour, Visits, nodes_of
+from rendezvous.multipoint.tour import SMOOTH, Visits
 
 Report = Callable[[float], None]
 
@@ -99,8 +100,7 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
 
     `progress` is called with the share of orders decided.
 
-    Dynamic programming over (visited, last) if every visit is a rendezvous, as a leg's cost then depends on its two
-    ends only; otherwise branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
+    Branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
 
     Raises
     ------
@@ -122,8 +122,6 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
             "no order fits the times: in each one a stay ends after the next visit; make times farther apart, or "
             "stays shorter"
         )
-    if isinstance(tour, Tour) and all(target.meet is Meet.RENDEZVOUS for target in tour.targets.targets):
-        return _by_dynamic_programming(tour, times, fits, unfit)
 
     def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Flown]:
         flown = tour.flyer(order)(times[: len(order)])
@@ -251,48 +249,3 @@ def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) ->
         except NoRoomError:
             unfit += factorial(len(dwell_s) - 1)
     return unfit
-
-
-def _unvisited(slot: Flags, visited: frozenset[int]) -> list[int]:
-    return [target for target in np.flatnonzero(slot).tolist() if target not in visited]
-
-
-def _by_dynamic_programming(tour: Tour, times: Floats, fits: Flags, unfit: int) -> BestOrder:
-    """Held and Karp's recursion over sets of visited targets."""
-    count, targets, dwell = len(times), tour.targets, tour.dwell_s
-    best: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
-    lost: list[tuple[int, ...]] = []
-    evaluations = 0
-
-    def leg_cost(start_s: float, start: Floats, target: int, slot: int) -> float:
-        """Return the cost of a leg; infinite if no path is found."""
-        nonlocal evaluations
-        evaluations += 1
-        try:
-            leg = nodes_of(targets, (target,), times[slot : slot + 1])
-            return solve_segments(tour.motion, start_s, start, leg).cost
-        except NotSettledError:
-            lost.append((target,))
-            return np.inf
-
-    for target in _unvisited(fits[0], frozenset()):
-        best[frozenset([target]), target] = leg_cost(tour.start_s, tour.start_state, target, 0), (target,)
-    for slot in range(1, count):
-        legs = {}
-        for first in _unvisited(fits[slot - 1], frozenset()):
-            leave_s = float(times[slot - 1] + dwell[first])
-            start = targets.states(np.array([first]), np.array([leave_s]))[0]
-            for second in _unvisited(fits[slot], frozenset([first])):
-                legs[first, second] = leg_cost(leave_s, start, second, slot)
-        longer: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
-        for (visited, last), (cost, order) in best.items():
-            for target in _unvisited(fits[slot], visited):
-                key, total = (visited | {target}, target), cost + legs[last, target]
-                if key not in longer or total < longer[key][0]:
-                    longer[key] = total, (*order, target)
-        best = longer
-    cost, order = min(best.values())
-    if not np.isfinite(cost):
-        raise NotSettledError("no path was found for any order; give visits more time")
-    path = tour.fly(order, times)
-    return BestOrder(order, path, path.cost, len(best), evaluations + 1, tuple(lost), unfit)

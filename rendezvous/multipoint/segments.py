@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.linalg import solveh_banded
 
 from rendezvous._arrays import Flags, Floats, Integers
-from rendezvous.relative_motion import LinearMotion, TimeVaryingMotion
+from rendezvous.relative_motion import LinearMotion
 from rendezvous.relative_motion.linear_motion import state_scales
 
 
@@ -33,25 +32,6 @@ class Nodes:
 
 class NotSettledError(ValueError):
     """No path of minimum energy was found; one may still exist."""
-
-
-class Flown(Protocol):
-    """The properties of a path that the choice of times uses."""
-
-    @property
-    def nodes(self) -> Nodes:
-        """Nodes of the path."""
-
-    @property
-    def cost(self) -> float:
-        """I = 1/2 int |u|^2 dt, m^2/s^3."""
-
-    @property
-    def time_gradient(self) -> Floats:
-        """Slopes dI / dt_i, shape (N,)."""
-
-    def settled(self) -> Path:
-        """Return the complete path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +75,8 @@ class Path:
         return self
 
     def costate(self, time_s: Floats) -> Floats:
-        """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times: after the jump at a node, zero during a stay.
-
-        From the end of each segment where the motion has a closed form; else together with the states.
-        """
-        if isinstance(self.motion, TimeVaryingMotion):
-            return self.along(time_s)[1]
-        times = np.asarray(time_s, dtype=np.float64)
-        which, moving = self._segment_of(times)
-        back = self.motion.transition(times, np.where(moving, self.nodes.arrive_s[which], times))
-        return np.asarray(np.where(moving[:, None], np.einsum("kba,kb->ka", back, self.costate_before[which]), 0.0))
+        """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times: after the jump at a node, zero during a stay."""
+        return self.along(time_s)[1]
 
     def control(self, time_s: Floats) -> Floats:
         """Return u = B' lambda, m/s^2, shape (k, 3), at k times."""

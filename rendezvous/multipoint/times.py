@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 
 from rendezvous._arrays import Floats
 from rendezvous._halton import halton
-from rendezvous.multipoint.segments import Flown, NotSettledError, Path
+from rendezvous.multipoint._shooting import Flown
+from rendezvous.multipoint.segments import NotSettledError, Path
 
 FlyAt = Callable[[Floats], Flown]
 

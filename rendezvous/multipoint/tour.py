@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats, Integers
-from rendezvous.multipoint.segments import Flown, Nodes, Path, solve_segments
+from rendezvous.multipoint._shooting import Flown
+from rendezvous.multipoint.segments import Nodes, Path, solve_segments
 from rendezvous.relative_motion import LinearMotion
 
 SMOOTH = 4.0 / 3.0

@@ -8,15 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from rendezvous._arrays import Flags, Floats, Places
+from rendezvous._arrays import Floats, Places
 from rendezvous.reachability.conic import MAX_GAP, ConeProgram, NoSolutionError, Optimum
 from rendezvous.reachability.problem import Block
 
 Constraints = tuple[Floats, Floats, Places, Places]
 
 _BROKEN = 3e-10
-_NEAR = 2
-_MANY_ROWS = 200
 _STILL = 1e-9
 
 
@@ -322,14 +320,14 @@ class Maximiser:
     """Maximise many linear functions over one set of controls, which is not empty.
 
     An interior-point method (Clarabel) reuses the factors that depend on the constraints only; the simplex method
-    (HiGHS) solves the programs on which it fails. Most constraints on states are never active. If there are many, the
-    maximiser starts without them, and adds a constraint at neighbouring times once a solution violates it.
+    (HiGHS) solves the linear programs on which it fails.
     """
 
     def __init__(self, lifted: Lifted) -> None:
         self._lifted = lifted
-        soft = lifted.moments >= 0
-        self._use(np.ones(len(soft), dtype=bool) if soft.sum() < _MANY_ROWS else ~soft)
+        self._program = self._with_cost(np.zeros(lifted.size))
+        if lifted.size:
+            self._solver = self._program.solver()
 
     def maximise(self, cost: Floats, max_gap: float = MAX_GAP) -> Floats:
         """Return a maximiser of a linear function, both of shape (p,), with at most this duality gap."""
@@ -345,46 +343,24 @@ class Maximiser:
         The solution takes the shortest step onto the rows whose multipliers are above their slacks: one more
         least-squares problem.
         """
-        optimum = self._solved(cost)
-        if not self._lifted.size or self._lifted.ball:
+        lifted, optimum = self._lifted, self._solved(cost)
+        if not lifted.size or lifted.ball:
             return optimum.point
-        rows, limits = self._lifted.rows[self._used], self._lifted.limits[self._used]
-        active = optimum.multipliers > limits - rows @ optimum.point
-        held = np.vstack([self._lifted.equal, rows[active]])
-        missing = np.concatenate([self._lifted.levels, limits[active]]) - held @ optimum.point
+        active = optimum.multipliers > lifted.limits - lifted.rows @ optimum.point
+        held = np.vstack([lifted.equal, lifted.rows[active]])
+        missing = np.concatenate([lifted.levels, lifted.limits[active]]) - held @ optimum.point
         moved = optimum.point + np.linalg.lstsq(held, missing, rcond=1e-12)[0]
-        kept = float((self._lifted.limits - self._lifted.rows @ moved).min(initial=0.0)) > -_BROKEN
+        kept = float((lifted.limits - lifted.rows @ moved).min(initial=0.0)) > -_BROKEN
         return moved if kept else optimum.point
 
-    def _use(self, used: Flags) -> None:
-        self._used = used
-        self._program = self._with_cost(np.zeros(self._lifted.size))
-        if self._lifted.size:
-            self._solver = self._program.solver()
-
     def _with_cost(self, cost: Floats) -> ConeProgram:
-        lifted, used = self._lifted, self._used
-        program = ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows[used], lifted.limits[used])
+        lifted = self._lifted
+        program = ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows, lifted.limits)
         return with_thrust(program, lifted)
 
     def _solved(self, cost: Floats, max_gap: float = MAX_GAP) -> Optimum:
-        lifted = self._lifted
-        if not lifted.size:
-            return Optimum(np.zeros(0), np.zeros(int(self._used.sum())))
-        while True:
-            optimum = self._with_rows_used(cost, max_gap)
-            used = self._used
-            if used.all():
-                return optimum
-            broken = (lifted.rows @ optimum.point - lifted.limits > _BROKEN) & ~used
-            if not broken.any():
-                return optimum
-            for row in np.flatnonzero(broken):
-                near = np.abs(lifted.moments - lifted.moments[row]) <= _NEAR
-                used = used | (near & (lifted.labels == lifted.labels[row]))
-            self._use(used)
-
-    def _with_rows_used(self, cost: Floats, max_gap: float) -> Optimum:
+        if not self._lifted.size:
+            return Optimum(np.zeros(0), np.zeros(len(self._lifted.rows)))
         size = float(np.abs(cost).max())
         down = -cost / (size if size > 0.0 else 1.0)
         self._solver.update(q=down)
@@ -394,4 +370,4 @@ class Maximiser:
         except NoSolutionError:
             if self._lifted.ball:
                 raise
-            return Optimum(self._with_cost(down).vertex(), np.zeros(int(self._used.sum())))
+            return Optimum(self._with_cost(down).vertex(), np.zeros(len(self._lifted.rows)))
