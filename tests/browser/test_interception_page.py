@@ -108,38 +108,6 @@ def test_hover_shows_the_records_numbers(open_page: Open, single: str, records: 
     assert range_km == pytest.approx(step.true_range_m / 1e3, rel=SIX_DIGITS)
 
 
-def test_hover_on_a_section_shows_its_extent_and_its_predicted_miss(
-    open_page: Open, single: str, records: list[Record]
-) -> None:
-    opened = open_page(single)
-    page = opened.page
-    page.get_by_label("Sections drawn").select_option("1")
-    page.evaluate("player.show(5)")
-    step = records[1].steps[1]
-    section = step.sections[len(step.sections) // 2]
-    corners = section.omega_alpha.polygon()
-    middle = corners.mean(axis=0).tolist()
-    units = "columns[0].limits.rateUnit[1]", "columns[0].limits.angleUnit[1]"
-    opened.point_at(
-        "columns[0].plane", f"columns[0].plane.at([[{middle[0]!r} * {units[0]}, {middle[1]!r} * {units[1]}]])[0]"
-    )
-    text = opened.tip()
-    range_km, label_km, zero, *rest = numbers(text)
-    minimum, maximum = corners.min(axis=0), corners.max(axis=0)
-    angle_factor = 1e6 if "µrad\n" in text else 1e3
-    assert [range_km, label_km, zero] == pytest.approx(
-        [section.range_m / 1e3, section.label_m / 1e3, 0.0], rel=SIX_DIGITS
-    )
-    assert rest[:4] == pytest.approx(
-        [minimum[0] * 1e6, maximum[0] * 1e6, minimum[1] * angle_factor, maximum[1] * angle_factor], rel=SIX_DIGITS
-    )
-    assert rest[-1] == len(corners)
-    e, nu = section.closing_speed_m_s, records[1].scenario.set_model.disturbance_m_s2
-    spread = 0.5 * nu * (section.range_m / e) ** 2  # equations (13) and (14), on this section
-    wanted = [each * section.range_m**2 / e for each in (minimum[0], maximum[0])]
-    assert rest[4:6] == pytest.approx([wanted[0] - spread, wanted[1] + spread], rel=SIX_DIGITS)
-
-
 def test_outlines_are_the_records_within_a_pixel(open_page: Open, single: str, records: list[Record]) -> None:
     opened = open_page(single)
     for step in (0, 50, STEP, 200):
@@ -172,22 +140,6 @@ def test_the_stages_follow_from_each_other(open_page: Open, single: str, records
     np.testing.assert_allclose(predicted[:, 1], fired[-len(predicted) :, 1] - nearer, rtol=1e-12)
 
 
-def test_choosing_sections_and_stages(open_page: Open, single: str) -> None:
-    opened = open_page(single)
-    page = opened.page
-    page.evaluate("player.show(1)")
-    for wanted in ("1", "3", "11"):
-        page.get_by_label("Sections drawn").select_option(wanted)
-        assert page.evaluate("columns[0].chosen(columns[0].sections).length") == int(wanted)
-    page.get_by_label("Sections drawn").select_option("all")
-    assert page.evaluate("columns[0].chosen(columns[0].sections).length === columns[0].sections.length")
-    page.get_by_label("Alone").select_option("section 3")
-    assert page.evaluate("columns[0].chosen(columns[0].sections)[0] === columns[0].sections[2]")
-    page.get_by_label("Stages of a step").select_option("after the measurement")
-    page.keyboard.press("ArrowRight")
-    assert opened.shown_at() == "t = 0.5 s, after the measurement"
-
-
 def test_two_records_side_by_side(open_page: Open, pair: str, records: list[Record], screenshots: Path) -> None:
     opened = open_page(pair)
     page = opened.page
@@ -210,50 +162,6 @@ def test_two_records_side_by_side(open_page: Open, pair: str, records: list[Reco
     page.get_by_label("Axes").select_option("each its own")
     assert page.evaluate("columns[0].limits.rates[1] < columns[1].limits.rates[1]")
     page.screenshot(path=screenshots / "interception-pair.png", full_page=True)
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1300])
-def test_light_and_dark_wide_and_narrow(
-    open_page: Open, single: str, screenshots: Path, width: int, scheme: str
-) -> None:
-    opened = open_page(single, width, scheme)
-    page = opened.page
-    page.evaluate("player.show(401)")
-    assert page.evaluate("document.documentElement.dataset.theme") == scheme
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    for name in ("Play", "One on"):
-        box = page.get_by_role("button", name=name).bounding_box()
-        assert box is not None
-        assert 0 <= box["x"] <= width - box["width"]
-    page.wait_for_timeout(50)
-    page.screenshot(path=screenshots / f"interception-{width}-{scheme}.png", full_page=True)
-    page.locator("#theme").click()
-    assert page.evaluate("document.documentElement.dataset.theme") != scheme
-
-
-def test_it_can_be_used_by_keyboard_and_read_aloud(open_page: Open, single: str) -> None:
-    opened = open_page(single)
-    page = opened.page
-    page.evaluate(f"player.show({MEASURED})")
-    unlabelled = page.evaluate(
-        "[...document.querySelectorAll('button, input, select, canvas:not([aria-hidden])')]"
-        ".filter((each) => !(each.getAttribute('aria-label') || each.labels?.length || each.textContent.trim())).length"
-    )
-    assert unlabelled == 0
-    label = page.locator("canvas[role=img]").nth(2).get_attribute("aria-label")
-    assert "predicted miss from" in label
-    reached = set()
-    for _ in range(30):
-        page.keyboard.press("Tab")
-        reached.add(
-            page.evaluate("document.activeElement.getAttribute('aria-label') || document.activeElement.textContent")
-        )
-    assert {"Time", "Play", "Turn left", "Tilt up", "Switch to dark colours"} <= reached
-    before = page.evaluate("columns[0].scene.azimuth")
-    page.get_by_role("button", name="Turn left").focus()
-    page.keyboard.press("Enter")
-    assert page.evaluate("columns[0].scene.azimuth") != before
 
 
 HOSTILE = "<img src=x onerror=alert(1)>"

@@ -90,64 +90,6 @@ def test_an_impulse_moves_the_rectangles(open_page: Open, page: str, space: list
     np.testing.assert_allclose(boxes[1], boxes[0] - times_s[:, None] * impulse, atol=1e-6)
 
 
-def test_numbers_name_the_axes(open_page: Open, page: str, space: list[Record]) -> None:
-    opened = open_page(page)
-    opened.page.evaluate(f"player.show({MEASURED})")
-    cells = opened.page.locator("table").first.locator("th, td").all_inner_texts()
-    rows = dict(zip(*[iter(cells)] * 2, strict=True))
-    step = space[1].steps[STEP]
-    for axis in AXES:
-        along = step.axes[axis]
-        assert along.predicted_miss_m is not None
-        assert numbers(rows[f"predicted miss along {axis}"]) == pytest.approx(along.predicted_miss_m, rel=SIX_DIGITS)
-        assert numbers(rows[f"measured angle along {axis}"]) == pytest.approx(
-            [along.measured["angle"] * 1e3], rel=SIX_DIGITS
-        )
-    assert {rows[name] for name in ("impulse along y", "impulse along z", "impulse modulus")} == {"not yet"}
-    spent = sum(each.impulse_m_s for each in space[1].steps[:STEP])
-    budget = space[1].scenario.thruster.budget_m_s
-    assert numbers(rows["budget left"]) == pytest.approx([budget - spent], rel=SIX_DIGITS)
-    opened.page.evaluate(f"player.show({IMPULSE})")
-    cells = opened.page.locator("table").first.locator("th, td").all_inner_texts()
-    rows = dict(zip(*[iter(cells)] * 2, strict=True))
-    for axis in AXES:
-        impulse = step.axes[axis].impulse_m_s
-        assert numbers(rows[f"impulse along {axis}"]) == pytest.approx([impulse], rel=SIX_DIGITS)
-    assert numbers(rows["impulse modulus"]) == pytest.approx([step.impulse_m_s], rel=SIX_DIGITS)
-    spent = sum(each.impulse_m_s for each in space[1].steps[: STEP + 1])
-    assert numbers(rows["budget left"]) == pytest.approx([budget - spent], rel=SIX_DIGITS)
-
-
-def test_hover_in_the_b_plane(open_page: Open, page: str, space: list[Record]) -> None:
-    opened = open_page(page)
-    opened.page.get_by_label("Sections drawn").select_option("1")
-    opened.page.evaluate(f"player.show({MEASURED})")
-    panel = "engagements[0].joint[0]"
-    box = opened.page.evaluate(f"{panel}.rectangles(MEASURED, false)")[0]
-    near = [0.9 * box[0] + 0.1 * box[2], 0.9 * box[3] + 0.1 * box[1]]
-    opened.point_at(f"{panel}.chart", f"{panel}.chart.at([{panel}.place({near})])[0]")
-    text = opened.tip()
-    found = numbers(text)
-    assert found[3:] == pytest.approx([box[0], box[2], box[1], box[3]], rel=SIX_DIGITS)
-    assert "predicted miss along y from" in text
-    truth = f"{panel}.place({panel}.columns.map((column) => column.truth.miss))"
-    opened.point_at(f"{panel}.chart", f"{panel}.chart.at([{truth}])[0]")
-    assert opened.tip().startswith("true predicted miss\nalong y ")
-    label = opened.page.evaluate(f"{panel}.chart.canvas.getAttribute('aria-label')")
-    assert "predicted miss along z from" in label
-
-
-@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1300, "light")])
-def test_wide_and_narrow(open_page: Open, page: str, screenshots: Path, width: int, scheme: str) -> None:
-    opened = open_page(page, width, scheme)
-    opened.page.evaluate(f"player.show({MEASURED})")
-    assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
-    opened.page.keyboard.press("ArrowRight")
-    assert opened.shown_at() == "t = 60 s, after the impulse"
-    opened.page.wait_for_timeout(50)
-    opened.page.screenshot(path=screenshots / f"space-{width}-{scheme}.png", full_page=True)
-
-
 def test_engagements_in_space_and_in_a_plane_side_by_side(
     open_page: Open, space: list[Record], records: list[Record], screenshots: Path
 ) -> None:
@@ -161,15 +103,6 @@ def test_engagements_in_space_and_in_a_plane_side_by_side(
     assert page.evaluate("columns[0].limits === columns[2].limits")
     assert page.evaluate("engagements.map((engagement) => engagement.joint.length)") == [0, 1]
     page.screenshot(path=screenshots / "space-and-plane.png", full_page=True)
-
-
-def test_two_engagements_in_space_share_their_limits(open_page: Open, space: list[Record]) -> None:
-    page = open_page(interception_page(space)).page
-    page.evaluate(f"player.show({MEASURED})")
-    limits = "JSON.stringify(engagements[0].joint[0].limits) === JSON.stringify(engagements[1].joint[0].limits)"
-    assert page.evaluate(limits)
-    page.get_by_label("Axes").select_option("each its own")
-    assert not page.evaluate(limits)
 
 
 def test_two_long_flights_have_the_same_steps() -> None:
@@ -229,18 +162,6 @@ def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screensh
     assert {section.label_m for section in after.sections} <= set(labels)
     truth = [page.evaluate(f"columns[{k}].truth.angle") for k in (0, 1)]
     assert truth == [after.axes[axis].true_angle_rad for axis in AXES]
-
-
-def test_an_image_outside_the_window_is_none(open_page: Open, long_flight: Record) -> None:
-    record = long_flight
-    opened = open_page(interception_page([record]))
-    kept = kept_steps(record)
-    for index in (0, len(record.steps) - 1):
-        assert "angle" not in record.steps[index].measured
-        opened.page.evaluate(f"player.show({4 * kept.index(index)})")
-        assert rows_of(opened)["measured angle along y"] == "not yet"
-        opened.page.evaluate(f"player.show({4 * kept.index(index) + 1})")
-        assert rows_of(opened)["measured angle along y"] == "none"
 
 
 def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Record) -> None:

@@ -31,12 +31,6 @@ KEYS = [
 BUDGET = 12
 
 
-def test_help_has_an_example(infoset: Command) -> None:
-    code, out, _ = infoset("adversary", "--help")
-    assert code == 0
-    assert "Example: infoset adversary" in out
-
-
 def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_path: Path) -> None:
     code, out, err = infoset(
         "adversary", "--budget", BUDGET, "--seed", 5, "--record", "worst.npz", "--json", "-", "--quiet"
@@ -167,20 +161,12 @@ def test_the_worst_in_a_folder_as_engage_writes_it(infoset: Command, tmp_path: P
     assert "exists already" in err
 
 
-def test_quiet_prints_nothing(infoset: Command) -> None:
-    assert infoset("adversary", "--budget", 1, "-q", "--json", "out.json") == (0, "", "")
-    found = json.loads(Path("out.json").read_text())
-    assert (found["evaluations"], found["record"]) == (1, None)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--budget", "0"], "--budget"),
         (["--record", "worst.txt"], "--record: worst.txt must end in .npz"),
-        (["--record", "there.npz"], "there.npz: exists already; choose another name, or give --overwrite"),
-        (["--json", "there.npz"], "there.npz: exists already"),
-        (["--strategy", "symetric-miss"], '--strategy: there is no "symetric-miss"; did you mean symmetric-miss?'),
-        (["asteroid-1998"], "asteroid-1998"),
+        (["--record", "there.npz"], "there.npz: exists already"),
         (["asteroid-1997-single", "--range-sensor"], "has no [range_sensor]"),
     ],
 )
@@ -188,12 +174,6 @@ def test_what_is_refused_before_anything_is_flown(arguments: list[str], message:
     Path("there.npz").write_text("something")
     assert message in infoset.refused("adversary", *arguments)
     assert Path("there.npz").read_text() == "something"
-
-
-def test_an_existing_record_is_replaced_when_told(infoset: Command) -> None:
-    Path("worst.npz").write_text("something")
-    assert infoset("adversary", "--budget", 1, "--record", "worst.npz", "--overwrite", "-q")[0] == 0
-    assert load_record("worst.npz").noise == "worst-found"
 
 
 def test_where_no_engagement_counts_it_is_said(infoset: Command, tmp_path: Path) -> None:

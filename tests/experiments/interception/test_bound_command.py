@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -164,22 +163,6 @@ def test_value_where_range_and_speed_are_known(infoset: Infoset, short: Scenario
     assert IS_VALUE not in out
 
 
-@pytest.mark.usefixtures("known")
-def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
-    code, out, err = infoset(
-        short_file, "--strategies", "symmetric-miss", "--model", "paper", "--json", "-", "--budget", 0
-    )
-    assert code == 0
-    found: Any = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-    (only,) = found["strategies"]
-    assert only["name"] == "symmetric-miss"
-    assert only["guaranteed_m"] is None
-    assert only["worst_of_search_m"] is None
-    assert "symmetric-miss" in err
-    assert [each.name for each in tmp_path.iterdir()] == ["short.toml"]
-    assert infoset(short_file, "--strategies", "patient", "-q", "--budget", 0) == (0, "", "")
-
-
 @pytest.mark.usefixtures("unrendered")
 def test_bound_in_space(infoset: Infoset, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
     spatial = in_space(short)
@@ -210,48 +193,6 @@ def test_bound_in_space(infoset: Infoset, short: Scenario, planar: LowerBound, t
     assert right.get_ylabel() == "offset from the midpoint, m"
     half = right.get_lines()[2].get_ydata()[-1]  # type: ignore[index]
     assert half == pytest.approx(0.5 * expected.pair.apart_m)
-
-
-def test_help_has_an_example(infoset: Infoset) -> None:
-    code, out, _ = infoset("--help")
-    assert code == 0
-    assert "Example: infoset bound" in out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
-        (["--strategies", "patent"], ["--strategies", "did you mean patient?"]),
-        (["--strategies", "patient,patient"], ["named twice"]),
-    ],
-)
-def test_what_is_wrong_is_said_before_the_work(
-    arguments: list[str], parts: list[str], infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(
-        "experiments.interception.runs.bound.lower_bound", lambda *_, **__: pytest.fail("began to work")
-    )
-    code, out, err = infoset(*arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("error: ")
-    assert err.count("error: ") == 1
-    for part in parts:
-        assert part in err
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.usefixtures("known")
-def test_nothing_is_replaced_unless_told(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
-    precious = tmp_path / "x.json"
-    precious.write_text("precious")
-    code, _, err = infoset(short_file, "--json", precious)
-    assert code == 2
-    assert "--overwrite" in err
-    assert precious.read_text() == "precious"
-    asked = (short_file, "--strategies", "patient", "--budget", 0)
-    assert infoset(*asked, "--json", precious, "--overwrite", "-q")[0] == 0
-    assert json.loads(precious.read_text())["scenario"] == "short"
 
 
 def test_a_program_without_a_solution_is_one_message(

@@ -84,24 +84,6 @@ def test_the_figures_are_those_of_the_simulator_and_the_worst_tie_rule_counts(
     assert found[1]["ties"]["lower"]["miss_m"] == summary(game[1].miss_m)
 
 
-def test_what_is_said_is_told_apart_from_what_is_piped(infoset: Infoset, brief_file: Path) -> None:
-    code, out, err = infoset(brief_file, *TWO, "--runs", 1, "--json", "-")
-    assert code == 0
-    json.loads(out)
-    assert "impulse, m/s" in err
-    assert infoset(brief_file, *TWO, "--runs", 1, "--quiet") == (0, "", "")
-
-
-def test_the_table(infoset: Infoset) -> None:
-    code, out, _ = infoset(*TWO, "--runs", 2, "--no-range-sensor")
-    assert code == 0
-    assert "asteroid-1997, without range sensor, model guaranteed: quantiles of 2 runs" in out
-    for part in ("p10", "p50", "p99", "max", "symmetric-miss  miss, m", "impulse, m/s", "random", "game"):
-        assert part in out
-    lines = [line.rstrip() for line in out.splitlines()[1:] if not line.startswith("game noise (")]
-    assert max(map(len, lines)) <= 80
-
-
 def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Path) -> None:
     asked = (brief_file, *TWO)
     assert infoset(*asked, "--runs", 3, "--out", "out", "--csv", "beside.csv", "--no-range-sensor")[0] == 0
@@ -126,44 +108,9 @@ def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Pat
     assert (tmp_path / "out" / "results.csv").read_text() != text
 
 
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["--strategies", "pateint"], ["--strategies", "did you mean patient?", "symmetric-miss"]),
-        (["--strategies", "patient,,"], ["--strategies", "choose one of"]),
-        (["--strategies", ""], ["--strategies", "choose one of"]),
-        (["--strategies", "patient,patient"], ["patient is named twice"]),
-        (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
-        (["asteroid-1997-single", "--range-sensor"], ["--range-sensor", "[range_sensor]"]),
-    ],
-)
-def test_what_is_wrong_is_said_before_the_work(
-    arguments: list[str], parts: list[str], infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("sim.parallel.simulate", lambda *_: pytest.fail("began to work"))
-    code, out, err = infoset(*arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("error: ")
-    assert err.count("error: ") == 1
-    for part in parts:
-        assert part in err
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_an_unknown_strategy_is_told_all_there_are(infoset: Infoset) -> None:
-    err = infoset("--strategies", "none-such")[2]
-    assert all(name in err for name in strategy_names())
-
-
 def test_the_strategies_of_a_comparison(infoset: Infoset, brief_file: Path) -> None:
     found = as_json(infoset, brief_file, "--runs", 1)["strategies"]
     assert [each["name"] for each in found[::2]] == strategy_names()
-
-
-def test_help_has_an_example(infoset: Infoset) -> None:
-    code, out, _ = infoset("--help")
-    assert code == 0
-    assert "Example: infoset compare" in out
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +14,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-import infoset
 import sim
-from experiments import find_worst, fly_one, load_record, load_scenario, lower_bound, plot, save, simulate
+from experiments import find_worst, fly_one, load_scenario, lower_bound, plot, save, simulate
 from experiments.common.errors import InputError
 from sim import Record, Results
 from sim.results import join
@@ -58,19 +56,6 @@ def test_unknown_names_are_refused() -> None:
         simulate("nowhere", 1)
     with pytest.raises(ValueError, match="no strategy is called 'patience'"):
         simulate(NAME, 1, strategy="patience")
-
-
-def test_the_repr_of_a_record_is_two_lines(record: Record) -> None:
-    assert len(repr(record).splitlines()) == 2
-    assert len(repr(record)) < 300
-    assert "patient" in repr(record)
-
-
-def test_a_record_comes_back(record: Record, tmp_path: Path) -> None:
-    save(record, tmp_path / "flight.npz")
-    assert load_record(tmp_path / "flight.npz").result.to_dict() == record.result.to_dict()
-    with pytest.raises(InputError, match=r"must end in \.npz"):
-        save(record, tmp_path / "flight.csv")
 
 
 def test_results_are_saved_by_suffix(results: Results, tmp_path: Path) -> None:
@@ -133,8 +118,3 @@ def test_pandas_gets_the_columns(results: Results, monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ModuleNotFoundError, match="pip install pandas"):
         results.to_pandas()
-
-
-def test_the_version_and_the_command_of_the_package() -> None:
-    done = subprocess.run([sys.executable, "-m", "infoset", "--version"], capture_output=True, text=True, check=True)
-    assert infoset.__version__ in done.stdout

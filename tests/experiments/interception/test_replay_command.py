@@ -95,12 +95,6 @@ def test_figure_3_at_other_times(file: Path, tmp_path: Path, capsys: pytest.Capt
         assert f"--times: {part}" in capsys.readouterr().err
 
 
-def test_an_animation_has_the_suffix_gif(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert replay(file, "--gif", "a.png") == 2
-    assert "--gif: a.png must end in .gif" in capsys.readouterr().err
-    assert [each.name for each in file.parent.iterdir()] == ["a.npz"]
-
-
 def test_times_that_draw_nothing_are_refused(infoset: Command, brief_file: Path) -> None:
     code, _, err = infoset("engage", brief_file, "--times", "1")
     assert (code, "--times: chooses the sets of figure 3, which only --out DIR writes" in err) == (2, True)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import pytest
 
 from experiments import load_scenario
-from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.common.errors import InputError
 from experiments.common.input_file import read_text, to_toml
 from experiments.interception.scenario_file import scenario_warnings
@@ -74,34 +72,6 @@ def test_measurements_after_the_last_impulse_are_warned_of() -> None:
         )
         assert len(lines) == number
         assert [after_cut_off in line for line in lines].count(True) == 1
-
-
-def test_a_camera_without_images_is_warned_of() -> None:
-    assert scenario_warnings(camera(angle_sensor__last_image_s="1e6")) == [
-        "angle_sensor.last_image_s is 1e+06 s, and the nominal arrival is 100.022 s after the start: no image is taken"
-    ]
-
-
-def test_a_delay_beyond_the_arrival_is_warned_of() -> None:
-    (warning,) = scenario_warnings(camera(thruster__delay_steps="100000"))
-    assert warning.startswith("thruster.delay_steps is 100000, which is 50000 s, and ")
-
-
-def test_sweeps_vary_the_camera_and_the_cut_off() -> None:
-    scenario = camera()
-    axes = sweep_axes("angle_sensor.pixel_error_rad=1e-6:5e-6:2,thruster.last_impulse_s=5:20:2", scenario)
-    cells = sweep_cells(scenario, axes)
-    sensors = [cell.set_model.angle_sensor for cell in cells]
-    assert [sensor.pixel_error_rad for sensor in sensors] == [1e-6, 1e-6, 5e-6, 5e-6]
-    assert [cell.thruster.last_impulse_s for cell in cells] == [5.0, 20.0, 5.0, 20.0]
-    (axis,) = sweep_axes("angle_sensor.scale=1:2:2", scenario)
-    doubled = replace(sensors[2], centroid_error_m=40.0, pixel_error_rad=1e-5)
-    assert sweep_cells(scenario, [axis])[1].set_model.angle_sensor == doubled
-    (axis,) = sweep_axes("thruster.delay_steps=0:3:4", load_scenario("asteroid-1997"))
-    assert axis.values == (0.0, 1.0, 2.0, 3.0)
-    timed = camera(thruster__impulses_s="[50.0, 20.0]")
-    with pytest.raises(InputError, match="no numeric key"):
-        sweep_axes("thruster.impulses_s.min=1:2:2", timed)
 
 
 def test_impulses_after_the_cut_off_are_named() -> None:

@@ -2,26 +2,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
+import random
 import re
-import subprocess
-import sys
 
 import pytest
-from hypothesis import given, reject, settings
-from hypothesis import strategies as st
 
 from experiments.common.errors import InputError
 from experiments.common.input_file import read_text, to_toml
 from experiments.common.units import si_factor
 from experiments.interception.scenario_file import load_scenario, scenario_warnings, with_model
-from guidance import strategy_names
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Model, SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
-from sim.gravity import on_board_model
-from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target, of_model
+from sim.scenario import Body, Scenario, Sun, Target, of_model
 from sim.storage.codec import fingerprint
 from tests.built_in import scenario_names, scenario_text
 
@@ -76,13 +70,6 @@ def test_single_scenario_is_the_paper_s_from_one_start() -> None:
         )
         == paper
     )
-
-
-def test_third_scenario_shares_no_number_with_the_paper() -> None:
-    paper, other = load_scenario("asteroid-1997").set_model, load_scenario("comet-fast").set_model
-    assert paper.angle_sensor.period_s != other.angle_sensor.period_s
-    for field in ("closing_speed_m_s", "step_s", "bounds", "sections", "fewest_sections", "disturbance_m_s2"):
-        assert getattr(paper, field) != getattr(other, field)
 
 
 @pytest.mark.parametrize("name", scenario_names())
@@ -166,14 +153,6 @@ def test_gravity_that_changes_the_closing_speed_by_more_than_the_model_allows() 
         load_scenario("own-scenario", ["sun.distance_km=9e3", "sun.gravitational_parameter_km3_s2=8e7"])
 
 
-def test_impulses_that_lead_near_the_attracting_body() -> None:
-    """A budget without end is spent in impulses that the engine can give."""
-    endless = "thruster.budget_m_s=1e12"
-    assert on_board_model(load_scenario("own-scenario", [endless])).speed_error < 0.02
-    with pytest.raises(InputError, match="gravity has no bound: the motions may come too near"):
-        load_scenario("own-scenario", [endless, "thruster.max_impulse_m_s=1e12"])
-
-
 def test_steep_lines_of_sight_in_the_papers_model_are_warned_of() -> None:
     (line,) = scenario_warnings(changed("uncertainty.z_km=[-100, 10]"))
     assert "0.0189 rad" in line
@@ -196,19 +175,6 @@ def test_fingerprint_is_of_the_values_not_of_the_writing() -> None:
     zero = dataclasses.replace(scenario, dispersion=dataclasses.replace(scenario.dispersion, z_m=(-0.0, 0.0)))
     positive = dataclasses.replace(scenario, dispersion=dataclasses.replace(scenario.dispersion, z_m=(0.0, 0.0)))
     assert fingerprint(zero) == fingerprint(positive)
-
-
-def test_hash_is_the_same_in_another_process() -> None:
-    # The seed of the hashes of Python differs from that of this process.
-    hash_seed = "0" if os.environ.get("PYTHONHASHSEED") == "1" else "1"
-    code = (
-        "from experiments.interception.scenario_file import load_scenario;"
-        "from sim.storage.codec import fingerprint;"
-        "print(fingerprint(load_scenario('asteroid-1997')))"
-    )
-    environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
-    assert shown.stdout.strip() == fingerprint(load_scenario("asteroid-1997"))
 
 
 def test_hash_tells_choices_apart() -> None:
@@ -242,106 +208,15 @@ def test_warning(setting: str, part: str) -> None:
     assert part in warning
 
 
-def _floats(minimum: float, maximum: float) -> st.SearchStrategy[float]:
-    return st.floats(minimum, maximum).filter(lambda value: value == 0 or abs(value) > 1e-90)
-
-
-def _intervals(minimum: float, maximum: float) -> st.SearchStrategy[tuple[float, float]]:
-    return st.tuples(_floats(minimum, maximum), _floats(minimum, maximum)).map(lambda ends: (min(ends), max(ends)))
-
-
-def _boxes(*, is_spatial: bool) -> st.SearchStrategy[StateBox]:
-    second_axis = {"y_m": _intervals(-5e5, 5e5), "vy_m_s": _intervals(-3e4, 3e4)} if is_spatial else {}
-    return st.builds(
-        StateBox,
-        z_m=_intervals(-5e5, 5e5),
-        x_m=_intervals(1e6, 2e7),
-        vz_m_s=_intervals(-3e4, 3e4),
-        vx_m_s=_intervals(-9e4, -1e3),
-        **second_axis,
-    )
-
-
-@st.composite
-def _in_space(draw: st.DrawFn, planar: Scenario) -> Scenario:
-    """Every value of space, over all that it permits."""
-    sensor, model, sun = planar.set_model.angle_sensor, planar.set_model, planar.sun
-    at_zero = draw(st.none() | st.just(0.0) | _floats(0.0, sensor.constant_error_rad))
-    at_nominal = draw(st.none() | _floats(sensor.constant_error_rad, 0.9))
-    sensor = dataclasses.replace(sensor, error_at_zero_range_y_rad=at_zero, error_at_nominal_range_y_rad=at_nominal)
-    return dataclasses.replace(
-        planar,
-        sun=sun and dataclasses.replace(sun, elevation_rad=draw(_floats(-0.5 * math.pi, 0.5 * math.pi))),
-        dispersion=draw(_boxes(is_spatial=True)),
-        **of_model(
-            dataclasses.replace(
-                model,
-                bounds=dataclasses.replace(
-                    model.bounds, y_m=draw(_intervals(-5e5, 5e5)), vy_m_s=draw(_intervals(-3e4, 3e4))
-                ),
-                angle_sensor=sensor,
-                disturbance_y_m_s2=draw(st.none() | _floats(0.0, 1.0)),
-            )
-        ),
-        thruster=dataclasses.replace(planar.thruster, pointing_error_rad=draw(_floats(0.0, 0.9))),
-        target=draw(
-            st.none()
-            | st.builds(
-                Target, st.sampled_from(Manoeuvre), _floats(0.0, 1.0), acceleration_y_m_s2=st.none() | _floats(0.0, 1.0)
-            )
-        ),
-    )
-
-
-@st.composite
-def _scenarios(draw: st.DrawFn) -> Scenario:
-    nominal_range_m = draw(_floats(1e6, 3e7))
-    step_s = draw(_floats(0.25, 2.0))
-    sections = draw(st.integers(1, 10_000))
-    min_impulse, max_impulse = sorted(draw(st.tuples(_floats(0.0, 100.0), _floats(1e-3, 100.0))))
-    at_zero = draw(_floats(1e-6, 0.3))
-    bounds = draw(_boxes(is_spatial=False))
-    suns = st.builds(Sun, _floats(1e18, 1e22), _floats(1e11, 1e13), _floats(-6.25, 6.25))
-    periods = st.integers(1, 50).map(lambda steps: steps * step_s)
-    return Scenario(
-        name=draw(st.from_regex(r"[abcXYZ019][abcXYZ019 ._-]{0,19}", fullmatch=True).filter(str.strip)),
-        description=draw(st.text(st.characters(codec="utf-8"), max_size=50).filter(str.isprintable)),
-        sun=draw(st.none() | suns),
-        nominal_range_m=nominal_range_m,
-        dispersion=draw(_boxes(is_spatial=False)),
-        **of_model(
-            SetModel(
-                # The guaranteed model needs the closing speed to be known to within itself.
-                closing_speed_m_s=draw(_floats(max(1e3, -0.51 * bounds.vx_m_s[0]), 9e4)),
-                step_s=step_s,
-                bounds=bounds,
-                angle_sensor=AngleSensor(draw(periods), draw(_floats(at_zero, 0.5)), at_zero, nominal_range_m),
-                disturbance_m_s2=draw(_floats(0.0, 1.0)),
-                range_threshold_m=draw(_floats(1.0, 1e5)),
-                sections=sections,
-                fewest_sections=draw(st.integers(1, sections)),
-                initial_set=draw(st.sampled_from(InitialSet)),
-                model=draw(st.sampled_from(Model)),
-            )
-        ),
-        range_sensor=draw(st.none() | st.builds(RangeSensor, periods, _floats(1e-6, 0.99))),
-        thruster=Thruster(draw(_floats(0.0, 1e5)), min_impulse, max(max_impulse, 1e-3)),
-        strategy=draw(st.sampled_from(strategy_names())),
-        noise=draw(st.sampled_from(NoiseKind)),
-        tie=draw(st.sampled_from(TieRule)),
-    )
-
-
-@settings(max_examples=50, deadline=None)
-@given(_scenarios() | _scenarios().flatmap(_in_space))
-def test_any_sound_scenario_comes_back_bit_for_bit(scenario: Scenario) -> None:
-    if scenario.set_model.is_guaranteed:
-        try:
-            on_board_model(scenario)
-        except ValueError:
-            reject()  # so strong a Sun leaves the guaranteed model no labels: files and simulator refuse it alike
-    text = to_toml(scenario)
-    again = read_text(Scenario, text, "again")
-    assert repr(again) == repr(scenario)  # equality does not see the sign of a zero
-    assert fingerprint(again) == fingerprint(scenario)
-    assert to_toml(again) == text
+def test_random_numbers_come_back_bit_for_bit() -> None:
+    draw = random.Random(0)
+    ranges = {"sun.direction_rad": 3.0, "thruster.budget_m_s": 1e3, "information_set.disturbance_m_s2": 1e-2}
+    ranges |= {"range_sensor.relative_error": 0.9, "angle_sensor.error_at_zero_range_rad": 2e-4}
+    for _ in range(100):
+        pair = sorted(draw.uniform(-1e4, 1e4) for _ in range(2))
+        scenario = changed(
+            f"uncertainty.z_m={pair}", *(f"{key}={draw.random() * top!r}" for key, top in ranges.items())
+        )
+        again = read_text(Scenario, to_toml(scenario), "again")
+        assert repr(again) == repr(scenario)  # equality does not see the sign of a zero
+        assert fingerprint(again) == fingerprint(scenario)

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.common.errors import InputError
 from experiments.common.input_file import read_text, to_toml
 from experiments.interception.scenario_file import load_scenario, scenario_warnings
@@ -91,11 +90,6 @@ def test_every_key_of_space_is_read_and_written() -> None:
     assert read_text(Scenario, written, "again") == scenario
 
 
-def test_a_start_along_y_may_be_fixed() -> None:
-    scenario = read_text(Scenario, spatial().replace("y_km = [-0.9, 0.9]", "y_km = 0.5"), "mine.toml")
-    assert scenario.dispersion.y_m == (500.0, 500.0)
-
-
 def test_the_error_law_is_checked_where_the_object_goes_across_along_y() -> None:
     law = "error_at_nominal_range_rad = 0.00002"
     assert read_text(Scenario, re.sub("error_at_nominal_range_rad = 0.00015", law, spatial()), "mine.toml").is_spatial
@@ -166,26 +160,3 @@ def test_settings_reach_the_second_axis(space: Scenario) -> None:
     assert tilted.set_model.bounds.y_m == (-8e3, 9e3)
     with pytest.raises(InputError, match="the file has no such interval"):
         load_scenario("asteroid-1997", ["uncertainty.y_km.min=-8"])
-
-
-def test_sweeps_vary_the_second_axis(space: Scenario) -> None:
-    cells = sweep_cells(space, sweep_axes("uncertainty.y_km.min=-9:-8:2,sun.elevation_deg=0:30:2", space))
-    assert [cell.set_model.bounds.y_m for cell in cells[::2]] == [(-9e3, 9e3), (-8e3, 9e3)]
-    assert [cell.sun.elevation_rad > 0.5 for cell in cells[:2] if cell.sun] == [False, True]
-    keys = (
-        "angle_sensor.error_at_nominal_range_y_rad",
-        "information_set.disturbance_y_m_s2",
-        "thruster.pointing_error_rad",
-    )
-    cells = sweep_cells(space, sweep_axes(",".join(f"{key}=0.001:0.002:2" for key in keys), space))
-    assert [cell.set_model.angle_sensor.error_at_nominal_range_y_rad for cell in cells[::4]] == [0.001, 0.002]
-    assert [cell.set_model.disturbance_y_m_s2 for cell in cells[:4:2]] == [0.001, 0.002]
-    assert [cell.thruster.pointing_error_rad for cell in cells[:2]] == [0.001, 0.002]
-    wider = read_text(
-        Scenario,
-        spatial(angle_sensor__error_at_zero_range_y_rad="0.0003"),
-        "mine.toml",
-    )
-    (_, double) = sweep_cells(wider, sweep_axes("angle_sensor.scale=1:2:2", wider))
-    sensor = double.set_model.angle_sensor
-    assert (sensor.error_at_zero_range_rad, sensor.error_at_zero_range_y_rad) == (0.00046, 0.0006)

@@ -60,37 +60,6 @@ def test_a_better_range_sensor_looks_worse_in_the_paper_and_the_study_says_why(i
     assert "warning" not in out
 
 
-def test_a_sweep_has_the_shares_of_its_sets(infoset: Infoset) -> None:
-    vary = ("--vary", "range_sensor.relative_error=0.01:0.1:2", "--runs", 20, "--out")
-    code, out, _ = infoset("sweep", *vary, "paper", "--model", "paper")
-    assert code == 0
-    assert "all cells: true state inside the set at every step: " in out
-    assert "set became empty: 16 of 40 runs (40 %)" in out
-    assert "warning: model paper: in " in out
-    code, out, _ = infoset("sweep", *vary, "default")
-    assert "set became empty: 0 of 40 runs (0 %)" in out
-    assert "warning" not in out
-
-
-@pytest.mark.parametrize("command", ["experiment", "compare", "campaign", "report"])
-def test_every_study_has_the_shares_of_its_sets(infoset: Infoset, sized: Path, command: str) -> None:
-    if command == "report":
-        assert infoset("campaign", sized, "--runs", 3, "--out", "runs")[0] == 0
-        asked: tuple[object, ...] = ("report", "runs")
-    else:
-        others = {"campaign": ("--out", "runs"), "compare": ("--strategies", "patient")}
-        asked = (command, sized, "--runs", 3, *others.get(command, ()))
-    code, out, _ = infoset(*asked)
-    assert code == 0
-    if command == "compare":
-        assert "true state in the" in out
-        assert "set became" in out
-        assert "hit: miss at" in out
-    else:
-        assert "true state inside the set at every step: 3 of 3 runs (100 %); set became empty: 0 of 3" in out
-        assert "hit (miss at most 10 m): " in out
-
-
 def test_the_json_of_an_experiment_has_its_hits(infoset: Infoset, sized: Path, tmp_path: Path) -> None:
     code, out, _ = infoset("experiment", sized, "--runs", 5, "--json", "-", "--csv", "all.csv")
     assert code == 0
@@ -102,14 +71,6 @@ def test_the_json_of_an_experiment_has_its_hits(infoset: Infoset, sized: Path, t
         assert curve["hit"] == vars(expected)
         own = [row for row in rows if row["published_curve"] == str(curve["published_curve"])]
         assert [row["hit"] == "true" for row in own] == [float(row["miss_m"]) <= 10.0 for row in own]
-
-
-def test_without_a_body_there_is_no_hit(infoset: Infoset, brief_file: Path) -> None:
-    code, out, _ = infoset("experiment", brief_file, "--runs", 2, "--json", "-")
-    assert code == 0
-    assert all("hit" not in curve for curve in json.loads(out)["curves"])
-    code, out, _ = infoset("experiment", brief_file, "--runs", 2)
-    assert "hit" not in out.replace("within", "")
 
 
 def test_the_json_of_a_comparison_has_its_hits(infoset: Infoset, sized: Path) -> None:
