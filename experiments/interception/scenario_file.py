@@ -12,7 +12,7 @@ from experiments.common.input_file import read_file
 from experiments.common.options import choice
 from experiments.interception.strategies import is_own_strategy
 from guidance import TieRule, strategy_names
-from infoset.model import MAX_SECTIONS, Model, SetModel
+from infoset.model import Model, SetModel
 from sim.gravity import on_board_model
 from sim.scenario import Scenario, Target
 
@@ -51,9 +51,8 @@ def with_model(scenario: Scenario, model: Model) -> Scenario:
 def scenario_with(options: Any) -> Scenario:
     """Read the scenario of a command and replace what its options set; None keeps the value of the scenario.
 
-    The command may have the options `strategy`, `model`, `tie`, `sections` and `range_sensor`. ``--strategy
-    FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it. Raise `InputError` if the scenario
-    is unsound, or an option does not fit it.
+    The command may have the options `strategy`, `model`, `tie`, `sections` and `range_sensor`. A strategy of a Python
+    file leaves that of the scenario. `InputError` if an option does not fit the scenario.
     """
     strategy, model, tie, sections, range_sensor = (
         getattr(options, name, None) for name in ("strategy", "model", "tie", "sections", "range_sensor")
@@ -65,44 +64,33 @@ def scenario_with(options: Any) -> Scenario:
         scenario = replace(scenario, tie=TieRule(tie))
     if range_sensor and scenario.range_sensor is None:
         raise InputError(
-            f"--range-sensor: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
-            "example period_s = 2.0 and relative_error = 0.05, or omit --range-sensor"
+            f"--range-sensor: the scenario {scenario.name} has no [range_sensor]; add that table to its file"
         )
     if range_sensor is False:
         scenario = replace(scenario, range_sensor=None)
     if model is not None:
         scenario = with_model(scenario, Model(model))
-    settings = scenario.information_set
     if sections is not None:
-        fewest = settings.fewest_sections
-        if not fewest <= sections <= MAX_SECTIONS:
-            raise InputError(
-                f"--sections: must be from {fewest}, the scenario's information_set.fewest_sections, to "
-                f"{MAX_SECTIONS}, found {sections}; for example --sections {max(29, fewest)}"
-            )
-        settings = replace(settings, sections=sections)
-    return replace(scenario, information_set=settings)
+        with input_errors("--sections"):
+            scenario = replace(scenario, information_set=replace(scenario.information_set, sections=sections))
+    return scenario
 
 
 def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario, list[str]]:
     """Return the scenario of a study, whose default model is the guaranteed one, whatever the scenario file says.
 
-    With the model `paper`, quantiles can include runs whose set lost the true state. The list contains a line for the
-    screen if the default replaces the model of the file. ``--model`` and ``--set`` may choose the model; if a folder is
-    resumed, its model is the default.
+    With the model `paper`, quantiles can include runs whose set lost the true state. ``--model`` and ``--set`` may
+    choose the model; if a folder is resumed, its model is the default. The list contains a line for the screen if the
+    default replaces the model of the file.
     """
     scenario = scenario_with(options)
-    chosen = any(text.partition("=")[0].strip() == "information_set.model" for text in options.settings or ())
-    of_file, default = scenario.information_set.model.value, resumed or Model.GUARANTEED
-    if chosen or options.model is not None or default.value == of_file:
+    is_set = any(text.partition("=")[0].strip() == "information_set.model" for text in options.settings or ())
+    of_file, default = scenario.information_set.model, resumed or Model.GUARANTEED
+    if is_set or options.model is not None or default is of_file:
         return scenario, []
-    try:
-        changed = with_model(scenario, default)
-    except InputError as error:
-        raise InputError(f"{error}; or choose the model of the file with --model {of_file}") from None
-    if resumed:
-        return changed, [f"model: {default.value}, the model of the resumed folder; the scenario file has {of_file}"]
-    return changed, [f"model: {default.value}, the default of studies; to use that of the file, add --model {of_file}"]
+    reason = "the model of the resumed folder" if resumed else "the default of studies"
+    note = f"model: {default.value}, {reason}; to use that of the file, add --model {of_file.value}"
+    return with_model(scenario, default), [note]
 
 
 def scenario_warnings(scenario: Scenario) -> list[str]:
@@ -174,40 +162,19 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
 
 
 def _timing_warnings(scenario: Scenario) -> list[str]:
-    """Return a line if the times before the nominal arrival leave no measured angle before the last decision."""
-    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
-    sensor, delay_s = model.angle_sensor, thruster.delay_steps * model.step_s
-    steps = scenario.impulse_steps
+    """Return a line if no angle is measured before the last impulse is decided."""
+    model, arrival_s = scenario.set_model, scenario.nominal_arrival_s
+    sensor, steps = model.angle_sensor, scenario.impulse_steps
     last_step = int(arrival_s / model.step_s) if steps is None else steps[-1]
-    decided = last_step - thruster.delay_steps
-    if decided < 0:
-        return [
-            f"thruster.delay_steps is {thruster.delay_steps}, which is {delay_s:g} s, and the nominal arrival is "
-            f"{arrival_s:g} s after the start: no impulse is given before it"
-        ]
-    measured = range(0, decided + 1, model.steps_in(sensor.period_s))
+    measured = range(0, last_step - scenario.thruster.delay_steps + 1, model.steps_in(sensor.period_s))
     if any(sensor.measures_at(arrival_s - step * model.step_s) for step in reversed(measured)):
         return []
-    if sensor.last_image_s > arrival_s:
-        return [
-            f"angle_sensor.last_image_s is {sensor.last_image_s:g} s, and the nominal arrival is {arrival_s:g} s after "
-            "the start: no image is taken"
-        ]
-    all_steps = range(0, int(arrival_s / model.step_s) + 1, model.steps_in(sensor.period_s))
-    before_s = [arrival_s - step * model.step_s for step in all_steps]
-    if not any(map(sensor.measures_at, before_s)):
-        nearest_s = min(before_s, key=lambda time_s: abs(time_s - sensor.last_image_s))
-        return [
-            f"angle_sensor.first_image_s is {sensor.first_image_s or 0.0:g} s and last_image_s {sensor.last_image_s:g} "
-            f"s: no image is taken, because no time of a measurement (every {sensor.period_s:g} s from the start) lies "
-            f"between them; the nearest is {nearest_s:g} s before the nominal arrival"
-        ]
-    last_s = arrival_s - last_step * model.step_s
-    lead = f", decided {last_s + delay_s:g} s before it" if delay_s > 0.0 else ""
     first_s = arrival_s if sensor.first_image_s is None else sensor.first_image_s
+    fired_s = arrival_s - last_step * model.step_s
     return [
-        f"angle_sensor.first_image_s is {first_s:g} s, and the last impulse is {last_s:g} s before the nominal "
-        f"arrival{lead}: no impulse follows a measurement"
+        f"no impulse follows a measurement: images are taken from {first_s:g} s to {sensor.last_image_s:g} s before "
+        f"the nominal arrival every {sensor.period_s:g} s, the last impulse is {fired_s:g} s "
+        f"before it, decided {scenario.thruster.delay_steps} steps earlier"
     ]
 
 

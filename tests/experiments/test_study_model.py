@@ -52,7 +52,7 @@ def test_a_scenario_outside_the_conditions_of_the_model_is_refused(
     (tmp_path / "wide.toml").write_text(text)
     message = infoset.refused("experiment", "wide.toml", "--runs", 2, "--model", "guaranteed")
     assert "SetModel: the guaranteed model needs a closing speed" in message
-    assert "choose the model of the file with --model paper" in infoset.refused("compare", "wide.toml", "--runs", 2)
+    assert "brief with --model guaranteed: " in infoset.refused("compare", "wide.toml", "--runs", 2)
     assert infoset("experiment", "wide.toml", "--runs", 2)[0] == 0
 
 
