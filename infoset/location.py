@@ -36,8 +36,8 @@ from infoset.section_law import Laws, law_of
 from infoset.section_life import ALIVE, summarise_section
 from infoset.section_passes import Sections, row_of
 
-FIRST, _, LAST = constants(3)
-"""Indices of the ends of a bracket of three labels."""
+FIRST, MIDDLE, LAST = constants(3)
+"""Indices of a bracket of three labels."""
 LABEL_RESOLUTION = 1e-13
 """Accuracy of the ends of the living labels, relative to the labels."""
 NARROWEST = 1e-15
@@ -154,7 +154,7 @@ def search_window(
     `first` is the first label replayed. If a label lives, it is the second of the known ones afterwards.
     """
     known = room.known
-    for i, label in ((1, first), (0, lower), (2, upper)):
+    for i, label in ((MIDDLE, first), (FIRST, lower), (LAST, upper)):
         if probe(known, i, label, tape, errors, laws, room.replays):
             known[1] = known[i]
             return True
