@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from experiments.common.units import quantity_and_unit
+
 M_PER_KM = 1e3
 
 Unit = tuple[str, float]
@@ -25,19 +27,10 @@ def length_unit(size_m: float) -> Unit:
     return "m", 1.0
 
 
-_UNITS = {
-    "km3_s2": "km\N{SUPERSCRIPT THREE}/s\N{SUPERSCRIPT TWO}",
-    "m_s2": "m/s\N{SUPERSCRIPT TWO}",
-    "km_s": "km/s",
-    "m_s": "m/s",
-    "rad_s": "rad/s",
-    **{unit: unit for unit in ("rad", "deg", "km", "kg", "m", "s", "N")},
-}
+_IN_PRINT = str.maketrans({"_": "/", "2": "\N{SUPERSCRIPT TWO}", "3": "\N{SUPERSCRIPT THREE}"})
 
 
 def split_unit(name: str) -> tuple[str, str]:
     """Return the words and the unit of a key or a column: ``impulse`` and ``m/s`` of ``impulse_m_s``."""
-    for end, unit in _UNITS.items():
-        if name.endswith(f"_{end}"):
-            return name.removesuffix(f"_{end}").replace("_", " "), unit
-    return name.replace("_", " "), ""
+    quantity, unit = quantity_and_unit(name)
+    return quantity.replace("_", " "), unit.translate(_IN_PRINT)
