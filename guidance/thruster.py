@@ -89,14 +89,12 @@ class Thruster:
             return None
         times_s = (*self.impulses_s, self.last_impulse_s or 0.0)
         *of_times, last = (math.floor((arrival_s - time_s) / step_s + STEP_TOLERANCE) for time_s in times_s)
-        first_s = arrival_s - self.delay_steps * step_s
-        first, remedy = f"the first impulse can be given {first_s:g} s before the nominal arrival", "give later times"
-        if self.delay_steps:
-            first += f", because thruster.delay_steps = {self.delay_steps} is {self.delay_steps * step_s:g} s"
-            remedy += " or fewer delay_steps"
+        first = f"the first impulse can be given {arrival_s - self.delay_steps * step_s:g} s before the nominal arrival"
         for i, step in enumerate(of_times):
             if step < self.delay_steps:
-                raise ValueError(f"thruster.impulses_s: {first}; {remedy}: got {self.impulses_s[i]!r}")
+                raise ValueError(
+                    f"thruster.impulses_s: {first}; give later times or fewer delay_steps: got {self.impulses_s[i]!r}"
+                )
             if i > 0 and step == of_times[i - 1]:
                 raise ValueError(
                     f"thruster.impulses_s: two impulses in one step of {step_s:g} s: got {self.impulses_s[i - 1]!r} "
@@ -104,13 +102,7 @@ class Thruster:
                 )
         steps = [step for step in of_times if step <= last] if of_times else range(self.delay_steps, last + 1)
         if not steps:
-            if of_times:
-                reason = f"the last of thruster.impulses_s is {self.impulses_s[-1]:g} s before the nominal arrival"
-            elif last >= 0:
-                reason = f"{first}; reduce delay_steps or last_impulse_s"
-            else:
-                reason = f"the nominal arrival is {arrival_s:g} s after the start"
-            raise ValueError(f"thruster.last_impulse_s excludes all impulses: got {self.last_impulse_s!r}; {reason}")
+            raise ValueError(f"thruster.last_impulse_s excludes all impulses: {first}: got {self.last_impulse_s!r}")
         return steps
 
     def give(self, wanted_m_s: Floats, budget_left_m_s: Floats) -> Floats:
