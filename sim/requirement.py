@@ -71,11 +71,6 @@ class Requirement(Checked):
         return f"{self.quantile}<{number_text(self.bound)}"
 
     @property
-    def name(self) -> str:
-        """Name of what is bounded."""
-        return str(self.quantile)
-
-    @property
     def share(self) -> float:
         """Share of the runs that must be below the bound."""
         return self.quantile.level
@@ -107,7 +102,6 @@ class HitRequirement(Checked):
 
     share: Fraction
 
-    name: ClassVar[str] = "hit"
     quantity: ClassVar[str] = "hit"
     unknown: ClassVar[float] = 0.0
 
@@ -159,9 +153,6 @@ class Verdict:
         the same; None if it is over `MAX_RUNS_NEEDED`, because the estimate is at the bound.
     known : int
         Runs with a value of the quantity; the others do not satisfy the bound.
-    quantile, bound : float or None
-        The required quantile and its bound, in the same unit. For hits, the quantile of the miss at the required share,
-        and the radius of the body; `judge` knows neither. The quantile is None if the sample does not show it.
     """
 
     decision: Decision
@@ -171,8 +162,6 @@ class Verdict:
     upper: float | None
     runs_needed: int | None
     known: int
-    quantile: float | None = None
-    bound: float | None = None
 
 
 def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verdict:
@@ -216,14 +205,12 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     value: float | None
     lower: float | None
     upper: float | None
-    compared: tuple[float | None, float | None] = None, None
     if isinstance(requirement, Requirement):
         ordered = np.sort(values)
         with np.errstate(invalid="ignore"):  # infinite values
             value = _finite(np.quantile(ordered, share)) if shows(size, share) else None
         lower = _finite(ordered[first - 1]) if first >= 1 else None
         upper = _finite(ordered[last - 1]) if last <= size else None
-        compared = value, requirement.bound
     else:
         estimate = estimate_hits(int(holding[-1]), size, CONFIDENCE)
         value, lower, upper = estimate.probability, estimate.lower, estimate.upper
@@ -237,14 +224,14 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     decided = np.flatnonzero(met | missed)
     if not decided.size:
         needed = runs_needed(int(holding[-1]), size, share)
-        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed, known, *compared)
+        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed, known)
     decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
     # A decision at an earlier run stays valid, although the last interval may contain the bound again.
     if (decision is Decision.MET) == isinstance(requirement, Requirement):
         upper = requirement.bound if upper is None else min(upper, requirement.bound)
     else:
         lower = requirement.bound if lower is None else max(lower, requirement.bound)
-    return Verdict(decision, size, value, lower, upper, size, known, *compared)
+    return Verdict(decision, size, value, lower, upper, size, known)
 
 
 def _finite(value: float) -> float | None:

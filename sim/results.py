@@ -128,19 +128,9 @@ class Results:
         return {column.name: values_of(self, column) for column in columns_with_values(self)}
 
     def to_pandas(self) -> Any:
-        """Return the columns as a pandas `DataFrame`, one row per run, with the units in ``frame.attrs["units"]``.
+        """Return the columns as a pandas `DataFrame`, one row per run, with the units in ``frame.attrs["units"]``."""
+        import pandas as pd  # of the extra `campaign`
 
-        Raises
-        ------
-        ModuleNotFoundError
-            If pandas is not installed.
-        """
-        try:
-            import pandas as pd
-        except ModuleNotFoundError:
-            raise ModuleNotFoundError(
-                "Results.to_pandas needs pandas: install it with `pip install pandas`, or use Results.to_dict"
-            ) from None
         frame = pd.DataFrame(self.to_dict())
         frame.attrs["units"] = {column.name: column.unit for column in columns_with_values(self)}
         return frame
@@ -181,7 +171,4 @@ def _joined(parts: Sequence[Any]) -> Any:
         return None
     if isinstance(parts[0], tuple):
         return tuple(value for part in parts for value in part)
-    if isinstance(parts[0], np.ma.MaskedArray):
-        mask = np.concatenate([np.ma.getmaskarray(part) for part in parts])
-        return np.ma.MaskedArray(np.concatenate([part.data for part in parts]), mask=mask)
-    return np.concatenate(parts)
+    return (np.ma.concatenate if isinstance(parts[0], np.ma.MaskedArray) else np.concatenate)(parts)

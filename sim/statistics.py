@@ -214,8 +214,8 @@ def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate
 
 def correlation_interval(
     correlation: float, size: int, confidence: float = 0.95, *, ranks: bool = False
-) -> tuple[float, float] | None:
-    """Return the confidence interval of a correlation coefficient by Fisher's z; None with fewer than 4 values.
+) -> tuple[float, float]:
+    """Return the confidence interval of a correlation coefficient by Fisher's z; NaN with fewer than 4 values.
 
     The interval is approximate, and assumes two normal variables. `ranks` is for Spearman's coefficient, whose z has
     a standard deviation larger by a factor of sqrt(1.06).
@@ -225,13 +225,11 @@ def correlation_interval(
     Fieller, Hartley, Pearson (1957), Tests for rank correlation coefficients I.
     """
     if size < 4:
-        return None
-    if abs(correlation) >= 1.0:
-        return correlation, correlation
-    deviation = math.sqrt((1.06 if ranks else 1.0) / (size - 3))
-    half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * deviation
-    z = math.atanh(correlation)
-    return math.tanh(z - half), math.tanh(z + half)
+        return math.nan, math.nan
+    half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * math.sqrt((1.06 if ranks else 1.0) / (size - 3))
+    with np.errstate(divide="ignore"):  # the interval of 1 is the point 1
+        z = np.arctanh(np.clip(correlation, -1.0, 1.0))
+    return float(np.tanh(z - half)), float(np.tanh(z + half))
 
 
 def number_text(number: float) -> str:

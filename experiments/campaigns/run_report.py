@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -26,7 +25,6 @@ from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import (
-    BeginProgress,
     Part,
     figure_files,
     number,
@@ -48,9 +46,8 @@ def run(options: Report) -> None:
         swept = bool(folder.manifest.axes)
         figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*_figures(folder))
         with output_of(options, [*figures, "report.json", SCENARIO_FILE]) as written:
-            with progress_bar(options.quiet) as begin:
-                parts = (_report_sweep if swept else _report_campaign)(folder, options, written, begin)
-                written.save(SCENARIO_FILE, to_toml(folder.manifest.scenario))
+            parts = (_report_sweep if swept else _report_campaign)(folder, options, written)
+            written.save(SCENARIO_FILE, to_toml(folder.manifest.scenario))
             show(parts, options.quiet, stdout_taken=written.stdout_taken)
 
 
@@ -74,7 +71,7 @@ def _read(options: Report) -> CampaignFolder:
     return folder
 
 
-def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Iterator[Part]:
+def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
     scenario = folder.manifest.scenario
     sized = bool(folder.runs(["hit"])["hit"].count())
     default = folder.manifest.require or default_requirement(has_size=sized)
@@ -86,25 +83,19 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begi
             f"--require {required}: this sweep was simulated without the bound Phi; simulate it in a new folder with "
             "infoset sweep --guarantee, or give a bound of miss_m"
         )
-    progress = begin("report")
     report = SweepReport(folder, sweep_table(folder, required, shown), shown)
-    progress(0.5)
     written.save("report.json", to_json(report.to_json()), "--json")
     written.deliver("--csv", report.table.rows.to_csv(index=False))
     report.save(written)
-    progress(1.0)
     return report.parts()
 
 
-def _report_campaign(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Iterator[Part]:
+def _report_campaign(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
     for option, value in (("--require", options.require), ("--show", options.show)):
         if value is not None:
             raise InputError(f"{option}: is only for a sweep, and {folder.path} is a campaign; omit it")
-    progress = begin("quantiles")
     runs = folder.runs()
-    progress(0.3)
     table = summary(folder, runs)
-    progress(1.0)
     related, worst = correlations(folder, runs), worst_runs(folder, runs, _scenario_file(folder, options.out))
     report = {
         **heading(folder),
@@ -117,7 +108,8 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, b
     if options.out is not None:
         from experiments.campaigns.campaign_figures import draw_all
 
-        written.draw(_figures(folder), draw_all(folder, runs), begin("figures"))
+        with progress_bar(options.quiet) as begin:
+            written.draw(_figures(folder), draw_all(folder, runs), begin("figures"))
     return _parts(folder, table, related, worst)
 
 
@@ -133,20 +125,11 @@ def _parts(folder: CampaignFolder, table: pd.DataFrame, related: pd.DataFrame, w
     yield study_title(manifest.scenario, manifest.strategy, manifest.seed)
     yield f"{some_runs(folder.finished_runs)}{stopped}"
     yield from summary_parts(folder, table)
-    yield from ("", "correlation of the miss with the initial state (CI by Fisher's z):")
-    printed = related[["noise", "component"]].copy()
-    for kind in ("pearson", "spearman"):
-        ends = (related[kind], related[f"{kind}_lower"], related[f"{kind}_upper"])
-        printed[f"{kind.capitalize()} (95 % CI)"] = [*map(_correlation, *ends)]
-    yield screen_table(printed, 2)
+    yield from ("", "correlation of the miss with the initial state (95 % CI by Fisher's z):")
+    yield screen_table(related.rename(columns=lambda name: name.replace("_l", "\nl").replace("_u", "\nu")), 2)
     yield from ("", "the worst runs, each with the command that simulates it again:")
     for row in records(worst):
         miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
         yield f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}"
     if not (folder.path / SCENARIO_FILE).is_file():
         yield f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)"
-
-
-def _correlation(value: float, lower: float, upper: float) -> str:
-    ends = "" if math.isnan(lower) else f" ({lower:+.2f} to {upper:+.2f})"
-    return "-" if math.isnan(value) else f"{value:+.2f}{ends}"

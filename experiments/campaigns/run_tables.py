@@ -31,6 +31,8 @@ OUTCOMES = {outcome.value.replace("-", "_"): outcome.value for outcome in Outcom
 
 COLUMNS = ("cell", "noise", "outcome", "hit", "truth_kept", "set_emptied", "phi_held", *QUANTITIES)
 """Columns of the runs that `summary` needs."""
+CI = ("95 % CI\nfrom", "\nto")
+"""Titles of the ends of an interval in a table for the screen."""
 
 
 def noises_of(folder: CampaignFolder) -> list[str]:
@@ -111,7 +113,7 @@ def correlations(folder: CampaignFolder, runs: pd.DataFrame) -> pd.DataFrame:
             row = {"noise": noise, "component": component}
             for kind, found in both.items():
                 value = found[component]
-                ends = correlation_interval(value, len(chosen), ranks=kind == "spearman") or (math.nan, math.nan)
+                ends = correlation_interval(value, len(chosen), ranks=kind == "spearman")
                 row |= {kind: value, f"{kind}_lower": ends[0], f"{kind}_upper": ends[1]}
             rows.append(row)
     return pd.DataFrame(rows)
@@ -184,9 +186,9 @@ def _quantile_table(samples: Sequence[Mapping[str, Any]], phi: str) -> pd.DataFr
         for quantity in known:
             for level in (*map(level_name, LEVELS), "max"):
                 column = f"{quantity}_{level}"
-                text = "" if level == "max" else interval(row[f"{column}_lower"], row[f"{column}_upper"])
-                rows.append((row["noise"], names[quantity], level, row[column], text))
-    return pd.DataFrame(rows, columns=["noise", "quantity", "quantile", "value", "95 % CI"])
+                ends = (row.get(f"{column}_lower"), row.get(f"{column}_upper"))
+                rows.append((row["noise"], names[quantity], level, row[column], *ends))
+    return pd.DataFrame(rows, columns=["noise", "quantity", "quantile", "value", *CI])
 
 
 def _notes(folder: CampaignFolder, row: Mapping[str, Any], sets: SetCounts, noises: int) -> Iterator[str]:
@@ -214,11 +216,6 @@ def screen_table(table: pd.DataFrame, left: int) -> Table:
     for row in records(table):
         printed.add_row(*(value if isinstance(value, str) else number(value) for value in row.values()))
     return printed
-
-
-def interval(lower: float | None, upper: float | None) -> str:
-    """Return the ends of a confidence interval as text; NaN is `-`."""
-    return " to ".join(number(None if pd.isna(end) else end) for end in (lower, upper))
 
 
 def or_nan(value: float | None) -> float:

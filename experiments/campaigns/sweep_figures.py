@@ -51,8 +51,8 @@ QUANTITY_NAMES = {
     "hit": "probability of a hit",
 }
 _PANEL_MM, _LEGEND_MM = 66.0, 24.0
-_MAX_TICKS, _MAX_LETTERS = 6, 40
-"""Maximum numbers of ticks of an axis, and of letters in a line of its label."""
+_TICK_LETTERS, _LABEL_LETTERS = 32, 40
+"""Maximum numbers of letters of all tick labels of an axis, and of a line of its label."""
 _DARK = 0.55
 """Part of the scale of colours from which numbers are white."""
 _NO_VALUE = "\N{EN DASH}"
@@ -207,7 +207,7 @@ def _write_numbers(axes: Axes, values: Floats, is_dark: Any, **look: Any) -> Non
     """Write the values into the cells of a map, unless there are too many cells."""
     if values.size > MAX_NUMBERS:
         return
-    size = min(7.0, 60.0 / values.shape[1])
+    size = min(7.0, 54.0 / values.shape[1])
     for (row, column), value in np.ndenumerate(values):
         text = _NO_VALUE if np.isnan(value) else f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
         colour = "white" if is_dark[row, column] else INK
@@ -218,10 +218,11 @@ def _name_values(one: MatplotlibAxis, axis: Axis) -> None:
     """Label an axis with its key, and its positions 0, 1, 2, ... with the values, a few of them if they are many."""
     maximum = max(map(abs, axis.values))
     power = 0 if 0.01 <= maximum < 1e5 else math.floor(math.log10(maximum))
-    at = range(0, len(axis.values), -(-len(axis.values) // _MAX_TICKS))
-    one.set_ticks([*at], [f"{axis.values[number] / 10.0**power:.4g}" for number in at])
+    names = [f"{value / 10.0**power:.4g}" for value in axis.values]
+    step = -(-len(names) * max(map(len, names)) // _TICK_LETTERS)
+    one.set_ticks(range(0, len(names), step), names[::step])
     one.set_label_text(
-        textwrap.fill(key_label(axis.key, f"$10^{{{power}}}$\N{NO-BREAK SPACE}" if power else ""), _MAX_LETTERS)
+        textwrap.fill(key_label(axis.key, f"$10^{{{power}}}$\N{NO-BREAK SPACE}" if power else ""), _LABEL_LETTERS)
     )
 
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import pandas as pd
 from rich.table import Table
 
-from experiments.campaigns.run_tables import game_notes, heading, interval, records, screen_table
+from experiments.campaigns.run_tables import CI, game_notes, heading, records, screen_table
 from experiments.campaigns.sweep_axes import unit_of
 from experiments.campaigns.sweep_table import SweepTable, limits
-from experiments.common.errors import InputError, input_errors
+from experiments.common.errors import input_errors
 from experiments.common.output import Output
 from experiments.common.screen import Part, some_runs
 from experiments.interception.study import SetCounts, random_note, set_warnings, study_title
@@ -24,7 +24,6 @@ from sim.storage import CampaignFolder
 TABLE = "sweep.parquet"
 SHOWN = tuple(QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99))
 SHOWN_WITH_HITS = (SHOWN[0], SHOWN[1], SHOWN[3])
-MAX_SHOWN = 8
 MAX_ROWS = 100
 """Maximum number of cells that are printed for each noise."""
 _FIXED = "a fixed number of runs"
@@ -134,16 +133,17 @@ class SweepReport:
 
     def _printed(self, rows: pd.DataFrame) -> pd.DataFrame:
         """Return the decisions as a table for the screen, with the values of the keys as they are."""
-        name = self.table.required.name
+        required = self.table.required
+        name = str(required.quantile) if isinstance(required, Requirement) else required.quantity
         printed = rows[self.table.keys].map("{:.6g}".format)
         printed["decision"] = rows["requirement"].fillna("not simulated").str.replace("-", " ")
         printed["runs"] = rows["runs"].astype(str)
         printed[name] = rows["required_value"]
-        printed["95 % CI"] = rows["required_lower"].combine(rows["required_upper"], interval)
+        printed[list(CI)] = rows[["required_lower", "required_upper"]]
         undecided = rows["requirement"] == Decision.UNDECIDED.value
         if undecided.any():
             needed = rows["runs_needed"].astype(str).mask(rows["runs_needed"].isna(), f"> {MAX_RUNS_NEEDED}")
-            printed["runs needed\n(about)"] = needed.where(undecided, "")
+            printed["runs\nneeded"] = needed.where(undecided, "")
         return printed
 
     def _notes(self) -> list[str]:
@@ -168,8 +168,6 @@ def quantile_options(
     default_shown = SHOWN if isinstance(required, Requirement) else SHOWN_WITH_HITS
     with input_errors("--show"):
         chosen = default_shown if show is None else tuple(QuantileName.parse(text) for text in show.split(","))
-    if len(chosen) > MAX_SHOWN:
-        raise InputError(f"--show: at most {MAX_SHOWN} quantiles can be drawn, found {len(chosen)}; leave some out")
     first = (required.quantile,) if isinstance(required, Requirement) else ()
     return required, tuple(dict.fromkeys((*first, *chosen)))
 

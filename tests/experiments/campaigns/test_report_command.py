@@ -61,7 +61,7 @@ def test_a_report_of_files_alone(infoset: Command, brief: Scenario, folder: Path
     for row in worst:
         assert row["replay"] == f"infoset engage {scenario} --noise {row['noise']} --seed 0 --run {row['run']}"
         assert row["replay"] in out
-    for title in ("correlation of the miss with", "Fisher's z", "|start_z_m|", "Spearman", "p99.9", "95 % CI"):
+    for title in ("correlation of the miss with", "Fisher's z", "|start_z_m|", "spearman", "p99.9", "95 % CI"):
         assert title in out
 
 

@@ -119,7 +119,6 @@ def test_three_keys_are_a_table_only(infoset: Command, file: Path, tmp_path: Pat
         (["--require", "miss_m 10"], "--require: must be hit>=SHARE or QUANTITY pLEVEL<BOUND, for example"),
         (["--require", "hit>=0.95"], "has no [body]; set its radius, for example --set body.radius_m=80"),
         (["--show", "miss_m p99,fuel p50"], "--show: there is no quantity fuel"),
-        (["--show", ",".join(f"miss_m p{each}" for each in range(1, 20))], "--show: at most 8"),
         (["--runs", 300_000], "give --yes"),
         (["--max-runs", 30], "--max-runs is the limit of --until; add --until decided"),
         (["--until", "decided", "--max-runs", 9], "--max-runs: must be at least --runs, 10, found 9"),
