@@ -7,9 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from sim.results import Results
 from sim.storage.files import LOCK, StorageError, is_leftover, locked, reporting, write_whole
@@ -127,43 +125,6 @@ class CampaignFolder:
 
     def _metadata(self, name: str) -> dict[str, str]:
         return {"campaign": self._identity, "name": name}
-
-    # What follows is for reports that do not use `runs` yet; it goes.
-    damaged: ClassVar[list[Any]] = []
-
-    def numbers(self, name: str, cell: int | None = None) -> Any:
-        """Return a column of numbers, masked where unknown."""
-        column, unit = (f"start_{name}".replace("_km", "_m"), 1e3) if "km" in name else (name, 1.0)
-        return np.ma.masked_invalid(self.runs([column], cell)[column].to_numpy(np.float64, na_value=np.nan) / unit)
-
-    def codes(self, name: str, known: Sequence[str], cell: int | None = None) -> Any:
-        """Return a column of text as indices in a list of values."""
-        return np.array([known.index(text) for text in self.runs([name], cell)[name]], dtype=np.int8)
-
-    def shards(self, quantities: Sequence[str], texts: Any, cell: int | None = None) -> Any:
-        """Yield columns."""
-        yield (
-            {name: self.numbers(name, cell) for name in quantities},
-            {name: self.codes(name, known, cell) for name, known in texts.items()},
-        )
-
-    def sample(self, quantity: str, noise: str, cell: int | None = None, *, unknown: float | None = None) -> Any:
-        """Return the values of a quantity under a noise."""
-        values = self.numbers(quantity, cell)[self.codes("noise", ("random", "game"), cell) == (noise == "game")]
-        return values.compressed() if unknown is None else values.filled(unknown)
-
-    def at(self, indices: Sequence[int]) -> list[dict[str, Any]]:
-        """Return rows."""
-        import pandas as pd
-
-        rows = self.runs().iloc[list(indices)]
-        return [{k: None if v is pd.NA else v for k, v in row.items()} for row in rows.to_dict("records")]
-
-    def table_file(self, columns: Any, units: Any) -> bytes:
-        """Return a table as Parquet."""
-        import pandas as pd
-
-        return bytes(pd.DataFrame(columns).to_parquet())
 
 
 def _names(manifest: Manifest) -> set[str]:

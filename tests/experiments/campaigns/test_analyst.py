@@ -52,7 +52,7 @@ def test_the_answer_is_the_same_with_more_runs_in_each_cell(infoset: Infoset, tm
     assert folder.manifest.until == str(required)
     decisions = []
     for number, cell in enumerate(sweep_cells(scenario, axes)):
-        hits = folder.sample("hit", "game", number)
+        hits = folder.runs(["hit"], number)["hit"].to_numpy(np.float64)
         more = simulate(cell, range(hits.size, hits.size + MORE), guarantee=False)
         longer = np.concatenate([hits, more.hit.filled(False).astype(np.float64)])
         decision = judge(hits, required, watched=True).decision
