@@ -30,6 +30,8 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain help: its text has 45 of 80 columns, in a table of Rich 20
     pretty_exceptions_enable=False,
 )
+EXTRAS = {"pandas": "campaign", "pyarrow": "campaign", "distributed": "distributed"}
+"""The optional extra of each library that a command may lack."""
 RUNS: dict[type, str] = {}
 """The module in `experiments` whose function ``run`` takes the options, by the class of the options."""
 
@@ -47,6 +49,13 @@ def _add(name: str, options: type, run: str, *, example: str) -> None:
     def command(**values: Any) -> None:
         try:
             import_module(RUNS[options]).run(options(**values))
+        except ModuleNotFoundError as error:
+            extra = EXTRAS.get(error.name or "")
+            if extra is None:
+                raise
+            from sim.versions import install_command
+
+            raise InputError(f"{error.name} is not installed: {install_command(extra)}") from None
         except KeyboardInterrupt as interrupt:
             typer.echo("interrupted" + "".join(map(str, interrupt.args)), err=True)
             raise

@@ -124,8 +124,8 @@ class Campaign:
         Raises
         ------
         StorageError
-            If the folder contains something else or cannot be written, or pyarrow is not installed. Stored runs are
-            kept, and the campaign can be resumed.
+            If the folder contains something else or cannot be written. Stored runs are kept, and the campaign can be
+            resumed.
         VersionError
             If the workers of the executor have other versions of the packages.
         FloatingPointError

@@ -11,7 +11,6 @@ from urllib.parse import urlsplit
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
 from sim.parallel import worker_processes
-from sim.versions import install_command
 
 PATIENCE_S = 8.0
 """Time limit for the scheduler's answer, and then for its workers, s."""
@@ -39,14 +38,10 @@ def workers_of(options: Flight, note: Callable[[str], None]) -> Iterator[tuple[E
 def cluster(address: str, note: Callable[[str], None]) -> Iterator[tuple[Executor, int]]:
     """Connect to the Dask scheduler at an address such as tcp://host:8786; yield its executor and number of threads.
 
-    Raise `InputError` if Dask is not installed, the scheduler does not answer in time, or it has no workers.
+    Raise `InputError` if the scheduler does not answer in time, or it has no workers.
     """
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError(
-            f"--dask: clusters need Dask, which is not installed: {install_command('distributed')}"
-        ) from None
+    from distributed import Client
+
     if not address.startswith("tls://") and urlsplit(address).hostname not in ("localhost", "127.0.0.1", "::1"):
         note(
             f"warning: --dask: the connection to {address} is not encrypted, and everyone who reaches that address can "

@@ -12,7 +12,6 @@ from experiments.common.screen import show, some_runs
 from experiments.interception.strategies import own_strategy
 from experiments.interception.study import study_title
 from sim import Campaign, CampaignNoise, StoppingRule
-from sim.storage import need_arrow
 
 SUMMARY = "summary.json"
 
@@ -20,7 +19,6 @@ SUMMARY = "summary.json"
 def run(options: Options) -> None:
     """Simulate the campaign, write its summary and print the tables."""
     with campaign_errors(RESUME_HINT), output_of(options) as written:
-        need_arrow()
         scenario, model_notes = scenario_of(options)
         with input_errors("--until"):
             rule = None if options.until is None else StoppingRule.parse(options.until)

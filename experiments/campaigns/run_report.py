@@ -35,13 +35,12 @@ from experiments.common.screen import (
 )
 from experiments.interception.study import study_title
 from sim.results import ending
-from sim.storage import CampaignFolder, need_arrow
+from sim.storage import CampaignFolder
 
 
 def run(options: Report) -> None:
     """Read the folder, write the files and print the tables."""
     with campaign_errors():
-        need_arrow()
         folder = _read(options)
         swept = bool(folder.manifest.axes)
         figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*_figures(folder))

@@ -17,7 +17,7 @@ from experiments.common.output import output_of, to_json
 from experiments.common.screen import say, show
 from experiments.interception.strategies import own_strategy
 from sim import Campaign, CampaignNoise
-from sim.storage import need_arrow, need_free
+from sim.storage import need_free
 
 ASK_FROM = 1_000_000
 """Number of engagements above which the command asks before it starts a sweep."""
@@ -28,7 +28,6 @@ MAX_RUNS_A_CELL = 2000
 def run(options: Options) -> None:
     """Simulate the sweep, write its table and figure, and print where the requirement is met."""
     with campaign_errors(RESUME_HINT), output_of(options) as written:
-        need_arrow()
         scenario, notes = scenario_of(options)
         axes = sweep_axes(",".join(options.vary), scenario)
         cells = sweep_cells(scenario, axes)

@@ -1,6 +1,6 @@
 """Campaigns on disk: a manifest, files of runs, one lock. The only package that knows Parquet and pydantic."""
 
-from sim.storage.campaign_folder import CampaignFolder, need_arrow, need_free
+from sim.storage.campaign_folder import CampaignFolder, need_free
 from sim.storage.codec import fingerprint
 from sim.storage.files import StorageError
 from sim.storage.manifest import MANIFEST, MAX_CELLS, Axis, Manifest, read_manifest
@@ -13,7 +13,6 @@ __all__ = [
     "Manifest",
     "StorageError",
     "fingerprint",
-    "need_arrow",
     "need_free",
     "read_manifest",
 ]

@@ -6,13 +6,11 @@ import contextlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 from sim.results import Results
 from sim.storage.files import LOCK, StorageError, is_leftover, locked, reporting, write_whole
 from sim.storage.manifest import MANIFEST, Manifest, read_manifest
-from sim.versions import install_command
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,8 +35,7 @@ class CampaignFolder:
 
     @classmethod
     def read(cls, path: Path) -> CampaignFolder:
-        """Open a folder; StorageError if it contains no campaign, or a library for its files is missing."""
-        need_arrow()
+        """Open a folder; StorageError if it contains no campaign."""
         return cls(path, read_manifest(path))
 
     def has(self, cell: int, runs: Sequence[int]) -> bool:
@@ -82,7 +79,9 @@ class CampaignFolder:
         """Return some columns of stored chunks, one after the other; see `runs`."""
         names = [_name(*chunk) for chunk in chunks]
         files = {self.path / SHARDS / name: self._metadata(name) for name in names}
-        return need_arrow().read(files, columns)
+        from sim.storage import tables
+
+        return tables.read(files, columns)
 
     @classmethod
     @contextlib.contextmanager
@@ -93,7 +92,8 @@ class CampaignFolder:
         this campaign already. StorageError if the folder contains something else or a campaign with different settings,
         another campaign is running in it, or it cannot be written.
         """
-        need_arrow()
+        from sim.storage import tables  # noqa: F401 (fails at once if a library is missing)
+
         need_free(path, resume=resume)
         with reporting(path):
             path.mkdir(parents=True, exist_ok=True)
@@ -113,8 +113,10 @@ class CampaignFolder:
 
     def write(self, cell: int, runs: Sequence[int], results: Results) -> None:
         """Write the file of a chunk atomically."""
+        from sim.storage import tables
+
         name = _name(cell, runs)
-        content = need_arrow().to_bytes(results, cell, self.manifest.noise, self._metadata(name))
+        content = tables.to_bytes(results, cell, self.manifest.noise, self._metadata(name))
         write_whole(self.path / SHARDS / name, content)
         self._names.add(name)
 
@@ -149,14 +151,3 @@ def need_free(path: Path, *, resume: bool) -> None:
         raise StorageError(f"{path}: contains a campaign already; continue it with --resume, or choose another folder")
     if names and MANIFEST not in names:
         raise StorageError(f"{path}: is not empty, and contains no campaign; choose another folder")
-
-
-def need_arrow() -> ModuleType:
-    """Return the module that reads and writes files of runs; StorageError if pyarrow or pandas is not installed."""
-    try:
-        from sim.storage import tables
-    except ImportError as error:
-        raise StorageError(
-            f"campaigns need {error.name}, which is not installed: {install_command('campaign')}"
-        ) from None
-    return tables

@@ -182,24 +182,22 @@ def test_what_is_wrong_is_said_before_the_work(
     assert [each.name for each in tmp_path.iterdir()] == ["brief.toml"]
 
 
-def test_without_an_extra_it_says_which(infoset: Infoset, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("library", "extra"), [("pyarrow", "campaign"), ("pandas", "campaign"), ("distributed", "distributed")]
+)
+def test_without_an_extra_it_says_which(
+    library: str, extra: str, infoset: Infoset, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import sim.storage
 
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    code, _, err = infoset("campaign", file, "--runs", 8, "--out", "runs", "--dask", "tcp://127.0.0.1:1")
-    assert code == 2
-    assert f"not installed: {install_command('distributed')}" in err
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    monkeypatch.delitem(sys.modules, "sim.storage.tables", raising=False)
+    monkeypatch.setitem(sys.modules, library, None)
+    for name in [each for each in sys.modules if each.startswith(("experiments.campaigns.", "sim.storage.tables"))]:
+        monkeypatch.delitem(sys.modules, name)
     monkeypatch.delattr(sim.storage, "tables", raising=False)
-    for command in (
-        ["campaign", file, "--runs", 8, "--out", "runs"],
-        ["sweep", file, "--vary", "thruster.budget_m_s=1:2:2", "--runs", 8, "--out", "runs"],
-        ["report", "runs"],
-    ):
-        message = f"error: campaigns need pyarrow, which is not installed: {install_command('campaign')}\n"
-        assert infoset(*command) == (2, "", message)
-    monkeypatch.undo()
+    options = ("--dask", "tcp://127.0.0.1:1") if library == "distributed" else ()
+    code, out, err = infoset("campaign", file, "--runs", 8, "--out", "runs", *options)
+    assert (code, out) == (2, "")
+    assert err.splitlines()[-1] == f"error: {library} is not installed: {install_command(extra)}"
 
 
 @pytest.mark.parametrize(
