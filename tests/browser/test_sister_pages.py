@@ -12,16 +12,12 @@ import pytest
 
 from experiments.multipoint import run as multipoint
 from experiments.multipoint.command import Multipoint
-from experiments.multipoint.page import multipoint_page
 from experiments.pareto import run as pareto
 from experiments.pareto.command import Pareto
-from experiments.pareto.page import pareto_page
 from experiments.pursuit import run as pursuit
 from experiments.pursuit.command import Pursuit
-from experiments.pursuit.page import pursuit_page
 from experiments.reachability import run as reachability
 from experiments.reachability.command import Reach
-from experiments.reachability.page import reachability_page
 from rendezvous.pareto import min_sum_of_costs
 from rendezvous.pursuit_evasion import history, orbital_axes
 from tests.browser.conftest import Opened, numbers
@@ -32,28 +28,23 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 CLOSING = "</script><script>alert(2)</script>"
 
 
-PAGES: dict[str, Callable[[Any], str]] = {
-    "pareto": pareto_page,
-    "multipoint": multipoint_page,
-    "reach": reachability_page,
-    "pursuit": pursuit_page,
+OPTIONS: dict[str, tuple[Any, Any]] = {
+    "pareto": (pareto.COMMAND, Pareto()),
+    "multipoint": (multipoint.COMMAND, Multipoint(settings=["max_control_m_s2=0.02"])),
+    "reach": (reachability.COMMAND, Reach(select="energy,l1,peak")),
+    "pursuit": (pursuit.COMMAND, Pursuit(problem="leo-pursuit")),
 }
 
 
 @pytest.fixture(scope="module")
 def reports() -> dict[str, Any]:
     """Reports of one problem of each kind."""
-    return {
-        "pareto": pareto.COMMAND.report(Pareto()),
-        "multipoint": multipoint.COMMAND.report(Multipoint(settings=["max_control_m_s2=0.02"])),
-        "reach": reachability.COMMAND.report(Reach(select="energy,l1,peak")),
-        "pursuit": pursuit.COMMAND.report(Pursuit(problem="leo-pursuit")),
-    }
+    return {name: command.report(options) for name, (command, options) in OPTIONS.items()}
 
 
 @pytest.fixture(scope="module")
 def pages(reports: dict[str, Any]) -> dict[str, str]:
-    return {name: PAGES[name](report) for name, report in reports.items()}
+    return {name: OPTIONS[name][0].to_html(report) for name, report in reports.items()}
 
 
 def rows(opened: Opened, table: int) -> dict[str, str]:
@@ -62,7 +53,7 @@ def rows(opened: Opened, table: int) -> dict[str, str]:
     return dict(zip(*[iter(cells)] * 2, strict=True))
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", OPTIONS)
 def test_slider_and_keys_move_the_time_wide_and_narrow(
     open_page: Open, pages: dict[str, str], screenshots: Path, name: str
 ) -> None:
@@ -85,7 +76,7 @@ def test_slider_and_keys_move_the_time_wide_and_narrow(
         page.screenshot(path=screenshots / f"{name}-{width}-{scheme}.png", full_page=True)
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", OPTIONS)
 def test_html_in_names_is_text(open_page: Open, reports: dict[str, Any], name: str) -> None:
     report, owner = reports[name], "rendezvous" if name == "reach" else "problem"
     problem = replace(getattr(report, owner), description=CLOSING)
@@ -100,7 +91,7 @@ def test_html_in_names_is_text(open_page: Open, reports: dict[str, Any], name: s
         first, *others = tour.targets.targets
         targets = replace(tour.targets, targets=(replace(first, name=f"{HOSTILE}{CLOSING}"), *others))
         worse = replace(worse, scene=replace(report.scene, tour=replace(tour, targets=targets)))
-    html = PAGES[name](worse)
+    html = OPTIONS[name][0].to_html(worse)
     assert HOSTILE not in html
     assert CLOSING not in html
     opened = open_page(html)
