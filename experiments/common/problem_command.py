@@ -57,12 +57,18 @@ class ProblemCommand(Generic[Problem, Report]):
         """Solve the problem, write the files and print the results."""
         problem: Any = read_file(self.owner, options.problem, options.settings)
         files = ("problem.toml", "results.json", self.csv_name, *figure_files(*self.figure_names))
-        with output_of(options, files) as written, progress_bar(options.quiet) as begin, _solver_errors(problem):
-            report = self.solve(problem, options, begin)
+        with (
+            output_of(options, files) as written,
+            progress_bar(options.quiet) as begin,
+            _errors_of_input(problem, ArithmeticError),  # also of sets that are computed when they are drawn
+        ):
+            with _errors_of_input(problem, ValueError):
+                report = self.solve(problem, options, begin)
+                head = {"versions": versions(), "problem": problem.name, "problem_hash": fingerprint(problem)}
+                results = to_json(head | self.to_json(report))  # a number that is not finite is a ValueError
             page = self.to_html(report) if self.to_html and options.html is not None else ""
             written.save("problem.toml", to_toml(problem))
-            head = {"versions": versions(), "problem": problem.name, "problem_hash": fingerprint(problem)}
-            written.save("results.json", to_json(head | self.to_json(report)), "--json")
+            written.save("results.json", results, "--json")
             if written.wants("--csv"):
                 written.save(self.csv_name, self.to_csv(report), "--csv")
             written.deliver("--html", page)
@@ -100,9 +106,9 @@ def trajectories_csv(
 
 
 @contextlib.contextmanager
-def _solver_errors(problem: Any) -> Iterator[None]:
-    """Turn an error of a solver, or results that are not finite, into an `InputError`."""
+def _errors_of_input(problem: Any, kind: type[Exception]) -> Iterator[None]:
+    """Turn an error of a solver into an `InputError`."""
     try:
         yield
-    except (ArithmeticError, ValueError) as error:
+    except kind as error:
         raise InputError(f"{problem.name}: {error}; check the units and the limits of the problem") from None
