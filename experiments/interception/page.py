@@ -25,7 +25,7 @@ from experiments.interception.course import (
 from infoset import InformationSet, Section
 from infoset.arrays import Floats, Integers
 from infoset.sensors import SENSORS
-from sim import Record, Scenario
+from sim import Record
 from sim.gravity import on_board_model
 
 MAX_RECORDS = 2
@@ -110,7 +110,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "axes": [
             {
                 "along": f" along {axis}" if scenario.is_spatial else "",
-                "measured_name": _measured_name(scenario, axis),
+                "measured_name": f"measured angle along {axis}" if scenario.is_spatial else "measured angle",
                 **_axis_data(record, axis, kept),
                 "fired_m_s": [record.steps[index].axes[axis].impulse_m_s for index in fired],
                 "outlines": {
@@ -123,10 +123,6 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
             for axis in model.axes
         ],
     }
-
-
-def _measured_name(scenario: Scenario, axis: str) -> str:
-    return f"measured angle along {axis}" if scenario.is_spatial else "measured angle"
 
 
 def _next(record: Record, kept: Sequence[int]) -> list[int]:

@@ -12,9 +12,9 @@ from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.screen import Part, figure_files, number, number_table, show
 from experiments.interception.command import Adversary
-from experiments.interception.record_file import record_path, write_record
+from experiments.interception.record_file import record_path
 from experiments.interception.runs.engage import steps_csv
-from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, need_times, read_times
+from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, read_times, save_records
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, work_of
 from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import own_strategy
@@ -50,16 +50,11 @@ def run(options: Adversary) -> None:
                 f"{'omit --keep-set, or ' if options.keep_set else ''}check the units of the scenario with: infoset "
                 "scenarios check FILE"
             )
-        files = [file for file in (options.record, options.out and options.out / RECORD) if file is not None]
-        records = [chosen.record(own)] if files else []
-        if records:
-            need_times(options.times, times_s, records)
         work.save(_summary(worst, chosen, options))
-        for record in records:
+        if options.record is not None or options.out is not None:
+            record = chosen.record(own)
             work.written.save("steps.csv", steps_csv([record]))
-            for file in files:
-                write_record(record, file, overwrite=options.overwrite)
-                work.written.add(file)
+            save_records({RECORD: record}, [options.record], work.written, options.overwrite)
             draw_engagements([record], times_s, work.written, work.begin)
     show(_parts(scenario, worst, options, elapsed_s), options.quiet, stdout_taken=work.written.stdout_taken)
 

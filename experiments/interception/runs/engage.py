@@ -9,13 +9,13 @@ from time import perf_counter
 from experiments.common.output import Cell, outcome_columns, to_csv
 from experiments.common.screen import figure_files, show
 from experiments.interception.command import Engage
-from experiments.interception.record_file import record_path, write_record
+from experiments.interception.record_file import record_path
 from experiments.interception.runs.engagement_table import (
     FIGURES,
     draw_engagements,
     engagement_parts,
-    need_times,
     read_times,
+    save_records,
 )
 from experiments.interception.runs.shared import need_finite, work_of
 from experiments.interception.scenario_file import scenario_with
@@ -53,14 +53,10 @@ def run(options: Engage) -> None:
             need_finite(record.result)
             records.append(record)
             summaries[noise.value] = _summary(record, perf_counter() - began_s)
-        need_times(options.times, times_s, records)
         work.save(summaries if both else summaries[noises[0].value])
         work.written.save("steps.csv", steps_csv(records), "--csv")
-        for noise, record, name in zip(noises, records, folder_records, strict=True):
-            for target in (record_files.get(noise), options.out and options.out / name):
-                if target is not None:
-                    write_record(record, target, overwrite=options.overwrite)
-                    work.written.add(target)
+        named = dict(zip(folder_records, records, strict=True))
+        save_records(named, [record_files.get(noise) for noise in noises], work.written, options.overwrite)
         draw_engagements(records, times_s, work.written, work.begin)
     show(engagement_parts(records), options.quiet, stdout_taken=work.written.stdout_taken)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from experiments.common.errors import InputError, input_errors
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
 from experiments.interception.published import SINGLE, printed_single_runs
+from experiments.interception.record_file import write_record
 from experiments.interception.runs.shared import THEOREM_8_NAME, allowance, bound_name
 from sim import Record
 from sim.results import ending
@@ -51,7 +52,6 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
         table.add_row(name, *(values.get(name, "") for _, values in columns))
     yield " | ".join(dict.fromkeys(record.scenario.name for record in records))
     yield table
-    yield from filter(None, map(_both_failures, records))
     yield from dict.fromkeys(filter(None, (allowance(record.scenario) for record in records)))
 
 
@@ -65,16 +65,6 @@ def _outcome(record: Record) -> str:
         time_s, label_km = record.steps[contradiction.step].time_s, contradiction.label_m / 1e3
         outcome = f"{outcome} at {time_s:g} s, section {label_km:.0f} km"
     return ending(outcome, record.result.hit.tolist()[0])
-
-
-def _both_failures(record: Record) -> str:
-    """Return a line if the set became empty and the budget was spent: the outcome names only one of them."""
-    result, thruster = record.result, record.scenario.thruster
-    left_m_s = thruster.budget_m_s - float(result.impulse_m_s[0])
-    if not result.set_emptied[0] or left_m_s >= max(thruster.min_impulse_m_s, 1e-9 * thruster.budget_m_s):
-        return ""
-    budget = f"the impulse budget of {thruster.budget_m_s:g} m/s was spent"
-    return f"{record.noise_name} noise: the set became empty, and {budget}"
 
 
 def read_times(text: str | None, folder: Path | None) -> tuple[float, ...]:
@@ -98,12 +88,13 @@ def read_times(text: str | None, folder: Path | None) -> tuple[float, ...]:
     return times_s
 
 
-def need_times(text: str | None, times_s: Sequence[float], records: Sequence[Record]) -> None:
-    """Raise `InputError` if a time of ``--times`` is after the last step of all engagements."""
-    last_s = max(record.steps[-1].time_s for record in records)
-    late_s = [time_s for time_s in times_s if time_s > last_s]
-    if text is not None and late_s:
-        raise InputError(f"--times: {late_s[0]:g} s is after the last step, at {last_s:g} s; give earlier times")
+def save_records(records: Mapping[str, Record], files: Sequence[Path | None], written: Output, overwrite: bool) -> None:
+    """Write records into the folder under their names, and each into a file if there is one."""
+    for (name, record), file in zip(records.items(), files, strict=True):
+        for target in (file, written.folder and written.folder / name):
+            if target is not None:
+                write_record(record, target, overwrite=overwrite)
+                written.add(target)
 
 
 def draw_engagements(

@@ -12,7 +12,6 @@ from experiments.interception.runs.engagement_table import (
     FIGURES,
     draw_engagements,
     engagement_parts,
-    need_times,
     read_times,
 )
 
@@ -29,7 +28,6 @@ def run(options: Replay) -> None:
         progress_bar(options.quiet) as begin,
     ):
         records = [load_record(file) for file in options.records]
-        need_times(options.times, times_s, records)
         if options.html is not None:
             written.deliver("--html", interception_page(records))
         if options.gif is not None:

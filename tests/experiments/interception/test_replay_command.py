@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -98,16 +97,3 @@ def test_figure_3_at_other_times(file: Path, tmp_path: Path, capsys: pytest.Capt
 def test_times_that_draw_nothing_are_refused(infoset: Command, brief_file: Path) -> None:
     code, _, err = infoset("engage", brief_file, "--times", "1")
     assert (code, "--times: chooses the sets of figure 3, which only --out DIR writes" in err) == (2, True)
-    assert infoset("engage", brief_file, "-q", "--record", "a.npz")[0] == 0
-    for command in (("replay", "a.npz"), ("engage", brief_file)):
-        code, _, err = infoset(*command, "--times", "0.5,2000", "--out", "drawn")
-        assert code == 2
-        assert re.search(r"--times: 2000 s is after the last step, at [\d.]+ s; give earlier times", err)
-
-
-def test_both_failures_of_an_engagement_are_printed(infoset: Command) -> None:
-    budget = ("--set", "thruster.budget_m_s=60")
-    code, out, _ = infoset("engage", "asteroid-1997", "--model", "paper", *budget)
-    assert code == 0
-    assert "set-empty at" in out
-    assert "random noise: the set became empty, and the impulse budget of 60 m/s was spent" in out
