@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -173,9 +174,11 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
         axes.set_xticks(columns, names, rotation=90)
         axes.set_ylabel(f"excess, {_COST}")
         return
+    shown = _widest_pair(excess)
     if len(names) == 3:
-        shade = axes.scatter(excess[:, 0], excess[:, 1], c=excess[:, 2], s=4.0, cmap="cividis")
-        axes.figure.colorbar(shade, ax=axes, location="top", label=f"$e$ of {names[2]}, {_COST}")
+        (third,) = {0, 1, 2} - set(shown)
+        shade = axes.scatter(excess[:, shown[0]], excess[:, shown[1]], c=excess[:, third], s=4.0, cmap="cividis")
+        axes.figure.colorbar(shade, ax=axes, location="top", label=f"$e$ of {names[third]}, {_COST}")
     elif solution.same_matrix:
         distance = float(distances(solution)[0, 1])
         along = np.linspace(0.0, distance**2, _POINTS)
@@ -183,8 +186,15 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
     else:
         axes.plot(excess[:, 0], excess[:, 1], color=SET_EDGE)
     for choice, values in chosen.items():
-        axes.plot(*values[:2], marker=_CHOICES[choice][0], markersize=7.0, **_HOLLOW)
-    label_axes(axes, [f"excess $e$ of {name}, {_COST}" for name in names[:2]])
+        axes.plot(*values[list(shown)], marker=_CHOICES[choice][0], markersize=7.0, **_HOLLOW)
+    label_axes(axes, [f"excess $e$ of {name}, {_COST}" for name in (names[index] for index in shown)])
+
+
+def _widest_pair(excess: Floats) -> tuple[int, int]:
+    """Return the two craft whose excesses are least correlated: they show the front best."""
+    pairs = list(combinations(range(excess.shape[1]), 2))
+    correlation = np.abs(np.corrcoef(excess.T))
+    return min(pairs, key=lambda pair: float(correlation[pair]))
 
 
 def _draw_sweep(axes: Axes, solution: EncounterSolution, sweep: DurationSweep) -> None:

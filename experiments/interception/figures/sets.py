@@ -91,7 +91,7 @@ def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[P
         chosen = choose_sections(step.sections, sections)
         ranges = f"{_km(chosen[0])} to {_km(chosen[-1])} km" if chosen else "no section is left"
         noise = name.removeprefix(f"({ascii_lowercase[number]}) ") if len(records) > 1 else name
-        title = plain(f"{noise}, {clock.text(record, step.time_s)}, {ranges}")
+        title = plain(f"{noise},\n{clock.text(record, step.time_s)}, {ranges}")
         planes += [Plane(title, record, axis, step, chosen) for axis in record.scenario.set_model.axes]
     return planes
 

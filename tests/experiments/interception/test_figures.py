@@ -111,7 +111,7 @@ def test_sets_show_truth_measurement_and_sections(records: list[Record]) -> None
         for outline, section in zip(outlines, chosen, strict=True):
             assert section.omega_alpha is not None
             np.testing.assert_allclose(outline[:-1], section.omega_alpha.polygon() * [1e6, 1e3])
-        name = f"({'abcdef'[position]}) {('random', 'game')[position % 2]} noise, t = {step.time_s:g} s"
+        name = f"({'abcdef'[position]}) {('random', 'game')[position % 2]} noise,\nt = {step.time_s:g} s"
         assert axes.get_title("left") == f"{name}, {chosen[0].range_m / 1e3:.0f} to {chosen[-1].range_m / 1e3:.0f} km"
     for first, second in zip(figure.axes[::2], figure.axes[1::2], strict=True):
         assert (first.get_xlim(), first.get_ylim()) == (second.get_xlim(), second.get_ylim())
@@ -122,7 +122,7 @@ def test_sets_without_a_measurement_or_a_section(records: list[Record]) -> None:
     blind = replace(records[0], steps=tuple(along_z(step, measured={}) for step in records[0].steps))
     assert len(legend(draw_sets([blind]))) == 2
     (axes,) = draw_sets(records[1:], times_s=(500.0,)).axes
-    assert axes.get_title("left") == f"game noise, t = {records[1].steps[-1].time_s:g} s, no section is left"
+    assert axes.get_title("left") == f"game noise,\nt = {records[1].steps[-1].time_s:g} s, no section is left"
 
 
 def test_chosen_sections_keep_the_ends(records: list[Record]) -> None:
