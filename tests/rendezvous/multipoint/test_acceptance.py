@@ -29,6 +29,7 @@ Make = Callable[..., Tour]
 
 NINE_DIGITS = 1e-9
 
+# fmt: off
 TWO = {
     "ts": [1500.0, 3000.0],
     "I": 0.007795510260921629,
@@ -53,6 +54,8 @@ TWO = {
     "I_rdv_all": 0.017027253321755767,
     "I_rdv_last_opt": 0.0143926742,
 }
+# fmt: on
+# fmt: off
 THREE = {
     "ts": [1200.0, 2600.0, 4000.0],
     "I": 0.021142280110555873,
@@ -80,6 +83,7 @@ THREE = {
     "I_rdv_all": 0.03321098114186421,
     "I_rdv_last_opt": 0.02315574123,
 }
+# fmt: on
 CASES = pytest.mark.parametrize("case", [TWO, THREE], ids=["two", "three"])
 
 

@@ -85,20 +85,6 @@ def test_the_front_of_two_in_closed_form() -> None:
     np.testing.assert_allclose(front_of_two(between, found.excess[:, 0]), found.excess[:, 1], atol=1e-12 * between**2)
 
 
-def test_the_front_of_three_in_closed_form() -> None:
-    solution = some(2, 3)
-    inside = np.random.default_rng(3).dirichlet([2.0, 2.0, 2.0], size=200)
-    found = pareto_set(solution, inside)
-    (_, base, left), (_, _, right) = distances(solution)[:2]
-    first, second, third = found.excess.T
-    # In the plane triangle of the ideals the distances of a point from two corners give the third.
-    along = (base**2 + first - second) / (2.0 * base)
-    corner = (base**2 + left**2 - right**2) / (2.0 * base)
-    across, height = np.sqrt(np.maximum(first - along**2, 0.0)), np.sqrt(left**2 - corner**2)
-    # Near the edge between the first two ideals the square root amplifies rounding.
-    np.testing.assert_allclose((along - corner) ** 2 + (across - height) ** 2, third, rtol=1e-7)
-
-
 @given(SEEDS, st.integers(1, 5), st.booleans(), st.sampled_from(list(Meeting)))
 @settings(max_examples=30, deadline=None)
 def test_the_min_sum_of_costs_is_min(seed: int, count: int, own_starts: bool, meeting: Meeting) -> None:
@@ -218,14 +204,6 @@ def test_coalitions_are_superadditive_and_shares_add_up(seed: int, count: int, o
             joined, before = tuple(sorted(order[: place + 1])), tuple(sorted(order[:place]))
             added[member] += (worth[joined] - worth.get(before, 0.0)) / len(orders)
     np.testing.assert_allclose(found.shapley, added, rtol=1e-9, atol=1e-12)
-
-
-def test_craft_that_agree_have_nothing_to_share() -> None:
-    solution = some(9, 1)
-    twins = tuple(replace(solution.encounter.craft[0], name=name) for name in ("a", "b"))
-    found = analyse_coalitions(solve_encounter(replace(solution.encounter, craft=twins)))
-    assert found.core is Core.ZERO
-    np.testing.assert_allclose(found.shapley, 0.0, atol=1e-12)
 
 
 def test_peak_and_impulse_of_a_flight() -> None:

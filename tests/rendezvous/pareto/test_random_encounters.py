@@ -9,23 +9,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.sparse import block_diag, csc_matrix
+from scipy.sparse import csc_matrix
 
 from rendezvous.pareto import (
     Component,
     Craft,
     Encounter,
     EncounterSolution,
-    Feasibility,
     Meeting,
-    NotCertifiedError,
-    Plan,
-    check_bound,
-    min_peak,
     min_sum_of_costs,
     minimax_excess,
     nearest_to,
-    peak_control,
     simplex_weights,
     solve_encounter,
 )
@@ -168,102 +162,10 @@ def the_nearest_is_nearest(seed: int) -> None:
     )
 
 
-def some_plan(seed: int, longest_rad: float) -> tuple[Plan, int]:
-    random = np.random.default_rng(seed)
-    encounter = some_encounter(seed, longest_rad, max_craft=2)
-    solution = solve_encounter(encounter)
-    return solution.plan(int(random.integers(len(solution.costs)))), encounter.common
-
-
-def held(plan: Plan, common: int, count: int) -> tuple[Floats, Floats]:
-    """Effects at the meeting of controls held over equal intervals, shape (c, 3 k), and what must be achieved."""
-    motion, start, end = plan.craft.motion, plan.craft.start_s, plan.meeting_s
-    grid = np.linspace(start, end, count + 1)
-    effects = motion.transition(grid[1:], np.full(count, end)) @ motion.held_input(grid[:-1], grid[1:])
-    scale = np.array([end - start] * 3 + [1.0] * 3)
-    wanted = motion.gramian(start, end) @ plan.costate / scale
-    rows = (effects / scale[:, None]).transpose(1, 0, 2).reshape(6, -1)
-    return rows[:common], wanted[:common]
-
-
-def min_peak_program(plan: Plan, common: int, count: int) -> tuple[float, float]:
-    """Bounds of the minimum peak: of held controls by a cone program from above, of its multipliers from below."""
-    rows, wanted = held(plan, common, count)
-    # Balanced, so that the program's tolerances mean something in each component.
-    left, sizes, right = np.linalg.svd(rows, full_matrices=False)
-    goal = left.T @ wanted / sizes
-    length = float(np.linalg.norm(goal)) / np.sqrt(3.0 * count)
-    goal = goal / (length * np.sqrt(count))
-    cone = np.zeros((4, 3))
-    cone[1:] = -np.eye(3)
-    heights = np.zeros((4 * count, 1))
-    heights[::4] = -1.0
-    equal = np.concatenate([right / np.sqrt(count), np.zeros((len(goal), 1))], axis=1)
-    conic = np.concatenate([block_diag([cone] * count).toarray(), heights], axis=1)
-    options = clarabel.DefaultSettings()
-    options.verbose = False
-    options.tol_gap_abs = options.tol_gap_rel = options.tol_feas = 1e-11
-    size = 3 * count + 1
-    objective = np.append(np.zeros(size - 1), 1.0)
-    solver = clarabel.DefaultSolver(
-        csc_matrix((size, size)),
-        objective,
-        csc_matrix(np.concatenate([equal, conic])),
-        np.concatenate([goal, np.zeros(4 * count)]),
-        [clarabel.ZeroConeT(len(goal)), *[clarabel.SecondOrderConeT(4)] * count],
-        options,
-    )
-    found = solver.solve()
-    assert str(found.status) in ("Solved", "AlmostSolved")
-    above = float(objective @ np.array(found.x)) * length
-    multipliers = left @ (np.array(found.z)[: len(goal)] / sizes)
-    # Any multipliers l give the bound l'e / int |B' Phi' l| dt; the integral by a rule that is much too fine.
-    motion, start, end = plan.craft.motion, plan.craft.start_s, plan.meeting_s
-    places, weights = np.polynomial.legendre.leggauss(8)
-    half = 0.5 * (end - start) / (4 * count)
-    times = (start + half * (2.0 * np.arange(4 * count) + 1.0)[:, None] + half * places).ravel()
-    scale = np.array([end - start] * 3 + [1.0] * 3)
-    effects = (motion.transition(times, np.full(times.shape, end))[:, :, 3:] / scale[:, None])[:, :common]
-    sizes_at = np.linalg.norm(np.einsum("kai,a->ki", effects, multipliers), axis=1)
-    below = abs(float(multipliers @ wanted)) / float(np.tile(half * weights, 4 * count) @ sizes_at)
-    return below, above
-
-
-REFUSED = (1826,)
-"""Of `MANY`: the direction of the control almost vanishes at some time, and the two bounds stay 5e-6 apart."""
-
-
-def the_min_peak_agrees(seed: int) -> None:
-    plan, common = some_plan(seed, 12.0)
-    if seed in REFUSED:
-        with pytest.raises(NotCertifiedError, match="not known to 1e-06"):
-            min_peak(plan, common)
-        return
-    minimum = min_peak(plan, common)
-    if not plan.costate.any():
-        assert minimum == peak_control(plan) == 0.0
-        return
-    below, above = min_peak_program(plan, common, 100)
-    assert minimum >= below * (1.0 - 2e-6)
-    assert minimum <= above * (1.0 + 1e-7)
-    assert above <= minimum * 1.02
-    peak = peak_control(plan)
-    assert minimum <= peak * (1.0 + 1e-9)
-    for bound, verdict in (
-        (minimum * (1.0 - 1e-9), Feasibility.IMPOSSIBLE),
-        (minimum * (1.0 + 1e-9), Feasibility.ANOTHER_CONTROL),
-        (peak * (1.0 + 1e-9), Feasibility.WITHIN),
-    ):
-        told = check_bound(plan, bound, common).feasibility
-        # Where the two bounds coincide, the control of minimum energy is that of minimum peak.
-        assert told is verdict or (peak <= minimum * (1.0 + 2e-6) and told is not Feasibility.IMPOSSIBLE)
-
-
 CHECKS = [
     the_min_sum_agrees,
     the_min_max_agrees,
     the_nearest_is_nearest,
-    the_min_peak_agrees,
 ]
 
 

@@ -7,7 +7,6 @@ from rendezvous.pursuit_evasion import (
     Ended,
     Observation,
     Policy,
-    RandomSteering,
     Script,
     Solution,
     Steering,
@@ -93,15 +92,3 @@ def test_a_script_changes_its_policy_at_its_times() -> None:
     state = np.array([7e6, 0.0, 0.0, 0.0, 7e3, 0.0])
     np.testing.assert_array_equal(script(99.0, state), np.zeros(3))
     np.testing.assert_array_equal(script(100.0, state), state[3:])
-
-
-def test_random_steering_is_the_same_however_often_it_is_asked() -> None:
-    steering = RandomSteering(1, 0, 100.0)
-    state = np.zeros(6)
-    first = steering(50.0, state)
-    assert np.linalg.norm(first) == pytest.approx(1.0)
-    np.testing.assert_array_equal(first, steering(99.0, state))
-    assert not np.array_equal(first, steering(100.0, state))
-    assert not np.array_equal(first, RandomSteering(1, 1, 100.0)(50.0, state))
-    with pytest.raises(ValueError, match="read-only"):  # it is drawn once, and told to whoever asks
-        first[0] = 0.0
