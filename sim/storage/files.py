@@ -26,7 +26,7 @@ def replace_file(file: Path, content: bytes) -> None:
     which is atomic, and the folder is flushed so that the new name is on the disk too. Raises `OSError`; the file is
     then unchanged.
     """
-    temporary = temporary_beside(file)
+    temporary = file.parent / f"{_TEMPORARY}{os.getpid()}-{secrets.token_hex(4)}.tmp"
     try:
         with temporary.open("xb") as stream:
             stream.write(content)
@@ -42,11 +42,6 @@ def replace_file(file: Path, content: bytes) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-def temporary_beside(file: Path) -> Path:
-    """Return a short unused name in the folder of a file."""
-    return file.parent / f"{_TEMPORARY}{os.getpid()}-{secrets.token_hex(4)}.tmp"
 
 
 def write_whole(file: Path, content: bytes) -> None:

@@ -16,9 +16,8 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from numpy.typing import NDArray
 
-from guidance import NoiseKind, Situation, TieRule
+from guidance import NoiseKind, TieRule
 from sim import Body, Campaign, CampaignNoise, QuantileName, Scenario, StoppingRule, fly_one, simulate
 from sim.parallel import Task, simulate_task, worker_processes
 from sim.scenario import of_model
@@ -95,21 +94,6 @@ def test_any_executor_will_do(brief: Scenario, reference: pd.DataFrame, tmp_path
     assert shuffled.most_waiting <= 4
     with worker_processes(2) as pool:
         assert same(mixed(brief, tmp_path / "processes").run(pool).runs(), reference)
-
-
-def test_a_campaign_of_an_own_strategy(brief: Scenario, tmp_path: Path) -> None:
-    class Nothing:
-        def start(self, batch: int) -> None:
-            return None
-
-        def decide(self, situation: Situation, state: object) -> NDArray[np.float64]:
-            return np.zeros(len(situation.budget_left_m_s))
-
-    campaign = Campaign(brief, 20, tmp_path, strategy=Nothing())
-    assert campaign.run().runs()["impulse_m_s"].tolist() == [0.0] * 20
-    assert read_manifest(tmp_path).strategy.endswith("Nothing")
-    with pytest.raises(StorageError, match="strategy: "):
-        replace(campaign, strategy=None).run(resume=True)
 
 
 def test_guaranteed_misses_are_unknown_where_they_are_not_computed(brief: Scenario, tmp_path: Path) -> None:

@@ -54,15 +54,11 @@ def test_the_texts_of_rules_and_requirements_are_exact(level: float, number: flo
     [
         "",
         "miss_m",
-        "miss_m p99",
         "miss_m p0 ci<1",
-        "miss_m p100 ci<1",
         "miss_m p99 ci<0",
         "miss_m p99 ci<nan",
-        "miss_m p99 ci<1e999",
         "miss_m p99 ci>1",
         "miss p99 ci<1",
-        "miss_m p" + "9" * 10_000 + " ci<1",
     ],
 )
 def test_what_is_no_rule(text: str) -> None:
