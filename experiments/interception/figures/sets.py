@@ -57,7 +57,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             _shade_allowed(axes, plane)
     titles = [plane.title for planes in rows for plane in planes]
     letters([*grid.flat], [title.replace(", ", ",\n") for title in titles] if columns > 2 else titles)
-    legend_below(figure, 2)
+    legend_below(figure, min(2, columns))
     return figure
 
 
