@@ -138,20 +138,26 @@ def _all_constraints(problem: ReachabilityProblem) -> tuple[Floats, Floats, tupl
 
 
 class _Program:
-    """The linear program of a plan: variables are nominal controls, gains, and absolute values."""
+    """The linear program of a plan: variables are nominal controls, gains, and absolute values.
+
+    Controls are divided by their bounds. `gain_at` are the variables of the gains of (t, s, control, disturbance).
+    """
 
     def __init__(self, problem: ReachabilityProblem, disturbance: Floats) -> None:
-        self.problem, self.disturbance = problem, disturbance
+        self.problem, self.disturbance, self.effect = problem, disturbance, accumulated(problem, disturbance)
         self.periods, self.states, self.group = problem.periods, problem.states, problem.controls
         self.width = disturbance.shape[2]
-        pairs = [(t, s) for t in range(self.periods) for s in range(t)]
-        self.gain_at = {pair: index for index, pair in enumerate(pairs)}
-        self.gains = self.periods * self.group  # index of the first
-        self.begin = self.size = self.gains + len(pairs) * self.group * self.width
+        gains = [(t, *rest) for t in range(self.periods) for rest in np.ndindex(t, self.group, self.width)]
+        self.gain_at = {gain: self.periods * self.group + index for index, gain in enumerate(gains)}
+        self.begin = self.size = self.periods * self.group + len(gains)
         self.rows: list[dict[int, float]] = []
         self.limits: list[float] = []
-        self.free, self.response = self._unfold()
-        self.effect = accumulated(problem, disturbance)
+        # x(t) = free[t] + response[t] of all controls.
+        self.free = problem.run(np.zeros((self.periods, self.group)))
+        self.response = np.zeros((self.periods + 1, self.states, self.periods, self.group))
+        for t in range(self.periods):
+            self.response[t + 1] = np.einsum("ij,jsm->ism", problem.transition[t], self.response[t])
+            self.response[t + 1][:, t] += problem.control[t] * problem.control_bounds
 
     def solve(self) -> FeedbackPlan:
         """Build and solve it."""
@@ -198,12 +204,10 @@ class _Program:
 
     def _plan(self, solution: Floats) -> FeedbackPlan:
         problem, reach = self.problem, self.problem.control_bounds
-        nominal = solution[: self.gains].reshape(self.periods, self.group) * reach
+        nominal = solution[: self.periods * self.group].reshape(self.periods, self.group) * reach
         gains = np.zeros((self.periods, self.periods, self.group, self.width))
-        block = self.group * self.width
-        for (t, s), index in self.gain_at.items():
-            start = self.gains + index * block
-            gains[t, s] = solution[start : start + block].reshape(self.group, self.width) * reach[:, None]
+        for (t, s, j, q), index in self.gain_at.items():
+            gains[t, s, j, q] = solution[index] * reach[j]
         centre = problem.run(nominal)
         # Effect of w(s) at t, directly and through the controls.
         total = np.zeros_like(self.effect)
@@ -212,18 +216,6 @@ class _Program:
             total[t + 1, t] += self.disturbance[t]
         spread = np.abs(total).sum(axis=(1, 3))
         return FeedbackPlan(problem, self.disturbance, nominal, gains, centre - spread, centre + spread)
-
-    def _unfold(self) -> tuple[Floats, Floats]:
-        """x(t) = free[t] + response[t] of all controls, these divided by their bounds."""
-        problem = self.problem
-        free = np.zeros((self.periods + 1, self.states))
-        response = np.zeros((self.periods + 1, self.states, self.periods, self.group))
-        free[0] = problem.initial
-        for t in range(self.periods):
-            free[t + 1] = problem.transition[t] @ free[t]
-            response[t + 1] = np.einsum("ij,jsm->ism", problem.transition[t], response[t])
-            response[t + 1][:, t] += problem.control[t] * problem.control_bounds
-        return free, response
 
     def _new(self) -> int:
         self.size += 1
@@ -247,7 +239,7 @@ class _Program:
         for s in range(time):
             for q in range(self.width):
                 entries = {
-                    self._gain(t, s, j, q): float(turned[t, j])
+                    self.gain_at[t, s, j, q]: float(turned[t, j])
                     for t in range(s + 1, time)
                     for j in range(self.group)
                     if turned[t, j] != 0.0
@@ -269,11 +261,9 @@ class _Program:
         for t in range(self.periods):
             for j in range(self.group):
                 spread = {
-                    self._absolute({self._gain(t, s, j, q): 1.0}, 0.0): 1.0 for s in range(t) for q in range(self.width)
+                    self._absolute({self.gain_at[t, s, j, q]: 1.0}, 0.0): 1.0
+                    for s in range(t)
+                    for q in range(self.width)
                 }
                 for sign in (1.0, -1.0):
                     self._add({t * self.group + j: sign, **spread}, 1.0)
-
-    def _gain(self, time: int, cause: int, control: int, move: int) -> int:
-        block = self.group * self.width
-        return int(self.gains + self.gain_at[time, cause] * block + control * self.width + move)
