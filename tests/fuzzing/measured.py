@@ -39,17 +39,7 @@ print(json.dumps(found))
 
 @dataclass(frozen=True)
 class Measured:
-    """How a file was refused.
-
-    Parameters
-    ----------
-    message : str
-        Empty if it was not.
-    seconds : float
-        Of the processor.
-    megabytes : float
-        More than before.
-    """
+    """How a file was refused."""
 
     message: str
     seconds: float
@@ -57,18 +47,7 @@ class Measured:
 
 
 def measured(reader: str, *paths: Path) -> list[Measured]:
-    """Read files, one after the other, in a process of their own.
-
-    Parameters
-    ----------
-    reader : str
-        record or scenario.
-    *paths : Path
-
-    Returns
-    -------
-    list of Measured
-    """
+    """Read files, one after the other, in a process of their own."""
     if not Path("/proc/self/clear_refs").exists():
         pytest.skip("memory is measured as Linux tells it")
     command = [sys.executable, "-W", "error", "-c", _CHILD, reader, *map(str, paths)]

@@ -23,18 +23,7 @@ _BYTES = (b"\0", b"\xff", b"\x80", b"\xc0\xaf", b"\xed\xa0\x80", b"\x7f", b"\n",
 
 
 def mutated_toml(text: str, draw: random.Random) -> bytes:
-    """Return a TOML file with one to three things done to it.
-
-    Parameters
-    ----------
-    text : str
-    draw : random.Random
-
-    Returns
-    -------
-    bytes
-        Perhaps no TOML, perhaps no text.
-    """
+    """Return a TOML file with one to three things done to it."""
     for _ in range(draw.choice((1, 1, 2, 3))):
         text = draw.choice(_TEXT_MUTATIONS)(text.split("\n"), draw)
     content = text.encode(errors="surrogatepass")
@@ -42,18 +31,7 @@ def mutated_toml(text: str, draw: random.Random) -> bytes:
 
 
 def mutated_bytes(content: bytes, draw: random.Random) -> bytes:
-    """Return bytes with a bit flipped, bytes put in, taken out, repeated or written over, or the end cut off.
-
-    Parameters
-    ----------
-    content : bytes
-    draw : random.Random
-
-    Returns
-    -------
-    bytes
-        Perhaps the same.
-    """
+    """Return bytes with a bit flipped, bytes put in, taken out, repeated or written over, or the end cut off."""
     at, size = draw.randrange(len(content) + 1), draw.choice((1, 1, 2, 4, 8, 100))
     match draw.choice(("flip", "flip", "flip", "put in", "take out", "repeat", "write over", "cut off")):
         case "flip" if content:
