@@ -98,12 +98,15 @@ def label_axes(axes: Any, titles: Sequence[str]) -> None:
         axes.tick_params(pad=-2.0)
 
 
-def letters(panels: Iterable[Axes], titles: Sequence[str] = ()) -> None:
-    """Write (a), (b) ... above axes, with their titles if there are any; no letter above a single one."""
+def letters(panels: Iterable[Axes], titles: Sequence[str] = (), **look: Any) -> None:
+    """Write (a), (b) ... above axes, with their titles if there are any; no letter above a single one.
+
+    `look` are arguments of `matplotlib.text.Text`.
+    """
     every = [*panels]
     for number, axes in enumerate(every):
         letter = [f"({chr(ord('a') + number)})"] if len(every) > 1 else []
-        axes.set_title(" ".join([*letter, *titles[number : number + 1]]), loc="left")
+        axes.set_title(" ".join([*letter, *titles[number : number + 1]]), loc="left", **look)
 
 
 def legend_below(figure: Figure, columns: int, **more: Any) -> None:

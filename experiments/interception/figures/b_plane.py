@@ -123,7 +123,7 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
         titles.append(f"{plain(each.title)}\n{quantiles}")
         if index % columns and not alone:
             axes.set_ylabel("")
-    letters(panels, titles)
+    letters(panels, titles, fontsize="small")
     note = "The scale differs from panel to panel." if alone else None
     legend_below(figure, min(2, columns), title=note)
     return figure
