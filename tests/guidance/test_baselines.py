@@ -23,7 +23,6 @@ from guidance import (
     make_strategy,
     strategy_names,
 )
-from guidance.kalman import _independent_error_rad
 from guidance.scripted_noise import ScriptedNoise
 from infoset import AngleSensor, Bias, InformationSet, Model, SetModel, StateBox
 from infoset.arrays import Flags, Floats
@@ -215,19 +214,6 @@ def test_the_dead_band_is_the_min_impulse_by_default_and_old_commands_are_not_gi
     assert state.accumulated_m_s[0] == 0.0
 
 
-@pytest.mark.parametrize("is_augmented", [False, True])
-def test_scheduled_impulses_of_proportional_navigation(is_augmented: bool) -> None:
-    """After each burn the miss is what continuous acceleration leaves at the next; the last burn corrects all."""
-    truth, burns = Truth(0.0, 2.0), [100, 650, 880]
-    flight = fly(ProportionalNavigation(truth.estimator(), is_augmented), truth, 1000, burns)
-    assert np.flatnonzero(flight.impulses_m_s).tolist() == burns
-    left = 2000.0
-    for to_go, later in ((900.0, 350.0), (350.0, 120.0)):
-        left *= (later / to_go) ** 3
-        assert flight.misses_m[round(T - later)] == pytest.approx(left)
-    assert abs(flight.misses_m[-1]) < 1e-6
-
-
 def test_predictive_guidance_leaves_the_error_of_its_last_estimate() -> None:
     """k_i = (e_i - e_(i-1))/tau_i after the first burn, and the miss is -e_i."""
     errors = {900.0: 300.0, 350.0: -40.0, 120.0: 5.0}
@@ -245,29 +231,6 @@ def test_predictive_guidance_corrects_an_exact_estimate_at_once() -> None:
     assert np.flatnonzero(np.abs(flight.impulses_m_s) > 1e-9).tolist() == [500]
     assert flight.impulses_m_s[500] == pytest.approx(2100.0 / 500.0)
     assert abs(flight.misses_m[-1]) < 1e-6
-
-
-def test_predictive_guidance_without_a_schedule_has_geometric_times() -> None:
-    truth = Truth(0.0, 2.0)
-    # Each estimate errs by its time to go, so each manoeuvre is the half of it or more.
-    flight = fly(Predictive(truth.estimator(lambda to_go: to_go), spacing=2.0), truth, 1000)
-    times = flight.to_go_s[np.abs(flight.impulses_m_s) > 1e-6]
-    np.testing.assert_allclose(times, [500.0, 250.0, 125.0, 62.0, 31.0, 15.0, 7.0, 3.0, 1.0], atol=1e-6)
-    np.testing.assert_allclose(flight.misses_m[-1], -1.0, atol=1e-6)
-
-
-def test_a_manoeuvre_beyond_the_max_impulse_continues() -> None:
-    truth = Truth(0.0, 2.0)
-    strategy = Predictive(truth.estimator(), spacing=2.0)
-    state, engine, given = strategy.start(1), Thruster(1e9, 0.0, 1.5), []
-    for step in range(1000):
-        now = replace(situation(step_s=1.0), thruster=engine, step=step, time_s=1.0 * step)
-        given.append(float(engine.give(strategy.decide(now, state), np.array([1e9]))[0]))
-        truth.v -= given[-1]
-        truth.advance(1.0)
-    assert np.flatnonzero(np.abs(given) > 1e-9).tolist() == [500, 501, 502]
-    assert given[500:502] == [1.5, 1.5]
-    assert abs(truth.z) < 1e-6
 
 
 @pytest.mark.parametrize("make", [ProportionalNavigation, Predictive])
@@ -354,30 +317,6 @@ def test_lost_images_change_nothing_in_the_engagement_that_lost_them() -> None:
     assert len(set(estimate.miss_m.tolist())) == 3
 
 
-def test_no_measurement_so_far_is_not_a_measurement() -> None:
-    """The measured value of an engagement without an image so far is NaN."""
-    estimator = KalmanBank(2)
-    flags = {"angle": np.array([False, True])}
-    now = replace(
-        situation(batch=2), measured={"angle": np.array([np.nan, 1e-4])}, new=frozenset({"angle"}), seen=flags
-    )
-    estimator.update(now)
-    estimate = estimator.estimate(now)
-    assert np.isfinite(estimate.miss_m).all()
-    prior, after = estimate.deviation_m
-    assert prior == pytest.approx(1e5 * np.sqrt(2.0 / 3.0), rel=1e-6)
-    assert after < prior
-
-
-def test_pending_impulses_count_as_given() -> None:
-    estimator, now = measured(KalmanBank, MODEL, Truth(500.0, -2.0), 60)
-    plain = estimator.estimate(now)
-    pending = ((50.0, np.array([0.5])), (1e4, np.array([9.0])))
-    later = estimator.estimate(replace(now, pending=pending, lead_s=100.0))
-    assert later.miss_m[0] == pytest.approx(plain.miss_m[0] - 0.5 * (T - 590.0 - 50.0))
-    assert later.to_go_s[0] == pytest.approx(plain.to_go_s[0] - 100.0)
-
-
 def test_the_dead_zone_ends_at_the_last_allowed_time() -> None:
     now = replace(situation(), measured={"angle": np.array([1e-4])}, new=frozenset({"angle"}))
     strategy = Kalman()
@@ -394,37 +333,6 @@ def test_augmented_estimators_find_the_acceleration_of_the_target() -> None:
     estimator, now = measured(lambda batch, _: KalmanBank(batch, True), model, truth, 60)
     assert estimator.estimate(now).miss_m[0] == pytest.approx(truth.miss_m, rel=0.02)
     assert estimator.mean[0, 0, 4] == pytest.approx(0.006, rel=0.02)
-
-
-@pytest.mark.parametrize("name", BASELINES)
-def test_an_error_bound_that_falls_to_zero_beyond_the_possible_ranges(name: str) -> None:
-    """Warnings are errors: an estimated range can be where the line of the bound is zero."""
-    sensor = AngleSensor(10.0, 1e-9, 1e-4, 1.05 * E * T)
-    model = set_model(sensor)
-    min_m = 1.05 * E * T / (1.0 - 1e-5)  # where the bound is zero
-    ranges_m = np.array([0.5 * E * T, E * T, min_m, 2.0 * min_m])
-    bounds = _independent_error_rad(model, ranges_m)
-    np.testing.assert_array_equal(bounds[:2], sensor.error_bound(ranges_m[:2]))
-    assert (bounds[2:] == 0.5 * sensor.error_bound(model.bounds.farthest_m)).all()
-    strategy = make_strategy(name)
-    now = replace(situation(model), measured={"angle": np.array([2e-4])}, new=frozenset({"angle"}))
-    assert np.isfinite(strategy.decide(now, strategy.start(1))).all()
-
-
-@pytest.mark.parametrize(
-    ("make", "name", "values"),
-    [
-        (ProportionalNavigation, "ratio", (2.0, -3.0, np.nan, np.inf)),
-        (ProportionalNavigation, "dead_band_m_s", (-1.0,)),
-        (Predictive, "spacing", (1.0, 0.5, np.nan)),
-    ],
-)
-def test_settings_outside_their_limits_are_refused(
-    make: Callable[..., Strategy], name: str, values: tuple[float, ...]
-) -> None:
-    for value in values:
-        with pytest.raises(ValueError, match=name):
-            make(**{name: value})
 
 
 @pytest.mark.parametrize("name", BASELINES)

@@ -30,12 +30,6 @@ ROUNDING = 4 * np.finfo(float).eps
 errors = st.floats(-1.0, 1.0)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _compiled() -> None:
-    """Compile the kernels before examples are timed."""
-    looked_at()
-
-
 def sight(alpha: Any, distance: Any, step: int = 0, ranging: bool = True, rating: bool = True) -> LineOfSight:
     alpha = np.atleast_1d(np.asarray(alpha, dtype=np.float64))
     sensors: dict[str, Sensor] = {"angle": SENSOR}
@@ -100,24 +94,6 @@ def test_each_step_and_engagement_has_its_own_error() -> None:
         assert same(found["angle"], SENSOR.error_bound(3e6) * script[:, step])
         assert same(found["range"], seen.range_m)
         assert same(found["rate"], seen.omega_rad_s)
-
-
-def test_what_the_sensors_do_not_measure_is_not_given() -> None:
-    seen = sight(0.001, 3e6, ranging=False, rating=False)
-    script = dict.fromkeys(("angle", "range", "rate"), np.ones((1, 1)))
-    assert set(ScriptedNoise(script).measure(seen, looked_at())) == {"angle"}
-    made = errors_made(seen, {"angle": seen.alpha_rad})
-    assert {name: error.tolist() for name, error in made.items()} == {"angle": [0.0]}
-
-
-@pytest.mark.parametrize("bad", [1.0 + 1e-15, -2.0, np.nan, np.inf])
-def test_an_error_beyond_its_bound_is_refused(bad: float) -> None:
-    good = np.zeros((2, 3))
-    spoilt = good.copy()
-    spoilt[1, 2] = bad
-    for name in ("angle", "range", "rate"):
-        with pytest.raises(ValueError, match=rf"errors\['{name}'\] must lie within \[-1, 1\]"):
-            ScriptedNoise({"angle": good} | {name: spoilt})
 
 
 def test_a_script_that_ends_before_the_flight_is_refused() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -11,7 +10,6 @@ import pytest
 
 from experiments import load_scenario
 from guidance import (
-    GameNoise,
     Kalman,
     LeastEffort,
     NoiseKind,
@@ -38,23 +36,13 @@ from infoset import (
     StateBox,
 )
 from infoset.arrays import Floats
-from sim import Results, Scenario, simulate
-from sim.draws import Draws, draw
-from sim.engagement import Engagements
-from sim.scenario import of_model
+from sim import Scenario, simulate
 
 BATCH = 3
 ALL = np.ones(BATCH, dtype=bool)
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
 BOX = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3), (-8e3, 6e3), (-50.0, 80.0))
 MODEL = SetModel(58e3, 0.5, BOX, SENSOR, disturbance_m_s2=0.005, disturbance_y_m_s2=0.002, model=Model.PAPER)
-IDLE = replace(
-    MODEL,
-    bounds=replace(BOX, y_m=(0.0, 0.0), vy_m_s=(0.0, 0.0)),
-    angle_sensor=replace(SENSOR, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0),
-    disturbance_y_m_s2=0.0,
-    gravity_y_m_s2=0.0,
-)
 AXES = ("y", "z")
 
 
@@ -137,21 +125,6 @@ def test_built_in_strategies_are_flown_on_each_axis(strategy: Strategy) -> None:
     assert np.abs(wanted).max(axis=1).min() > 0.0
 
 
-def test_all_built_in_strategies_are_tested() -> None:
-    assert list(EAGER) == strategy_names()
-
-
-@pytest.mark.parametrize("name", EAGER)
-def test_an_axis_without_uncertainty_gets_no_impulse(name: str) -> None:
-    strategy = EAGER[name]
-    states = start(strategy, BATCH, AXES)
-    for whole in situations(IDLE):
-        assert whole.predicted_miss.exists.all()
-        wanted = decide(strategy, whole, states, ALL)
-        assert (wanted[0] == 0.0).all()
-        assert np.isfinite(wanted).all()
-
-
 def test_the_situation_of_an_axis() -> None:
     whole = situations(MODEL)[-1]
     for number, name in enumerate(AXES):
@@ -220,18 +193,6 @@ class Returns(Noted):
         return self.value
 
 
-class VectorReturns(Returns):
-    spatial = True
-
-
-def test_a_vector_without_the_attribute_is_refused_with_a_hint() -> None:
-    now = situations(MODEL)[0]
-    with pytest.raises(ValueError, match=r"must return 3 finite impulses .*set `spatial = True` in its class"):
-        decide(Returns(np.zeros((2, BATCH))), now, [None, None], ALL)
-    with pytest.raises(ValueError, match=r"shape \(2, 3\), along y and z, .* returned shape \(3,\)"):
-        decide(VectorReturns(np.zeros(BATCH)), now, [None], ALL)
-
-
 def test_an_impulse_need_be_finite_only_where_a_set_is_tracked() -> None:
     now, wanted = situations(MODEL)[0], np.zeros((2, BATCH))
     wanted[0, 1] = np.inf
@@ -265,82 +226,3 @@ def test_a_spatial_strategy_flies_as_the_planar_one_on_each_axis() -> None:
         vector, axes = simulate(scenario, 4, strategy=Symmetric()), simulate(scenario, 4)
         assert np.array_equal(vector.miss_m, axes.miss_m)
         assert np.array_equal(vector.impulse_m_s, axes.impulse_m_s)
-
-
-def fly(scenario: Scenario, draws: Draws, noise: GameNoise | None = None) -> Results:
-    flight = Engagements(scenario, draws, noise=noise)
-    while flight.flying:
-        flight.advance()
-    return flight.results(np.arange(len(draws.position_m)))
-
-
-def by_axis(draws: Draws, change: Callable[[Floats], Floats]) -> Draws:
-    """Draws of an engagement in free space, with the parts of the two axes, shape (2, ...), changed."""
-    start = (
-        np.concatenate([change(part[:, :2].T), part[:, 2:].T]).T for part in (draws.position_m, draws.velocity_m_s)
-    )
-    errors = {name: change(values) if values.ndim == 3 else values for name, values in draws.errors.items()}
-    position, velocity = start
-    return replace(draws, position_m=position, velocity_m_s=velocity, errors=errors, tie=change(draws.tie))
-
-
-def in_free_space(name: str, noise: NoiseKind, tie: TieRule = TieRule.RANDOM) -> Scenario:
-    scenario = replace(load_scenario("asteroid-1997-space"), strategy=name, noise=noise, tie=tie, sun=None)
-    return replace(scenario, rate_sensor=RateSensor(0.5, 1e-6))
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", strategy_names())
-@pytest.mark.parametrize("noise", list(NoiseKind))
-def test_an_engagement_with_exchanged_axes_is_the_same_bit_for_bit(name: str, noise: NoiseKind) -> None:
-    scenario = in_free_space(name, noise)
-    draws = draw(scenario, range(3), 3)
-    there, back = fly(scenario, draws), fly(scenario, by_axis(draws, lambda values: values[::-1].copy()))
-    assert np.array_equal(back.miss_m, there.miss_m)
-    assert np.array_equal(back.impulse_m_s, there.impulse_m_s)
-    assert np.array_equal(back.lateral_miss, there.lateral_miss[:, ::-1])
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", ["symmetric-miss", "patient", "zero-effort-miss"])
-@pytest.mark.parametrize("signs", [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0)])
-def test_a_mirrored_engagement_is_mirrored(name: str, signs: tuple[float, float]) -> None:
-    """To rounding, as in the plane. If one axis is mirrored, so is its tie rule."""
-    scenario, mirror = in_free_space(name, NoiseKind.GAME), np.array(signs)
-    draws = draw(scenario, range(3), 3)
-    back = by_axis(draws, lambda values: values * mirror.reshape(2, *[1] * (values.ndim - 1)))
-    rules = [TieRule.UPPER if sign > 0.0 else TieRule.LOWER for sign in signs]
-    one, other = (
-        fly(scenario, *each)
-        for each in ((draws, GameNoise(TieRule.UPPER, draws.tie)), (back, GameNoise((rules[0], rules[1]), back.tie)))
-    )
-    np.testing.assert_allclose(other.miss_m, one.miss_m, rtol=1e-6)
-    np.testing.assert_allclose(other.impulse_m_s, one.impulse_m_s, rtol=1e-6)
-    np.testing.assert_allclose(other.lateral_miss, one.lateral_miss * mirror, rtol=1e-6)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("noise", "tie"), [(NoiseKind.RANDOM, TieRule.UPPER), *((NoiseKind.GAME, tie) for tie in TieRule)]
-)
-def test_an_engagement_without_uncertainty_along_y_is_the_planar_one(noise: NoiseKind, tie: TieRule) -> None:
-    plane = replace(load_scenario("asteroid-1997"), noise=noise, tie=tie, rate_sensor=RateSensor(0.5, 1e-6))
-    model, idle = plane.set_model, {"y_m": (0.0, 0.0), "vy_m_s": (0.0, 0.0)}
-    space = replace(
-        plane,
-        **of_model(
-            replace(
-                model,
-                bounds=replace(model.bounds, **idle),
-                angle_sensor=replace(
-                    model.angle_sensor, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0
-                ),
-                disturbance_y_m_s2=0.0,
-            )
-        ),
-        dispersion=replace(plane.dispersion, **idle),
-    )
-    one, other = (fly(scenario, draw(scenario, range(4), 3)) for scenario in (plane, space))
-    assert np.array_equal(other.miss_m, one.miss_m)
-    assert np.array_equal(other.impulse_m_s, one.impulse_m_s)
-    assert np.array_equal(np.abs(other.lateral_miss[:, 0]), np.zeros(4))

@@ -24,9 +24,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
-from numba import types
 
-from infoset import chain_storage, chains, location, replays
+from infoset import chain_storage, chains
 from infoset.arrays import Floats
 from infoset.chain_storage import FIRST_RING, TAKEN
 from infoset.chains import CAPACITY
@@ -583,14 +582,6 @@ def test_a_stale_peak_is_found_again() -> None:
                 assert misses[number - life.section.numbers(side)[0]] == pick(misses)
 
 
-def test_vertices_that_repeat_one_another_do_not_stop_the_search_for_a_peak() -> None:
-    """Both have the same miss, so that to look for a greater one next to the first is to look no further."""
-    section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
-    (v, m), (v_top, m_top) = section.local(RIGHT)
-    section.replace(RIGHT, [(v, m), (math.nextafter(v, 2.0), m), (v, m), (v_top, m_top)])
-    assert section.peak(RIGHT) == 3
-
-
 @pytest.mark.parametrize("part", [0.25, 0.5, 0.9])
 def test_a_level_segment_cut_by_its_miss_stays_a_segment(part: float) -> None:
     """Its heights are equal: neither its lowest vertex nor its highest says where it ends."""
@@ -747,44 +738,7 @@ def test_a_mirrored_life_is_mirrored_to_the_last_bit(start: Start, story: list[t
             assert section.peak(side) == mirror.peak(1 - side)
 
 
-def test_two_borders_on_one_edge_are_mirrored_up_to_rounding() -> None:
-    """The crossing of the second is found on an edge that the first has shortened, and which is first is not mirrored.
-
-    Heights are mirrored all the same: a crossing is put at the level of its border.
-    """
-    rng = np.random.default_rng(2)
-    for _ in range(200):
-        v, z = np.sort(rng.uniform(-1.0, 1.0, 2)), np.sort(rng.uniform(-1.0, 1.0, 2))
-        bottom, top = (float(v[0]), float(v[0]), float(z[0])), (float(v[1]), float(v[1]), float(z[1]))
-        section = Section(2.0, bottom, top)
-        mirror = Section(2.0, (-top[0], -top[0], -top[2]), (-bottom[0], -bottom[0], -bottom[2]))
-        lower, upper = z[0] + (z[1] - z[0]) * np.sort(rng.uniform(0.0, 1.0, 2))
-        assert section.cut(lower, upper) == mirror.cut(-upper, -lower)
-        outline, image = section.outline(), -mirror.outline()
-        ulps = 16.0 * chains.EPSILON / (z[1] - z[0])
-        np.testing.assert_allclose(np.sort(outline, axis=0), np.sort(image, axis=0), rtol=0.0, atol=ulps)
-
-
 # Wear.
-
-
-def test_no_kernel_is_compiled_anew_for_each_constant_it_is_handed() -> None:
-    """Numba makes a type of its own of a constant that is Python's: it doubles the time to compile."""
-    literal: Any = types.maybe_literal
-    assert literal(1) is not None
-    for number in (chains.ONE, location.FIRST, location.LAST, replays.PROBE, replays.LOWER, replays.UPPER):
-        assert literal(number) is None
-
-
-@pytest.mark.parametrize("lead", [0.0, 0.25])
-def test_a_vertex_that_both_chains_end_in_is_handed_over_once(lead: float) -> None:
-    """A segment adds two vertices to a polygon; both chains hold its highest and its lowest."""
-    section = Section(103.7, (-97.1, 99.3, -10123.7), (-98.9, 101.1, 10017.3))
-    for step in range(1, 61):
-        section.turn(103.7 - 0.5 * step + lead)
-        section.spread(0.00123)
-        section.turn(103.7 - 0.5 * step)
-        assert section.count <= 4 + 2 * step + 2
 
 
 def test_ten_thousand_moves_do_not_wear_a_section() -> None:

@@ -127,11 +127,6 @@ def test_the_ends_of_the_range_are_alive_and_just_beyond_them_is_dead(seed: int)
         assert information.section_at(end + travelled + outward * 2e-9 * (end + travelled)).polygon.is_empty
 
 
-def test_one_section_sits_in_the_middle() -> None:
-    (section,) = InformationSet(replace(MODEL, sections=1, fewest_sections=1)).sections()
-    assert section.label_m == pytest.approx(5801.3e3)
-
-
 def test_the_initial_rectangle_is_the_papers() -> None:
     section = InformationSet(replace(MODEL, sections=1, fewest_sections=1)).sections()[0]
     x = section.label_m
@@ -217,20 +212,6 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     assert information.predicted_miss().exists.all()
 
 
-def test_without_recovery_an_inconsistent_set_stays_empty() -> None:
-    information = InformationSet(replace(MODEL, recovery=Recovery.NONE), batch=2)
-    information.measure_angle(0.001)
-    information.measure_angle([0.0012, -0.0012])
-    assert information.status == [SetStatus.TRACKING, SetStatus.EMPTY]
-    assert information.inconsistent.tolist() == [False, True]
-    assert information.inconsistency[0].tolist() == [None, 0]
-    for _ in range(3):
-        information.predict()
-        information.measure_angle(0.001)
-        assert information.status == [SetStatus.TRACKING, SetStatus.EMPTY]
-        assert information.predicted_miss().exists.tolist() == [True, False]
-
-
 def test_a_set_whose_labels_have_all_left_is_finished() -> None:
     information = InformationSet(replace(MODEL, sections=2, fewest_sections=1))
     for _ in range(230):
@@ -245,35 +226,6 @@ def test_measuring_some_of_a_batch_leaves_the_others_alone() -> None:
     information.measure_angle(0.0003, where=[True, False])
     np.testing.assert_array_equal(information.sections(1)[3].polygon.polygon(), before)
     assert information.sections(0)[3].polygon.area() < information.sections(1)[3].polygon.area()
-
-
-def test_a_batch_gives_what_its_members_give_alone() -> None:
-    together, random = InformationSet(MODEL, batch=3), np.random.default_rng(2)
-    alone = [InformationSet(MODEL) for _ in range(3)]
-    for _ in range(40):
-        alpha = random.uniform(-2e-5, 2e-5, 3)
-        together.measure_angle(alpha)
-        together.predict()
-        for information, value in zip(alone, alpha, strict=True):
-            information.measure_angle(value)
-            information.predict()
-    for b, information in enumerate(alone):
-        for one, other in zip(together.sections(b), information.sections(), strict=True):
-            np.testing.assert_array_equal(one.polygon.polygon(), other.polygon.polygon())
-
-
-def test_a_view_follows_the_set_and_a_copy_does_not() -> None:
-    information = InformationSet(MODEL)
-    view, copy = information.view(), information.copy()
-    information.measure_angle(0.0004)
-    information.predict()
-    assert view.time_s == 0.5
-    assert copy.time_s == 0.0
-    assert not hasattr(view, "measure_angle")
-    with pytest.raises(ValueError, match="read-only"):
-        view.labels_m[0, 0] = 1.0
-    with pytest.raises(ValueError, match="read-only"):
-        view.living[0, 0] = False
 
 
 @pytest.mark.parametrize("recovery", list(Recovery))
@@ -304,18 +256,6 @@ def test_a_range_that_contradicts_names_the_living_label_nearest_to_it(range_m: 
     # The limits stand a little outside the outermost sections' labels.
     wanted = living.min() if nearest == "minimum" else living.max()
     assert label == pytest.approx(wanted, rel=1e-3)
-
-
-def test_shapely_and_margin_agree_on_what_is_inside() -> None:
-    from shapely import Point
-
-    information = flown(MODEL, 30)
-    section = information.sections()[4]
-    shape = information.to_shapely()[4]
-    omega, alpha = section.omega_alpha.centroid()
-    assert shape.contains(Point(omega, alpha))
-    assert information.margin(section.label_m, alpha, omega) > 0.0
-    assert information.margin(section.label_m, alpha + 1e-3, omega) < 0.0
 
 
 def test_exact_knowledge_gives_segments_and_points() -> None:

@@ -313,34 +313,6 @@ def test_axis_parallel_clip_leaves_vertices_exactly_on_its_line(
         assert tuple(vertex) in given_vertices or vertex[axis] in (lower / length, upper / length)
 
 
-@SOME
-@given(CASES, st.data())
-def test_clip_is_idempotent_and_monotone(case: Case, data: st.DataObject) -> None:
-    normal, lower, upper = data.draw(bands(case))
-    direction = (abs(Fraction(normal[0])), abs(Fraction(normal[1])))
-    slack = FEW * U * (direction[0] * case.size[0] + direction[1] * case.size[1])
-    once = case.polygon.cut(normal, lower, upper)
-    if once.is_empty:
-        assert once.cut(normal, lower, upper).is_empty
-        return
-    # A second, wider band takes nothing away. (The same band may cut a vertex again, by the rounding of its height.)
-    again = once.cut(normal, lower - 2 * float(slack), upper + 2 * float(slack))
-    assert again.polygon().tolist() == once.polygon().tolist()
-    wider = case.polygon.cut(normal, lower - 2 * float(slack), upper + 2 * float(slack))
-    assert outside_by(exact(once.polygon()), hull(exact(wider.polygon())), case.box()) is None
-    if 0.0 in normal and abs(normal[0] + normal[1]) == 1.0:
-        assert once.cut(normal, lower, upper).polygon().tolist() == once.polygon().tolist()
-
-
-def test_slanted_clip_of_no_width_ends_and_keeps_a_point() -> None:
-    """Rounding may put the points of the first cut beyond the second."""
-    vertices = [(0.6715302078397394, -0.13446586418989326), (1.6715302078397394, -0.13446586418989326)]
-    polygon = ConvexPolygons([*vertices, (0.9715302078397394, 0.8655341358101067)], 3)
-    level = 0.07342934118057139
-    got = polygon.cut((0.07466040118969462, -0.9972090174553145), level, level)
-    assert not got.is_empty
-
-
 # Maps and sums --------------------------------------------------------------------------------------------------
 
 ENTRY = st.one_of(UNIT, st.builds(lambda scale, x: scale * x, SCALE, UNIT))
@@ -466,26 +438,6 @@ def test_sum_of_a_needle_that_turns_the_wrong_way_with_a_segment_along_it() -> N
     assert [got.support_function((0.0, -1.0)), got.support_function((0.0, 1.0))] == [1.0, 2.0]
 
 
-def test_sum_of_a_polygon_with_a_repeated_vertex() -> None:
-    vertices = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (1.25, 1.0), (0.0, 1.0)]
-    case = Case(ConvexPolygons(vertices, 5), hull(exact(vertices)))
-    other = case_of([(0.0, 0.0), (-0.5, 4.0), (-3.0, 1.0)])
-    for one, two in ((case, other), (other, case)):
-        got = one.polygon.minkowski_sum(two.polygon)
-        assert_same_set(got, exact_sum(case.exact, other.exact), case.box(other.size))
-
-
-@SOME
-@given(UNEVEN, st.data())
-def test_sum_of_an_uneven_polygon_with_a_segment(case: Case, data: st.DataObject) -> None:
-    half = data.draw(halves(case))
-    hx, hy = Fraction(half[0]), Fraction(half[1])
-    wanted = [(x + sign * hx, y + sign * hy) for x, y in case.exact for sign in (-1, 1)]
-    got = case.polygon.add_segment(half)
-    assert_same_set(got, hull(wanted), case.box((abs(hx), abs(hy))))
-    assert got.counts <= case.polygon.counts + 2
-
-
 @SOME
 @given(UNEVEN, st.data())
 def test_clip_of_an_uneven_polygon(case: Case, data: st.DataObject) -> None:
@@ -523,25 +475,6 @@ def test_measures_of_an_uneven_polygon(case: Case, data: st.DataObject) -> None:
     ulps += 4 * n * FEW * case.box(few=1)[0] * case.box(few=1)[1]
     assert abs(Fraction(float(case.polygon.area())) - exact_area(case.exact)) <= ulps
     assert outside_by(exact([case.polygon.centroid().tolist()]), case.exact, case.box(few=n * FEW)) is None
-
-
-@FEWER
-@given(CASES, CASES, matrices())
-def test_sum_commutes_with_linear_maps(first: Case, second: Case, matrix: list[list[float]]) -> None:
-    sum_then_map = first.polygon.minkowski_sum(second.polygon).linear_map(matrix)
-    map_then_sum = first.polygon.linear_map(matrix).minkowski_sum(second.polygon.linear_map(matrix))
-    size = (first.size[0] + second.size[0], first.size[1] + second.size[1])
-    assert_same_set(map_then_sum, exact(sum_then_map.polygon()), image_box(matrix, size, few=3 * FEW))
-
-
-@FEWER
-@given(CASES, CASES, st.data())
-def test_support_of_a_sum_is_the_sum_of_supports(first: Case, second: Case, data: st.DataObject) -> None:
-    x, y = data.draw(directions(first))
-    whole = first.polygon.minkowski_sum(second.polygon).support_function((x, y))
-    parts = first.polygon.support_function((x, y)) + second.polygon.support_function((x, y))
-    tolerance = abs(x) * first.box(second.size)[0] + abs(y) * first.box(second.size)[1]
-    assert abs(whole - parts) <= tolerance + FEW * float(MINIMUM)
 
 
 # Measures -------------------------------------------------------------------------------------------------------
@@ -594,14 +527,6 @@ def test_margin(case: Case, data: st.DataObject) -> None:
         assert (got > 0.0) == strictly_inside(case.exact, point)
 
 
-@SOME
-@given(CASES)
-def test_vertices_have_no_margin(case: Case) -> None:
-    for vertex in case.polygon.polygon():
-        assert case.polygon.margin(vertex) == 0.0
-        assert case.polygon.contains(vertex)
-
-
 def area_tolerance(case: Case) -> Fraction:
     """Each term of a fan rounds its differences and two products of up to the extents."""
     return FEW * U * len(case.exact) * case.extent[0] * case.extent[1]
@@ -611,18 +536,6 @@ def area_tolerance(case: Case) -> Fraction:
 @given(CASES)
 def test_area(case: Case) -> None:
     assert abs(Fraction(float(case.polygon.area())) - exact_area(case.exact)) <= area_tolerance(case)
-
-
-@FEWER
-@given(FAT_CASES, st.tuples(ENTRY, ENTRY))
-def test_area_does_not_depend_on_place(case: Case, offset: tuple[float, float]) -> None:
-    """Vertices move by half an ulp of their new place, so the area by that times the extent of the other axis."""
-    moved = case.polygon.translate(offset)
-    dx, dy = (U * (size + abs(Fraction(step))) for size, step in zip(case.size, offset, strict=True))
-    rounding = 2 * len(case.exact) * (dx * case.extent[1] + dy * case.extent[0] + 2 * dx * dy) + 2 * area_tolerance(
-        case
-    )
-    assert abs(float(moved.area()) - float(case.polygon.area())) <= rounding
 
 
 @SOME

@@ -261,13 +261,6 @@ def test_a_segment_cut_in_the_middle_stays_a_segment() -> None:
         assert len(made) == 2
 
 
-def test_a_border_that_wavers_by_rounding_does_not_overflow_the_room() -> None:
-    top = [(9.0 - i, 1.0 + (i % 2) * 2.0**-51) for i in range(10)]
-    corners = np.array([(0.0, 0.0), (9.0, 0.0), *top])
-    made = clip(corners, np.array([0.0, 1.0]), 0.5, 1.0 + 2.0**-52)
-    assert agree(made, exact([(0.0, 0.5), (9.0, 0.5), (9.0, 1.0), (0.0, 1.0)]), 4 * EPS)
-
-
 # Maps.
 
 
@@ -357,24 +350,6 @@ def test_a_reduced_polygon_contains_the_polygon_and_keeps_to_the_cap(corners: Fl
     else:
         tolerance = 16 * EPS * (reach(reduced) + reach(corners))
         assert lies_within(exact(corners), hull(exact(reduced)), tolerance)
-
-
-def test_reduction_adds_little_area() -> None:
-    angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-    circle = np.stack([3.0 + np.cos(angles), 1e-6 * np.sin(angles)], axis=-1)
-    for cap, growth in ((32, 1.01), (8, 1.1), (4, 1.6)):
-        reduced = reduce_outward(circle, cap)
-        assert len(reduced) == cap
-        assert polygon.area(reduced, cap) < growth * polygon.area(circle, 64)
-
-
-def test_reduction_of_repeated_and_collinear_vertices_keeps_to_the_cap() -> None:
-    square = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]
-    repeated = np.repeat(np.array(square), 3, axis=0)
-    np.testing.assert_array_equal(reduce_outward(repeated, 4), square)
-    line = np.stack([np.linspace(0.0, 1.0, 9), np.linspace(0.0, 3.0, 9)], axis=-1)
-    np.testing.assert_array_equal(reduce_outward(np.concatenate([line, line[-2:0:-1]]), 4), [(0.0, 0.0), (1.0, 3.0)])
-    assert len(reduce_outward(np.full((9, 2), 0.1), 4)) == 1
 
 
 def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:

@@ -75,12 +75,3 @@ def test_published_areas(pair: dict[str, Any]) -> None:
         "symmetric difference": first + second - 2.0 * common,
     }[kind]
     assert area == pytest.approx(published, rel=6e-3)
-
-
-def test_all_pairs_as_one_batch() -> None:
-    polygons = [cases(pair) for pair in PAIRS]
-    first, second = (ConvexPolygons.stack([pair[i].polygon for pair in polygons]) for i in (0, 1))
-    common = first & second
-    assert common.shape == (len(PAIRS),)
-    for i, (one, other) in enumerate(polygons):
-        assert common[i].polygon().tolist() == (one.polygon & other.polygon).polygon().tolist()

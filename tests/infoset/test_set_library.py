@@ -388,15 +388,6 @@ def test_projection_slice_and_samples(case: Case, axis: int, part: float) -> Non
     assert outside_by(exact(points), case.exact, case.box()) is None
 
 
-def test_samples_are_uniform() -> None:
-    triangle = ConvexPolygons.from_vertices([(0.0, 0.0), (4.0, 0.0), (0.0, 2.0)])
-    points = triangle.sample(200_000)
-    np.testing.assert_allclose(points.mean(axis=0), triangle.centroid(), atol=0.01)
-    share = float(triangle.cut((1.0, 0.0), upper=1.0).area() / 4.0)
-    assert float((points[:, 0] < 1.0).mean()) == pytest.approx(share, abs=0.005)
-    np.testing.assert_array_equal(points, triangle.sample(200_000, np.random.default_rng(0)))
-
-
 @pytest.mark.parametrize("sides", [3, 4, 7, 64])
 def test_balls_and_zonotopes(sides: int) -> None:
     centre = (1.0, -2.0)
@@ -435,62 +426,6 @@ def test_rings_of_both_orders_are_taken(case: Case, data: st.DataObject) -> None
         assert float(polygon.area()) >= 0.0
         assert ConvexPolygons.from_shapely(shapely.Polygon(order)).equals(polygon)
         assert ConvexPolygons(order, len(order)).convex_hull(polygon).equals(polygon)
-
-
-@SOME
-@given(FAT_CASES, st.data())
-def test_rings_that_are_not_convex_are_refused_with_a_reflex_vertex(case: Case, data: st.DataObject) -> None:
-    """One vertex moves to the other side of the line through its neighbours, by any amount."""
-    assume(len(case.exact) > 3)
-    ring = [tuple(map(float, p)) for p in case.exact]
-    i = data.draw(st.integers(0, len(ring) - 1))
-    near = data.draw(st.sampled_from([1e-15, 1e-9, 0.1, 0.3]))
-    a, b, c = np.array(ring[i - 1]), np.array(ring[i]), np.array(ring[(i + 1) % len(ring)])
-    middle = 0.5 * (a + c)
-    ring[i] = tuple((middle - near * (b - middle)).tolist())
-    reflex = turn(*exact([a, ring[i], c])) < 0
-    order = list(range(len(ring)))
-    if data.draw(st.booleans()):
-        order.reverse()
-    if reflex and len(hull(exact(ring))) != len(ring):
-        with pytest.raises(ValueError, match="the ring is not convex: vertex") as refusal:
-            ConvexPolygons.from_vertices([ring[k] for k in order])
-        vertex = int(str(refusal.value).split("vertex ")[1].split(",")[0])
-        k = order[vertex]
-        # A vertex that moves far can turn the whole ring over; a ring that crosses itself may go around twice.
-        points = exact([ring[k] for k in order])
-        sign = (
-            1
-            if sum(p[0] * q[1] - q[0] * p[1] for p, q in zip(points, points[1:] + points[:1], strict=True)) > 0
-            else -1
-        )
-        corner = [ring[order[(vertex + step) % len(ring)]] for step in (-1, 0, 1)]
-        assert k in range(len(ring))
-        assert sign * turn(*exact(corner)) <= 0 or not shapely.Polygon(ring).is_valid
-
-
-@pytest.mark.parametrize(
-    ("ring", "vertex"),
-    [
-        ([(0, 0), (4, 0), (4, 4), (3, 1)], 3),
-        ([(3, 1), (4, 4), (4, 0), (0, 0)], 0),
-        ([(0, 0), (1, 0), (1, 1), (0.5, 1 - 2**-53), (0, 1)], 3),
-        ([(0, 0), (2, 4), (4, -4), (-2, 2), (4, 4)], 4),  # around twice
-        ([(0, 0), (1, 0), (0.5, 0), (1, 1)], 1),  # back along a side
-        ([(-3, 1 + 2**-51), (-3 + 2**-51, 0.9), (3, 1), (0.3, 0.99)], 3),  # two peaks; (3, 1) was named
-    ],
-)
-def test_the_message_has_the_vertex(ring: list[tuple[float, float]], vertex: int) -> None:
-    with pytest.raises(ValueError, match=rf"the ring is not convex: vertex {vertex}, "):
-        ConvexPolygons.from_vertices(ring)
-    with pytest.raises(ValueError, match=rf"vertex {vertex} of polygon \(1,\)"):
-        ConvexPolygons.from_vertices([ring[:1] * len(ring), ring])
-
-
-def test_flat_rings_are_segments_and_points() -> None:
-    assert ConvexPolygons.from_vertices([(0, 0), (2, 2), (1, 1)]).polygon().tolist() == [[0, 0], [2, 2]]
-    assert ConvexPolygons.from_vertices([(1, 1), (1, 1)]).polygon().tolist() == [[1, 1]]
-    assert ConvexPolygons.from_vertices([]).is_empty
 
 
 # Batches ----------------------------------------------------------------------------------------------------------
@@ -558,52 +493,3 @@ def test_empty_members_do_not_affect_the_others(number: int) -> None:
             np.testing.assert_array_equal(np.ma.getdata(whole[i]), alone)
         elif alone is None and np.ma.isMaskedArray(whole):
             assert np.ma.getmaskarray(whole)[i].all()
-
-
-def test_a_batch_is_built_like_a_single_set() -> None:
-    boxes = ConvexPolygons.from_box(np.zeros((3, 2)), [[1.0, 1.0], [2.0, 0.0], [0.0, 0.0]])
-    assert boxes.counts.tolist() == [4, 2, 1]
-    rings = ConvexPolygons.from_vertices([[(0, 0), (1, 0), (0, 1)], [(0, 0), (0, 1), (1, 1), (1, 0)], []])
-    assert (rings.shape, rings.counts.tolist()) == ((3,), [3, 4, 0])
-    padded = ConvexPolygons.from_vertices(np.zeros((2, 5, 2)), [0, 3])
-    assert padded.counts.tolist() == [0, 1]
-    cloud = ConvexPolygons.from_points(np.random.default_rng(0).normal(size=(4, 5, 9, 2)))
-    assert cloud.shape == (4, 5)
-    halves = ConvexPolygons.from_constraints([(1, 0), (-1, 0), (0, 1), (0, -1)], [[1, 1, 1, 1], [-2, 1, 1, 1]])
-    assert halves.is_empty.tolist() == [False, True]
-    with pytest.raises(ValueError, match=r"the set \(1,\) is unbounded"):
-        ConvexPolygons.from_constraints([(1, 0), (-1, 0), (0, 1)], [[-1, 0, 1], [1, 1, 1]])
-    shapes = ConvexPolygons.from_shapely([shapely.box(0, 0, 1, 1), shapely.Point(1, 2), shapely.Polygon()])
-    assert shapes.counts.tolist() == [4, 1, 0]
-    assert (boxes & cloud[0, 0]).shape == (3,)
-    assert ConvexPolygons.stack([]).shape == (0,)
-    moved = ConvexPolygons.stack([boxes[0], ConvexPolygons.empty()])
-    assert (moved + -moved.centroid()).counts.tolist() == [4, 0]
-
-
-def test_operators_and_other_dimensions() -> None:
-    square = ConvexPolygons.from_box((0.0, 0.0), (1.0, 1.0))
-    assert (square + np.array([1.0, 2.0])).bounding_box()[0].tolist() == [1.0, 2.0]
-    assert (np.array([1.0, 2.0]) + square).bounding_box()[0].tolist() == [1.0, 2.0]
-    assert (np.diag([2.0, 3.0]) @ square).area() == 6.0
-    assert (square + square).area() == 4.0
-    assert (0.5, 1.0) in square
-    assert (0.5, 1.0 + 2.0**-52) not in square
-    assert square.volume() == 1.0
-    lifted = square.affine_map([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], (0.0, 0.0, 1.0))
-    assert (lifted.space, lifted.dimension) == (3, 2)
-    line = square.preimage([[1.0], [2.0]])
-    assert [float(end[0]) for end in line.bounding_box()] == pytest.approx([0.0, 0.5])
-    axes = pytest.importorskip("matplotlib.figure").Figure().subplots()
-    square.plot(axes, alpha=0.5)
-    assert len(axes.patches) == 1
-
-
-def test_a_difference_with_an_empty_member_of_a_batch_is_empty_for_this_member_alone() -> None:
-    square = ConvexPolygons.from_box([0, 0], [2, 2])
-    others = ConvexPolygons.stack([ConvexPolygons.from_box([0, 0], [1, 1]), ConvexPolygons.empty()])
-    difference = square.minkowski_difference(others)
-    assert difference.is_empty.tolist() == [False, True]
-    assert difference.area().tolist() == [1.0, 0.0]
-    with pytest.raises(ValueError, match="the difference with an empty set is unbounded"):
-        square.minkowski_difference(ConvexPolygons.empty())

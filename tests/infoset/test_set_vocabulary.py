@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -50,18 +48,6 @@ def test_both_classes_have_the_same_names() -> None:
     assert names(Polytope) - names(ConvexPolygons) == set(ONLY_POLYTOPES)
 
 
-def test_arguments_have_the_same_order_and_names_up_to_a_plural() -> None:
-    """A batch has an argument for each member, a polytope a row for each argument: `direction` and `directions`."""
-    more = {"from_vertices", "from_ball", "from_constraints", "empty", "box"}
-    for name in names(ConvexPolygons) & names(Polytope) - more:
-        one, two = getattr(ConvexPolygons, name, None), getattr(Polytope, name, None)
-        if inspect.isroutine(one) and inspect.isroutine(two):
-            first, second = (
-                [parameter.rstrip("s") for parameter in inspect.signature(method).parameters] for method in (one, two)
-            )
-            assert first == second, name
-
-
 def test_projections_and_slices_take_a_number_or_several() -> None:
     square, cube = ConvexPolygons.from_box([0, 1], [2, 5]), Polytope.from_box([0, 1, 2], [3, 5, 7])
     number: Any
@@ -105,43 +91,4 @@ def test_a_single_polygon_takes_many_points_and_directions() -> None:
         square.cut([[1, 0], [0, 1]], 0.0, 1.0)  # for a Polytope this is one intersection
 
 
-def test_hulls_of_lists_and_a_line_beside_a_polygon() -> None:
-    one, two = [[0, 0], [1, 0], [0, 1]], [[0, 0], [4, 0], [4, 4], [0, 4], [1, 1]]
-    assert ConvexPolygons.from_points([one, two]).area().tolist() == [0.5, 16.0]
-    with pytest.raises(ValueError, match=r"the line where coordinate 0 is 5\.0 does not meet the polygon"):
-        ConvexPolygons.from_points(one).slice(0, 5.0)
-
-
 BAD_NUMBERS: list[Any] = [np.nan, np.inf, "1", None, 1e70, 1j, np.ma.masked_array([1.0], [True])]
-
-
-@pytest.mark.parametrize("value", BAD_NUMBERS)
-@pytest.mark.parametrize(
-    "sample", [ConvexPolygons.from_box([0, 0], [1, 1]), Polytope.from_box([0, 0, 0], [1, 1, 1])], ids=["2", "3"]
-)
-def test_what_would_give_wrong_numbers_is_refused(sample: Any, value: Any) -> None:
-    """Values that NumPy would take: not finite, complex, masked, texts, and too large for exact decisions."""
-    space = 2 if isinstance(sample, ConvexPolygons) else 3
-    if isinstance(value, np.ma.MaskedArray):
-        vector: Any = np.ma.masked_array(np.ones(space), [True] + [False] * (space - 1))
-        matrix: Any = np.ma.masked_array(np.eye(space), np.eye(space, dtype=bool))
-    else:
-        vector, matrix = [value] * space, [[value] * space] * space
-    operations: tuple[Callable[[], object], ...] = (
-        lambda: sample.linear_map(matrix),
-        lambda: sample.preimage(matrix),
-        lambda: sample.translate(vector),
-        lambda: sample.cut(vector, 0.0, 1.0),
-        lambda: sample.support_function(vector),
-        lambda: sample.margin(vector),
-        lambda: sample.contains(vector),
-        lambda: sample.distance(vector),
-        lambda: sample.from_vertices(matrix),
-        lambda: sample.from_constraints(matrix, np.ones(space)),
-        lambda: sample.from_box(vector, vector),
-        lambda: sample.from_ball(vector, 1.0),
-        lambda: sample.from_zonotope(vector, []),
-    )
-    for operation in operations:
-        with pytest.raises((TypeError, ValueError)):
-            operation()

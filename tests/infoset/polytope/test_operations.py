@@ -332,41 +332,6 @@ def test_published_constraints(rows: list[tuple[float, ...]], count: int) -> Non
     assert count == 0 or float(gaps.min(axis=1).max()) <= 1e-11 * float(np.abs(polygon.polygon()).max())
 
 
-def test_other_published_cases() -> None:
-    # polytope issue 93: the constraints leave the direction (0, 0, 1, 1) free; vertices of 3e13 were returned.
-    rows = np.array(
-        [
-            [-1, 0, 0, 0],
-            [0, 1, 0, 0],
-            [0.5, -0.5, 0.5, -0.5],
-            [0.5, -0.5, -0.5, 0.5],
-            [0.5, 0.5, 0.5, -0.5],
-            [0, 0, -1, 0],
-        ]
-    )
-    with pytest.raises(UnboundedPolytopeError, match=r"along \(0, 0, 0.707, 0.707\)"):
-        Polytope.from_constraints(rows, [-0.33333, 0.3125, 0.05724, -0.01478, 0.3566, -0.16667])
-    # pycvxset issue 4: points on a segment, and its intersection with lines.
-    segment = Polytope.from_vertices([[3.0, 2.4], [6.0, 4.8]])
-    inside = segment.contains([[3.0, 2.4], [6.0, 4.8], [2.97, 2.376], [3.97, 3.176]])
-    assert inside.tolist() == [
-        True,
-        True,
-        False,
-        True,
-    ]
-    assert segment.cut([1.0, 0.0], 2.97, 2.97).is_empty
-    np.testing.assert_allclose(segment.cut([1.0, 0.0], 3.97, 3.97).vertices, [[3.97, 3.176]], rtol=1e-12)
-    # pycvxset, test_polytope_binary.py: a flat square less a cube is empty; less itself it is a point.
-    flat = Polytope.from_box([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0])
-    assert flat.minkowski_difference(Polytope.from_box([-1.0] * 3, [1.0] * 3)).is_empty
-    np.testing.assert_allclose(flat.minkowski_difference(flat).vertices, [[0.0, 0.0, 0.0]], atol=1e-12)
-    # pycvxset, test_polytope_unary.py: the projection of a cylinder.
-    cylinder = [[-1, 0, 0], [0, -1, 0], [1, 1, 0], [0, 0, 1], [0, 0, -1]]
-    shade = Polytope.from_constraints(cylinder, [0, 0, 1, 1, 1]).project([0, 1])
-    assert shade.equals(Polytope.from_vertices([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]), 1e-12)
-
-
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("large", [[1e9, 1.0, 1e-9], [1e9, 1.0, 1.0], [1e9, 1e9, 1e9], [1.0, 1.0, 1e-9]])
 def test_intersections_with_sets_that_are_a_billion_times_larger(large: list[float], size: float) -> None:
@@ -375,29 +340,6 @@ def test_intersections_with_sets_that_are_a_billion_times_larger(large: list[flo
     lower, most = both.bounding_box()
     np.testing.assert_allclose(most, np.minimum(upper, size), rtol=1e-9, atol=1e-12 * most.max())
     np.testing.assert_allclose(lower, 0.0, rtol=0.0, atol=1e-12 * most.max())
-
-
-def test_cuts_that_leave_a_billionth_of_a_set() -> None:
-    box = Polytope.from_box([0, 0, 0], [1e9, 1, 1])
-    np.testing.assert_allclose(box.cut([1, 0, 0], upper=1.0).volume(), 1.0, rtol=1e-9)
-    np.testing.assert_allclose(box.cut([1, 1, 1], upper=1.0).volume(), 1.0 / 6.0, rtol=1e-9)
-
-
-def test_mistaken_arguments_of_polytopes_have_a_clear_message() -> None:
-    cube = Polytope.from_box([0, 0, 0], [1, 1, 1])
-    for axes in ([-1], [3], [0, 1, 2]):
-        with pytest.raises(ValueError, match="axes must be one or more different numbers from 0 to 2, not all"):
-            cube.slice(axes, 0.5)
-    for generators in (np.ones((3, 2)), [[1, 2]]):
-        with pytest.raises(ValueError, match=r"generators must have the shape \(g, 3\)"):
-            Polytope.from_zonotope([0, 0, 0], generators)
-    for normal, bound in (([1, 0, 0], np.nan), ([1, np.nan, 0], 1.0), ([1, 0], 1.0)):
-        with pytest.raises(ValueError, match=r"upper must be a number|normals must (be finite|have the shape \(3,\))"):
-            cube.cut(normal, upper=bound)
-    with pytest.raises(TypeError, match="unsupported operand"):
-        _ = cube & None  # type: ignore[operator]
-    with pytest.raises(TypeError, match="not supported"):
-        _ = cube <= None  # type: ignore[operator]
 
 
 @pytest.mark.parametrize("states", [2, 3, 4])

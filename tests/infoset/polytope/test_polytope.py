@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 
 from infoset.arrays import Floats
 from infoset.polytope import (
-    EmptyPolytopeError,
     Polytope,
-    UnboundedPolytopeError,
     _qhull,
     polytope_from_support,
     product,
@@ -237,47 +235,6 @@ def test_projection_of_a_flat_set_and_of_one_with_too_many_facets() -> None:
     assert polytope_from_support(flat.support_vector, 3).dimension == 2
     with pytest.raises(ArithmeticError, match="over 20 facets"):
         polytope_from_support(lambda direction: direction / np.linalg.norm(direction), 2, max_facets=20)
-
-
-def test_empty_says_by_how_much() -> None:
-    with pytest.raises(EmptyPolytopeError, match=r"relaxed by 0\.25") as caught:
-        Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-0.5, 0.0, 1.0, 1.0]).needed()
-    assert caught.value.relaxation == pytest.approx(0.25)
-    with pytest.raises(EmptyPolytopeError):
-        Polytope.from_constraints(
-            [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-1.0, 1, 1, 1, 1]
-        ).needed()
-    with pytest.raises(EmptyPolytopeError):
-        Polytope.from_constraints(
-            np.vstack([np.eye(2), -np.eye(2)]), np.ones(4), [[1.0, 0.0], [1.0, 0.0]], [0.0, 0.5]
-        ).needed()
-
-
-def test_unbounded_says_along_what() -> None:
-    with pytest.raises(UnboundedPolytopeError, match="along") as caught:
-        Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0, 1.0, 1.0])
-    assert caught.value.direction @ [1.0, 0.0] < -0.9
-    with pytest.raises(UnboundedPolytopeError):
-        Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0]], [1.0, 1.0])
-    with pytest.raises(UnboundedPolytopeError):
-        Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [0.0, 0.0], [[0.0, 1.0, 0.0]], [0.0])
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: Polytope.from_vertices(np.zeros((0, 2))),
-        lambda: Polytope.from_vertices([[np.nan, 0.0]]),
-        lambda: Polytope.from_constraints([[1.0, 0.0]], [1.0, 2.0]),
-        lambda: Polytope.from_constraints([[np.inf, 0.0]], [1.0]),
-        lambda: Polytope.from_constraints([[1.0, 0.0]], [1.0], [[1.0]], [1.0]),
-        lambda: Polytope.from_box([1.0], [0.0]),
-    ],
-)
-def test_what_is_no_polytope_is_refused(make: object) -> None:
-    assert callable(make)
-    with pytest.raises(ValueError, match=r"(points|normals|across) must|normals and offsets must|box is reversed"):
-        make()
 
 
 def test_vertices_that_lie_together_count_once() -> None:
