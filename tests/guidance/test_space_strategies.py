@@ -183,16 +183,6 @@ def test_in_a_plane_a_strategy_gets_the_planar_situation_and_one_for_both_axes_i
         start(Vector(), BATCH, ("z",))
 
 
-class Returns(Noted):
-    """A strategy that returns a given value."""
-
-    def __init__(self, value: Any) -> None:
-        self.value = value
-
-    def decide(self, situation: Situation, state: Any) -> Any:
-        return self.value
-
-
 def test_an_impulse_need_be_finite_only_where_a_set_is_tracked() -> None:
     now, wanted = situations(MODEL)[0], np.zeros((2, BATCH))
     wanted[0, 1] = np.inf
