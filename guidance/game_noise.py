@@ -20,9 +20,8 @@ class GameNoise:
 
     Parameters
     ----------
-    tie : TieRule, or tuple of two
-        Which extreme is kept when both are equal in modulus, as they are at almost every step under U_s. In space one
-        rule for both axes, or two rules, for y and z.
+    tie : TieRule
+        Which extreme is kept when both are equal in modulus, as they are at almost every step under U_s.
     tie_draws : ndarray, shape (B, steps), or (2, B, steps) in space
         Uniform in [-1, 1], used by `TieRule.RANDOM`: the upper extreme where the draw is not negative.
     shift_m : ndarray, shape (steps,), or (2, steps) in space, or None
@@ -36,7 +35,7 @@ class GameNoise:
     Raises
     ------
     TypeError, ValueError
-        If `tie` is not a `TieRule` or two of them, a draw is not within [-1, 1], or the array has another shape.
+        If `tie` is not a `TieRule`, a draw is not within [-1, 1], or the array has another shape.
 
     Notes
     -----
@@ -54,15 +53,14 @@ class GameNoise:
     Kumkov and Patsko (1997), section 7.
     """
 
-    tie: TieRule | tuple[TieRule, TieRule]
+    tie: TieRule
     tie_draws: Floats
     shift_m: Floats | None = None
     target_side: Floats | None = None
 
     def __post_init__(self) -> None:
-        rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
-        if not all(isinstance(rule, TieRule) for rule in rules) or len(rules) > 2 or not rules:
-            raise TypeError(f"tie must be a TieRule, for example TieRule.UPPER, or a pair of them: got {self.tie!r}")
+        if not isinstance(self.tie, TieRule):
+            raise TypeError(f"tie must be a TieRule, for example TieRule.UPPER: got {self.tie!r}")
         need_draws("tie_draws", self.tie_draws)
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
@@ -84,11 +82,9 @@ class GameNoise:
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state, shape (), (B,), (2, 1) or (2, B): 1 or -1, 0 for no shift."""
+        """Side to which the shift moves the true state, shape (), (B,) or (2, B): 1 or -1, 0 for no shift."""
         sides = {} if self.shift_m is None else {TieRule.UPPER: -1.0, TieRule.LOWER: 1.0}
-        rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
-        of_rules = [[sides.get(rule, 0.0)] for rule in rules]
-        side = np.array(of_rules if len(rules) > 1 else of_rules[0][0])
+        side = np.array(sides.get(self.tie, 0.0))
         return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
 
     def _shifted(self, sensor: AngleSensor, sight: LineOfSight, chosen: Floats) -> Floats:
@@ -103,17 +99,10 @@ class GameNoise:
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         upper, lower = np.abs(miss.upper_m), np.abs(miss.lower_m)
         tie = np.abs(upper - lower) <= TIE_TOLERANCE * (miss.upper_m - miss.lower_m)
-        if not isinstance(self.tie, tuple):
-            return np.where(tie, self._upper_at_tie(self.tie, step, tie.shape), upper > lower)
-        if tie.ndim == 1:
-            raise ValueError(f"tie must be one TieRule in a plane, which has one lateral axis: got {self.tie!r}")
-        y, z = (self._upper_at_tie(rule, step, tie.shape) for rule in self.tie)
-        return np.where(tie, np.where([[True], [False]], y, z), upper > lower)
-
-    def _upper_at_tie(self, rule: TieRule, step: int, shape: tuple[int, ...]) -> Flags | bool:
-        if rule is TieRule.RANDOM:
-            return draws_of_step("tie_draws", self.tie_draws, step, shape) >= 0.0
-        return rule is TieRule.UPPER or (rule is TieRule.ALTERNATE and step % 2 == 0)
+        at_tie: Flags | bool = self.tie is TieRule.UPPER or (self.tie is TieRule.ALTERNATE and step % 2 == 0)
+        if self.tie is TieRule.RANDOM:
+            at_tie = draws_of_step("tie_draws", self.tie_draws, step, tie.shape) >= 0.0
+        return np.where(tie, at_tie, upper > lower)
 
 
 @dataclass(frozen=True)

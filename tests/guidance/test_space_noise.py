@@ -90,22 +90,16 @@ def test_the_game_of_each_axis_is_that_of_the_plane(tie: TieRule, at_tie: bool) 
                 assert np.array_equal(measured[key][number], planar[key])
 
 
-def test_tie_rules_by_axis() -> None:
+def test_tie_rules_differ() -> None:
     view, seen = InformationSet(MODEL, BATCH).view(), sight({"angle": SENSOR})
-    for y in TieRule:
-        for z in TieRule:
-            measured = GameNoise((y, z), draws()).measure(seen, view)["angle"]
-            for number, rule in enumerate((y, z)):
-                planar = GameNoise(rule, draws()).measure(seen, view)["angle"]
-                assert np.array_equal(measured[number], planar[number])
     upper, lower = (GameNoise(tie, draws()).measure(seen, view)["angle"] for tie in (TieRule.UPPER, TieRule.LOWER))
     assert (upper != lower).all()
 
 
 def test_a_shift_along_one_axis_keeps_the_errors_possible() -> None:
     seen, view = sight({"angle": SENSOR}), moved()
-    for rules in ((TieRule.UPPER, TieRule.ALTERNATE), (TieRule.RANDOM, TieRule.LOWER)):
-        measured = GameNoise(rules, draws(), np.array([1e9])).measure(seen, view)["angle"]
+    for rule in TieRule:
+        measured = GameNoise(rule, draws(), np.array([1e9])).measure(seen, view)["angle"]
         assert np.abs(SENSOR.error(seen, measured)).max() <= 1.0 + 1e-9
 
 
