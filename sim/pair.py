@@ -13,39 +13,13 @@ from infoset.arrays import Floats
 from infoset.sensor import Measurements
 from sim.draws import Draws
 from sim.engagement import Engagements
-from sim.kepler import KeplerMotion, Passage
 from sim.results import Results
-from sim.scenario import Scenario, Sun
+from sim.scenario import Scenario
+from sim.target import GivenTarget
 from sim.truth_pair import TruthPair
 
 STEPS_BEYOND = 2
 """Maximum number of simulated steps after the one in which x = 0."""
-
-
-class ScheduledMotion(KeplerMotion):
-    """Kepler motion with a prescribed acceleration of the object across x.
-
-    `acceleration_m_s2`, shape (B, steps) or (2, B, steps), is along z, or along y and z, over each step; zero after the
-    last. The other parameters are those of `KeplerMotion`.
-    """
-
-    def __init__(
-        self,
-        position_m: Floats,
-        velocity_m_s: Floats,
-        sun: Sun | None,
-        acceleration_m_s2: Floats,
-    ) -> None:
-        super().__init__(position_m, velocity_m_s, sun)
-        self._schedule = acceleration_m_s2
-        self._step = 0
-
-    def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
-        """Advance by one step with the prescribed acceleration."""
-        over = self._step >= self._schedule.shape[-1]
-        scheduled = np.zeros(self._schedule.shape[:-1]) if over else self._schedule[..., self._step]
-        self._step += 1
-        return super().advance(step_s, scheduled)
 
 
 class PairNoise:
@@ -108,12 +82,12 @@ def fly_pair(
     `strategy` None is the scenario's. The pair replaces the noise of the scenario and the manoeuvre of its target. For
     every deterministic strategy, the greater one of the two misses is at least `pair.bound_m`.
     """
-    *shape, steps = pair.acceleration_m_s2.shape
-    nothing = np.zeros((*shape, steps + STEPS_BEYOND))
-    draws = Draws(pair.position_m, pair.velocity_m_s, {}, nothing)
+    acceleration_m_s2 = pair.acceleration_m_s2
+    nothing = np.zeros((*acceleration_m_s2.shape[:-1], STEPS_BEYOND))
+    target = GivenTarget(np.concatenate([acceleration_m_s2, nothing], axis=-1))
+    draws = Draws(pair.position_m, pair.velocity_m_s, {}, np.zeros_like(target.accelerations_m_s2))
     noise = PairNoise(pair.last_common_step)
-    truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2)
-    flight = Engagements(scenario, draws, strategy, truth, noise)
+    flight = Engagements(scenario, draws, strategy, noise=noise, target=target)
     impulses: list[Floats] = []
     while flight.flying:
         flight.advance(lambda step: impulses.append(np.where(step.tracking, step.impulse_m_s, 0.0)))

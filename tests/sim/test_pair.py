@@ -22,7 +22,7 @@ from infoset.model import InitialSet, Model
 from infoset.sensor import Sensor
 from sim import Scenario, Sun
 from sim.bound import lower_bound, pair_at
-from sim.pair import PairNoise, ScheduledMotion, fly_pair
+from sim.pair import PairNoise, fly_pair
 from sim.scenario import of_model
 
 QUICK = 4
@@ -81,18 +81,6 @@ def test_pairs_in_space_have_one_measurement_with_equal_errors(nothing_known: In
     assert noise.max_share == pytest.approx(sizes.max())
     assert measured["angle"][:, ::2] == pytest.approx(np.array([[0.3006, -0.1], [0.19955, 0.4008]]))
     assert sizes[::2] == pytest.approx([0.6, 0.8])
-
-
-def test_scheduled_motion_follows_its_schedule() -> None:
-    schedule = np.array([[1.0, -2.0, 0.0], [0.0, 0.0, 4.0]])
-    start = np.array([[0.0, 1e6], [5.0, 1e6]])
-    motion = ScheduledMotion(start, np.tile([0.0, -1e3], (2, 1)), None, schedule)
-    for _ in range(3):
-        motion.advance(2.0)
-    assert motion.position_m[:, 0] == pytest.approx([2.0 + 0.0 - 4.0, 5.0 + 8.0])
-    assert motion.velocity_m_s[:, 0] == pytest.approx([-2.0, 8.0])
-    motion.advance(2.0)
-    assert motion.velocity_m_s[:, 0] == pytest.approx([-2.0, 8.0])
 
 
 def random_scenario(number: int) -> Scenario:
