@@ -53,9 +53,7 @@ def _add(name: str, options: type, run: str, *, example: str) -> None:
             extra = EXTRAS.get(error.name or "")
             if extra is None:
                 raise
-            from sim.versions import install_command
-
-            raise InputError(f"{error.name} is not installed: {install_command(extra)}") from None
+            raise InputError(f"{error.name} is not installed: install infoset with the extra [{extra}]") from None
         except KeyboardInterrupt as interrupt:
             typer.echo("interrupted" + "".join(map(str, interrupt.args)), err=True)
             raise

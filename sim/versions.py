@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import functools
-import json
 import platform
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, distribution, version
-from pathlib import Path
-from urllib.parse import urlsplit
-from urllib.request import url2pathname
+from importlib.metadata import PackageNotFoundError, version
 
 PACKAGES = ("infoset", "numpy", "numba")
 """Packages on which the numbers depend."""
@@ -41,18 +37,3 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "none"
-
-
-def install_command(extra: str) -> str:
-    """Return the command that installs an optional extra: from the clone if there is one, else by name.
-
-    PEP 610: `direct_url.json` has the key `dir_info` if the package was installed from a folder.
-    """
-    try:
-        origin = json.loads(distribution("infoset").read_text("direct_url.json") or "{}")
-    except PackageNotFoundError:  # the folder is on the path of Python, not installed
-        origin = {"url": Path(__file__).parents[1].as_uri(), "dir_info": {"editable": True}}
-    if "dir_info" not in origin:
-        return f'pip install "infoset[{extra}]"'
-    folder = url2pathname(urlsplit(origin["url"]).path)
-    return f'pip install {"-e " if origin["dir_info"].get("editable") else ""}"{folder}[{extra}]"'

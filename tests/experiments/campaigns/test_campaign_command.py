@@ -11,14 +11,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from importlib.metadata import PackageNotFoundError
 from pathlib import Path
-from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
-import sim
 from experiments.campaigns.flight import duration
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
@@ -29,7 +26,7 @@ from infoset import Model
 from sim import Campaign, CampaignNoise, Scenario, fly_one
 from sim.storage import CampaignFolder, StorageError
 from sim.storage.codec import fingerprint
-from sim.versions import install_command, versions
+from sim.versions import versions
 
 Infoset = Callable[..., tuple[int, str, str]]
 needs_kill = pytest.mark.skipif(os.name != "posix", reason="there is no kill -9")
@@ -197,29 +194,7 @@ def test_without_an_extra_it_says_which(
     options = ("--dask", "tcp://127.0.0.1:1") if library == "distributed" else ()
     code, out, err = infoset("campaign", file, "--runs", 8, "--out", "runs", *options)
     assert (code, out) == (2, "")
-    assert err.splitlines()[-1] == f"error: {library} is not installed: {install_command(extra)}"
-
-
-@pytest.mark.parametrize(
-    ("origin", "command"),
-    [
-        ('{"url": "file:///a%20b/clone", "dir_info": {"editable": true}}', 'pip install -e "/a b/clone[exact]"'),
-        ('{"url": "file:///a%20b/clone", "dir_info": {}}', 'pip install "/a b/clone[exact]"'),
-        ('{"url": "file:///a/infoset.whl", "archive_info": {}}', 'pip install "infoset[exact]"'),
-        (None, 'pip install "infoset[exact]"'),
-    ],
-)
-def test_the_command_for_an_extra(origin: str | None, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sim.versions.distribution", lambda _name: SimpleNamespace(read_text=lambda _file: origin))
-    assert install_command("exact") == command
-
-
-def test_the_command_for_an_extra_of_a_clone_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    def not_installed(name: str) -> None:
-        raise PackageNotFoundError(name)
-
-    monkeypatch.setattr("sim.versions.distribution", not_installed)
-    assert install_command("exact") == f'pip install -e "{Path(sim.__file__).parents[1]}[exact]"'
+    assert err.splitlines()[-1] == f"error: {library} is not installed: install infoset with the extra [{extra}]"
 
 
 def test_times_and_commands_are_readable() -> None:
