@@ -42,8 +42,6 @@ YOUNG_SHARE = 0.5
 """Share of the budget that is the first part of the search."""
 FIRST_SHARE = 0.25
 """Share of the budget for first plans."""
-MAX_ERRORS = 1e8
-"""Maximum number of errors in the first plans, of 8 bytes each."""
 
 
 class Objective(Enum):
@@ -62,10 +60,6 @@ class Objective(Enum):
 
 class NothingCountsError(ValueError):
     """In every engagement of a search the set became empty, or the miss was not finite."""
-
-
-class BudgetError(ValueError):
-    """The first plans of a search need too much memory."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +173,7 @@ def find_worst(
     objective : Objective
         Which miss is maximised: that of any state of the set, or that of the simulated truth.
     budget : int
-        Number of engagements to simulate.
+        Number of engagements to simulate; the plans of a quarter of them are in memory at a time.
     seed : int
         Root seed. The same seed and budget give the same engagement for any number of threads.
     keep_set : bool
@@ -192,8 +186,6 @@ def find_worst(
     ------
     TypeError, ValueError
         If the budget or the number of threads is not an integer from 1, or the seed not one from 0.
-    BudgetError
-        If the first plans of so many steps need too much memory.
     NothingCountsError
         If in every simulated engagement the set became empty, or the miss was not finite.
 
@@ -220,7 +212,6 @@ def find_worst(
     COUNT.need("threads", threads)
     WHOLE.need("seed", seed)
     search = _Search(*with_strategy(scenario, strategy), Objective(objective), seed, keep_set)
-    search.check_memory(budget)
     with ThreadPoolExecutor(threads) as pool:
         try:
             search.run(budget, pool, progress)
@@ -250,16 +241,6 @@ class _Search:
         self._first_plans, self._changes = FirstPlans(self._space, random), PlanChanges(self._space, random)
         self._elite: Flown | None = None
 
-    def check_memory(self, budget: int) -> None:
-        """Raise BudgetError if the first plans of a budget have more than `MAX_ERRORS` errors."""
-        space = self._space
-        most = int(MAX_ERRORS / (FIRST_SHARE * (len(space.names) + 1) * space.axes * space.steps))
-        if budget > most:
-            raise BudgetError(
-                f"budget must be at most {most} for flights of {space.steps} steps, because the search keeps its first "
-                f"plans in memory: got {budget}"
-            )
-
     def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
         first = self._first_plans.make(max(1, round(FIRST_SHARE * budget)))
         flights = [chunk for plans, tie in first for chunk in _in_chunks(plans, tie)]
@@ -269,12 +250,8 @@ class _Search:
                 if progress is not None:
                     progress(self.evaluations / budget)
             size = min(GENERATION, budget - self.evaluations)
-            flights = _in_chunks(self._changed(size), None) if size > 0 else []
-
-    def _changed(self, count: int) -> Plans:
-        if self._elite is None:
-            raise RuntimeError("no plan has been simulated yet")
-        return self._changes.children(self._elite, count)
+            assert self._elite is not None
+            flights = _in_chunks(self._changes.children(self._elite, size), None) if size > 0 else []
 
     def worst(self) -> WorstEngagement:
         elite = self._elite

@@ -18,7 +18,7 @@ from experiments.interception.scenario_file import scenario_warnings
 from experiments.interception.study import set_counts
 from guidance import NoiseKind, Strategy
 from sim import Results, Scenario
-from sim.adversary import BudgetError, NothingCountsError, Objective, WorstEngagement, find_worst
+from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.gravity import on_board_model
 from sim.parallel import Task, is_finite, simulate_tasks
 from sim.scenario import strategy_name
@@ -185,8 +185,6 @@ def find_worst_misses(
             )
         except NothingCountsError:
             return None
-        except BudgetError as error:
-            raise InputError(f"--{error}") from None
 
     set_kept = search(True, "")
     if set_kept is not None and set_kept.sets_emptied == 0:
