@@ -6,7 +6,7 @@ from guidance.kalman import Kalman, KalmanBank
 from guidance.least_effort import LeastEffort
 from guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, TieRule
 from guidance.patient import Patient
-from guidance.predicted_miss import symmetric_impulse, zero_effort_miss
+from guidance.predicted_miss import symmetric_impulse
 from guidance.predictive import Predictive
 from guidance.proportional_navigation import ProportionalNavigation
 from guidance.registry import make_strategy, strategy_names
@@ -41,5 +41,4 @@ __all__ = [
     "make_strategy",
     "strategy_names",
     "symmetric_impulse",
-    "zero_effort_miss",
 ]

@@ -1,4 +1,4 @@
-"""Predicted miss of a state, and the impulse that corrects an interval of misses."""
+"""The impulse that corrects an interval of misses."""
 
 from __future__ import annotations
 
@@ -7,24 +7,6 @@ import numpy as np
 from infoset import PredictedMiss
 from infoset.arrays import Floats
 from infoset.limits import POSITIVE
-
-
-def zero_effort_miss(omega_rad_s: Floats, range_m: Floats, closing_speed_m_s: float) -> Floats:
-    """Return the signed miss (m) without further impulses, omega x^2 / e, which equals z + V x/e.
-
-    Parameters
-    ----------
-    omega_rad_s, range_m : ndarray
-        Line-of-sight rate and range x, of any common shape.
-    closing_speed_m_s : float
-        Nominal closing speed e.
-
-    References
-    ----------
-    Kumkov and Patsko (1997), section 5, with the sign kept.
-    """
-    POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
-    return omega_rad_s * range_m**2 / closing_speed_m_s
 
 
 def symmetric_impulse(interval: PredictedMiss, closing_speed_m_s: float, lead_s: float = 0.0) -> Floats:

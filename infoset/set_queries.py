@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from infoset import section_life
 from infoset.arrays import Flags, Floats
 from infoset.chain_storage import Chains
 from infoset.convex_polygons import ConvexPolygons
-from infoset.limits import NUMBER, POSITIVE, WHOLE, Limits, real_array
+from infoset.limits import NUMBER, POSITIVE, WHOLE, Limits
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.replays import PROBE, ROWS, replay_label, replay_room
 from infoset.section_stack import outline
@@ -266,57 +266,10 @@ class SetQueries:
         x = label - stack.law.closing_speed * (stack.law.step * history.elapsed)
         return self._section(label, x, outlines)
 
-    def margin(self, label_m: float, alpha_rad: ArrayLike, omega_rad_s: ArrayLike, engagement: int = 0) -> float:
-        """Return the signed distance of a state to the boundary of its section: positive inside, negative outside.
-
-        Parameters
-        ----------
-        label_m : float
-            Range at t = 0 of the state, m.
-        alpha_rad, omega_rad_s : float, in space array_like, shape (2,)
-            Line-of-sight angle, rad, and its rate, rad/s, now.
-
-        Returns
-        -------
-        float
-            Distance in the plane of V x/e and z, m, in space the lesser one of both; -inf if the section is empty.
-        """
-        shape = () if len(self._channels) == 1 else (len(self._channels),)
-        alphas = np.atleast_1d(real_array("alpha_rad", alpha_rad, shape)).tolist()
-        omegas = np.atleast_1d(real_array("omega_rad_s", omega_rad_s, shape)).tolist()
-        for name, values in (("alpha_rad", alphas), ("omega_rad_s", omegas)):
-            for value in values:
-                NUMBER.need(name, value)
-        section = self.section_at(label_m, engagement)
-        x, e = section.range_m, section.closing_speed_m_s
-        polygons = [polygon for polygon in (section.polygon_y, section.polygon) if polygon is not None]
-        margins = []
-        for polygon, alpha, omega in zip(polygons, alphas, omegas, strict=True):
-            scaled = polygon.linear_map(np.array([[x / e, 0.0], [0.0, 1.0]]))
-            z, v = alpha * x, omega * x - e * alpha
-            margins.append(float(scaled.margin(np.array([v * x / e, z]))))
-        return min(margins)
-
     def _need_engagement(self, engagement: int) -> None:
         WHOLE.need("engagement", engagement)
         if engagement >= self.batch:
             raise IndexError(f"engagement must be less than {self.batch}, the number of engagements: got {engagement}")
-
-    def living_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum range, m, that agree with the history, to rounding.
-
-        Returns
-        -------
-        minimum, maximum : ndarray, shape (B,)
-            m; zeros where no range agrees.
-
-        Notes
-        -----
-        The ends are located between the stored sections by about ten replays each.
-        """
-        refined = self._state.copy()
-        refined.refine(self.tracking, 2)
-        return SetQueries(refined).stored_range_interval_m()
 
     def to_shapely(self, engagement: int = 0) -> list[BaseGeometry]:
         """Return the living sections of one engagement as shapely geometries of (omega, alpha), rad/s and rad.

@@ -28,14 +28,13 @@ class Distribution:
         Share of the sample at or below each value.
     lower, upper : ndarray, shape (n,)
         Band of the distribution function at each value. The true function lies within it everywhere with at least the
-        probability `confidence`.
+        probability of the confidence.
     """
 
     values: Floats
     probability: Floats
     lower: Floats
     upper: Floats
-    confidence: float
 
 
 def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distribution:
@@ -62,7 +61,7 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
     half = math.sqrt(math.log(2.0 / (1.0 - confidence)) / (2.0 * values.size))
     probability = np.arange(1, values.size + 1) / values.size
     lower, upper = (np.clip(probability + shift, 0.0, 1.0) for shift in (-half, half))
-    return Distribution(values, probability, lower, upper, confidence)
+    return Distribution(values, probability, lower, upper)
 
 
 def _ordered(sample: ArrayLike) -> Floats:

@@ -103,11 +103,6 @@ class UndecidedCells:
             self._advance(cell)
 
     @property
-    def undecided(self) -> int:
-        """Number of cells that need more runs."""
-        return sum(not self._is_done(cell) for cell in self._cells)
-
-    @property
     def runs(self) -> tuple[int, ...]:
         """Engagements stored without a gap from run 0 on, for each cell; empty if the rule has stopped none."""
         if not any(map(self._is_decided, self._cells)):

@@ -26,7 +26,6 @@ from guidance import (
     Thruster,
     TieRule,
     symmetric_impulse,
-    zero_effort_miss,
 )
 from infoset import (
     AngleSensor,
@@ -313,11 +312,8 @@ def test_a_range_at_which_rates_are_too_large() -> None:
 def test_what_is_no_number(value: Any) -> None:
     given = information(1)
     refused(lambda: given.section_at(value), "label_m")
-    refused(lambda: given.margin(5.5e6, value, 0.0), "alpha_rad")
-    refused(lambda: given.margin(5.5e6, 0.0, value), "omega_rad_s")
     refused(lambda: to_omega_alpha(square(), value, 1.0), "range_m")
     refused(lambda: to_omega_alpha(square(), 1.0, value), "closing_speed_m_s")
-    refused(lambda: zero_effort_miss(np.zeros(1), np.ones(1), value), "closing_speed_m_s")
     refused(lambda: symmetric_impulse(given.predicted_miss(), value), "closing_speed_m_s")
     refused(lambda: Kalman(dead_zone=value), "dead_zone")
     refused(lambda: Kalman(process_noise=value), "process_noise")

@@ -6,7 +6,7 @@ not from these sources.
 """
 
 from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
-from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, capture_quantiles_s, fly, fly_many
+from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, fly, fly_many
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
 from rendezvous.pursuit_evasion.maps import STATUSES, CaptureMap, PointStatus, capture_map
 from rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
@@ -41,7 +41,6 @@ __all__ = [
     "Units",
     "Verdict",
     "capture_map",
-    "capture_quantiles_s",
     "certify",
     "fly",
     "fly_many",

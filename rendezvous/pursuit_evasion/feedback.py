@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -26,7 +26,6 @@ HIT_M = 100.0
 _LOOKS = 65
 _PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
 _MAX_PLANS, _LONGEST = 10_000, 1e3
-_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 
 @dataclass(frozen=True)
@@ -63,8 +62,7 @@ class Flight:
     """A pursuit with feedback.
 
     It ends at `time_s`, at the capture, at the closest approach or for another reason, at `distance_m`. At the times of
-    the n plans, `planned_s`, which predict captures at `predicted_s`, the distances are `distances_m`, shape (n,), and
-    the positions `pursuer_m` and `evader_m`, shape (n, 3).
+    the n plans, `planned_s`, which predict captures at `predicted_s`, the distances are `distances_m`, shape (n,).
     """
 
     ended: Ended
@@ -73,8 +71,6 @@ class Flight:
     planned_s: Floats
     predicted_s: Floats
     distances_m: Floats
-    pursuer_m: Floats
-    evader_m: Floats
 
 
 def fly(
@@ -146,15 +142,6 @@ def fly_many(
     return flights
 
 
-def capture_quantiles_s(flights: Sequence[Flight]) -> list[float]:
-    """Return the minimum capture time of `flights`, the quantiles 0.1, 0.5 and 0.9, and the maximum, s.
-
-    The list is empty if no flight ended in a capture.
-    """
-    times = [flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]
-    return [float(time_s) for time_s in np.quantile(times, _QUANTILES)] if times else []
-
-
 class _Pursuit:
     """One pursuit in progress, nondimensional."""
 
@@ -168,12 +155,13 @@ class _Pursuit:
         self._dry = game.pursuer.dry_mass_kg / units.mass_kg, game.evader.dry_mass_kg / units.mass_kg
         self._time, self._work = 0.0, MAX_WORK
         self._past: list[tuple[float, PathNow]] = []
-        self._log: list[tuple[float, float, Floats, Floats]] = []
+        self._log: list[tuple[float, float, float]] = []
 
     def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
         own = plan
         while len(self._log) < _MAX_PLANS:
-            self._log.append((self._time, self._time + plan.duration, self._pursuer.start[:3], self._evader.start[:3]))
+            apart = float(np.linalg.norm(self._evader.start[:3] - self._pursuer.start[:3]))
+            self._log.append((self._time, self._time + plan.duration, apart))
             if progress is not None:
                 progress(min(1.0, self._time / (self._time + plan.duration)))
             last = plan.duration <= leg
@@ -293,16 +281,14 @@ class _Pursuit:
 
     def _flight(self, ended: Ended, time: float, distance: float) -> Flight:
         units = self._units
-        planned, predicted, pursuer, evader = (np.array(column) for column in zip(*self._log, strict=True))
+        planned, predicted, distances = (np.array(column) for column in zip(*self._log, strict=True))
         return Flight(
             ended=ended,
             time_s=time * units.time_s,
             distance_m=distance * units.length_m,
             planned_s=planned * units.time_s,
             predicted_s=predicted * units.time_s,
-            distances_m=np.linalg.norm(evader - pursuer, axis=1) * units.length_m,
-            pursuer_m=pursuer * units.length_m,
-            evader_m=evader * units.length_m,
+            distances_m=distances * units.length_m,
         )
 
 

@@ -10,7 +10,6 @@ from rendezvous.pursuit_evasion import (
     Script,
     Solution,
     Steering,
-    capture_quantiles_s,
     fly,
     fly_many,
     solve,
@@ -81,10 +80,6 @@ def test_a_batch_draws_each_flight_from_its_own_stream(slides: MakeGame) -> None
     assert len({each.time_s for each in three}) == 3
     assert all(each.ended is Ended.CAPTURED for each in three)
     assert told == pytest.approx([1.0 / 3.0, 2.0 / 3.0, 1.0])
-    quantiles = capture_quantiles_s(three)
-    assert quantiles == sorted(quantiles)
-    assert quantiles[0] == min(each.time_s for each in three)
-    assert capture_quantiles_s([]) == []
 
 
 def test_a_script_changes_its_policy_at_its_times() -> None:
