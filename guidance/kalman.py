@@ -212,11 +212,6 @@ class Kalman(Checked):
         Standard deviation of the acceleration along z, constant over a step and independent between steps,
         in units of that of an acceleration uniform within the bound of the set's model.
 
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is negative or not finite, or there is no filter.
-
     Notes
     -----
     `KalmanBank` describes the filters. The last decision before the arrival that the engine allows has no dead zone.

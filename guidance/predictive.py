@@ -37,11 +37,6 @@ class Predictive(Checked):
     spacing : float
         The ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has no scheduled times.
 
-    Raises
-    ------
-    TypeError, ValueError
-        If the ratio is not a number greater than 1.
-
     Notes
     -----
     The impulse is k = m / tau, with the estimated miss m and the time to go tau. If the engine has scheduled times

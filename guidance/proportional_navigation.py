@@ -38,11 +38,6 @@ class ProportionalNavigation(Checked):
     dead_band_m_s : float or None
         Commands accumulate until their sum has this size, m/s; None is the minimum impulse of the engine.
 
-    Raises
-    ------
-    TypeError, ValueError
-        If a number is outside these limits.
-
     Notes
     -----
     The law is a = N c q, with the closing speed c and the rate q of the line of sight; the augmented law adds half of N

@@ -77,12 +77,12 @@ class InformationSet(InformationSetView):
     >>> sensor = AngleSensor(0.5, 0.00015, 0.00023, nominal_range_m=5.8e6)
     >>> information = InformationSet(SetModel(58e3, 0.5, known, sensor, disturbance_m_s2=0.005, sections=3))
     >>> information
-    <InformationSet at t = 0 s: 3 sections, range 5300 to 6300 km, predicted miss -2.105e+04 to 2.105e+04 m>
+    <InformationSet of 1 at t = 0 s>
     >>> information.measure_angle(0.0004)
     >>> information.shift(2.0)
     >>> information.predict()
     >>> information.sections()[0].polygon
-    <hexagon, area 8.33e+05>
+    ConvexPolygons(shape=(), counts=6)
 
     Notes
     -----

@@ -24,7 +24,7 @@ class Limits:
 
     Parameters
     ----------
-    above, minimum, below, most : float or None
+    above, minimum, below, maximum : float or None
         Ends of the interval; `above` and `below` are excluded. None is no limit but `MAXIMUM`.
     whole : bool
         Whether the number must be an integer; `MAXIMUM` does not apply to integers.
@@ -149,7 +149,7 @@ def check_fields(owner: object) -> None:
 
 
 class Checked:
-    """A dataclass whose constructor calls `check_fields`."""
+    """A dataclass whose constructor refuses values of wrong types and outside the limits of their fields."""
 
     def __post_init__(self) -> None:
         check_fields(self)

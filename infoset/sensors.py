@@ -246,11 +246,6 @@ class RangeSensor(Checked, Sensor):
     relative_error : float
         Maximum |d_m - d| / d, in (0, 1).
 
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not a number within its limits.
-
     References
     ----------
     Kumkov and Patsko (1997), equations (5) and (11).
@@ -300,11 +295,6 @@ class RateSensor(Checked, Sensor):
         Time between measurements, s; the first is at t = 0.
     error_rad_s : float
         Maximum |omega_m - omega|, rad/s.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not a number within its limits.
 
     References
     ----------

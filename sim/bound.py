@@ -28,13 +28,10 @@ class LowerBound:
         Best pair at both ends of the interval of V_x and at the nominal closing speed, the best one first.
     by_label : tuple of TruthPair
         Best pairs of all examined labels, in ascending order, for each velocity along x.
-    disturbance_m_s2 : float
-        Maximum acceleration of the true motion along z, m/s^2; `SetModel` contains that along y.
     """
 
     pairs: tuple[TruthPair, ...]
     by_label: tuple[TruthPair, ...]
-    disturbance_m_s2: float
 
     def __repr__(self) -> str:
         return (
@@ -99,10 +96,9 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     of the motion in their middle. The bound has a reserve for the second order and for what impulses change in gravity,
     and is zero if gravity is too strong for the proof of the reserve.
 
-    In space, each axis has a linear program, and the impulses limit the modulus. If the errors of the angles are in a
-    box, the two motions of a pair differ along both axes, each by the most that its program allows: |(dy(T), dz(T))|
-    replaces |dz(T)|, so the bound is never below that of one axis. If the errors are in a disc, they differ along the
-    axis with the greater bound.
+    In space, each axis has a linear program, and the impulses limit the modulus. The two motions of a pair differ along
+    both axes, each by the most that its program allows: |(dy(T), dz(T))| replaces |dz(T)|, so the bound is never below
+    that of one axis.
     """
     model = scenario.set_model
     slow, fast = max(model.bounds.vx_m_s), min(model.bounds.vx_m_s)
@@ -137,7 +133,6 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     return LowerBound(
         tuple(best),
         tuple(pair for _, pair in sorted(by_label.items(), key=lambda item: item[0])),
-        model.disturbance_m_s2,
     )
 
 

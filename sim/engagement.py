@@ -23,6 +23,7 @@ from guidance.noise import checked_measurements
 from guidance.strategy import decide, start
 from guidance.thruster import modulus
 from infoset import AngleSensor, InformationSet, InformationSetView, PredictedMiss
+from infoset.arrays import Flags, Floats
 from infoset.sensor import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.closed_form import worst_shift_m
@@ -36,8 +37,6 @@ from sim.target import TargetMotion, acceleration_m_s2, constant_side
 from sim.theorem_8 import Theorem8, has_theorem_8
 from sim.truth_section import TruthSection
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 Pending = tuple[tuple[float, Floats], ...]
 """Impulses that are decided and not given yet: times from now, s, and impulses, m/s."""

@@ -54,11 +54,6 @@ class Requirement(Checked):
         What is bounded.
     bound : float
         In the unit of the quantity.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the bound is not positive.
     """
 
     quantile: QuantileName
@@ -93,11 +88,6 @@ class HitRequirement(Checked):
     ----------
     share : float
         Minimum share of the runs that hit, between 0 and 1.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the share is not between 0 and 1.
     """
 
     share: Fraction

@@ -37,11 +37,6 @@ class Sun(Checked):
         Direction of the Sun seen from the spacecraft at t = 0, from the x axis toward z, rad.
     elevation_rad : float
         Angle of that direction out of the plane (x, z), toward y, rad. For space only.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not a number within its limits.
     """
 
     gravitational_parameter_m3_s2: Positive
@@ -76,11 +71,6 @@ class Target(Checked):
         Acceleration along y, m/s^2; None is that along z. For space only.
     switching_period_s : float
         Time between changes of sign (bang-bang), or the mean time (random telegraph), s.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is not within its limits.
     """
 
     manoeuvre: Manoeuvre
@@ -97,11 +87,6 @@ class Body(Checked):
     ----------
     radius_m : float
         Radius of a sphere, m: an engagement hits if its miss is at most this radius.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the radius is not a positive number.
     """
 
     radius_m: Positive

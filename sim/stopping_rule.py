@@ -64,11 +64,6 @@ class StoppingRule(Checked):
         In the unit of the quantity.
     confidence : float
         Of the interval, in (0, 1).
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the width or the confidence is out of its range.
     """
 
     quantile: QuantileName

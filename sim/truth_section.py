@@ -10,17 +10,15 @@ import copy
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from infoset import SetModel
+from infoset.arrays import Flags, Floats
 from infoset.history import ANGLE, IMPULSE, PREDICTION, RATE, History
 from infoset.replays import margins_along
 from infoset.section_law import BOUND_SLACK, law_table, section_laws
 from infoset.set_queries import MaskedFloats
 from sim.kepler import Sight
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 """Rounding error of a margin, relative to the terms of z: a quarter of that for which each cut widens the set."""

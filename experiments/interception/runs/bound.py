@@ -131,7 +131,7 @@ def _summary(
     if scenario.is_spatial:
         spatial["disturbance_y_m_s2"] = model.axis("y").disturbance_m_s2
     return {
-        "disturbance_m_s2": lower.disturbance_m_s2,
+        "disturbance_m_s2": model.disturbance_m_s2,
         **spatial,
         "lower_bound_m": lower.bound_m,
         "reached_at": _where(lower.pair, scenario),
