@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from decimal import Decimal
@@ -14,8 +13,8 @@ from sim.statistics import estimate_quantiles, level_name, number_text
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 
 DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
-_QUANTILE = rf"\s*(?P<quantity>\w+)\s+p(?P<level>{DIGITS})\s*"
-NUMBER = rf"\s*(?P<number>{DIGITS})\s*"
+_QUANTILE = re.compile(rf"\s*(?P<quantity>\w+)\s+p(?P<level>{DIGITS})\s*")
+_RULE = re.compile(rf"(?P<quantile>.*\S)\s+ci\s*<\s*(?P<width>{DIGITS})\s*")
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,10 @@ class QuantileName:
     @classmethod
     def parse(cls, text: str) -> QuantileName:
         """Read `miss_m p99`; raise ValueError for any other text."""
-        return parse_quantile(text, "", 'a quantity and a quantile, for example "miss_m p99"')[0]
+        match = _QUANTILE.fullmatch(text[:100])
+        if match is None:
+            raise ValueError('must be a quantity and a quantile, for example "miss_m p99"')
+        return cls(match["quantity"], float(Decimal(match["level"]) / 100))
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,10 @@ class StoppingRule(Checked):
     @classmethod
     def parse(cls, text: str) -> StoppingRule:
         """Read `miss_m p99 ci<0.5`; raise ValueError for any other text."""
-        example = 'a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"'
-        return cls(*parse_quantile(text, rf"\s+ci\s*<{NUMBER}", example, "the width of the confidence interval"))
+        match = _RULE.fullmatch(text[:100])
+        if match is None:
+            raise ValueError('must be a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"')
+        return cls(QuantileName.parse(match["quantile"]), float(match["width"]))
 
     @property
     def quantity(self) -> str:
@@ -90,20 +94,3 @@ class StoppingRule(Checked):
             return False
         (estimate,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)
         return estimate.width is not None and estimate.width < self.width
-
-
-def parse_quantile(text: str, end: str, wanted: str, number: str = "") -> tuple[QuantileName, float]:
-    """Read a quantile and, if the pattern `end` has one, the number after it; raise ValueError for any other text.
-
-    `wanted` and `number` name the form and the number in the message.
-    """
-    match = re.fullmatch(_QUANTILE + end, text[:100])
-    if match is None:
-        raise ValueError(f"must be {wanted}")
-    level = float(Decimal(match["level"]) / 100)
-    if not 0.0 < level < 1.0:
-        raise ValueError("the quantile must lie between p0 and p100, for example p99")
-    value = float(match["number"]) if end else 0.0
-    if end and not 0.0 < value < math.inf:
-        raise ValueError(f"{number} must be greater than 0 and finite, found {match['number']}")
-    return QuantileName(match["quantity"], level), value
