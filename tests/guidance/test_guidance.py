@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from guidance import Thruster, symmetric_impulse, zero_effort_miss
+from guidance import Thruster, symmetric_impulse
 from guidance.game_noise import keep_point
 from infoset import ExtremePoints, PredictedMiss
 
@@ -104,13 +104,6 @@ def test_the_symmetric_impulse_makes_the_ends_opposite(
     k = float(symmetric_impulse(interval(lower, lower + width, lower_range, upper_range), e)[0])
     upper_after, lower_after = lower + width - k * upper_range / e, lower - k * lower_range / e
     assert upper_after == pytest.approx(-lower_after, rel=1e-9, abs=1e-9 * (abs(lower) + width + 1.0))
-
-
-def test_the_zero_effort_miss_is_where_the_straight_line_goes() -> None:
-    z, v, x, e = 300.0, -12.0, 2e6, 58e3
-    alpha = z / x
-    omega = (v + e * alpha) / x
-    assert zero_effort_miss(array(omega), array(x), e)[0] == pytest.approx(z + v * x / e, rel=1e-12)
 
 
 def choose(larger: bool, low: float, high: float, point: float, minimum: float, maximum: float, reach: float) -> float:
