@@ -48,9 +48,7 @@ class QuantileName:
     @classmethod
     def parse(cls, text: str) -> QuantileName:
         """Read `miss_m p99`; raise ValueError for any other text."""
-        match = _QUANTILE.fullmatch(text[:100])
-        if match is None:
-            raise ValueError('must be a quantity and a quantile, for example "miss_m p99"')
+        match = _matched(_QUANTILE, text, 'a quantity and a quantile, for example "miss_m p99"')
         return cls(match["quantity"], float(Decimal(match["level"]) / 100))
 
 
@@ -78,9 +76,7 @@ class StoppingRule(Checked):
     @classmethod
     def parse(cls, text: str) -> StoppingRule:
         """Read `miss_m p99 ci<0.5`; raise ValueError for any other text."""
-        match = _RULE.fullmatch(text[:100])
-        if match is None:
-            raise ValueError('must be a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"')
+        match = _matched(_RULE, text, 'a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"')
         return cls(QuantileName.parse(match["quantile"]), float(match["width"]))
 
     @property
@@ -94,3 +90,10 @@ class StoppingRule(Checked):
             return False
         (estimate,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)
         return estimate.width is not None and estimate.width < self.width
+
+
+def _matched(pattern: re.Pattern[str], text: str, wanted: str) -> re.Match[str]:
+    match = pattern.fullmatch(text[:100])
+    if match is None:
+        raise ValueError(f"must be {wanted}")
+    return match
