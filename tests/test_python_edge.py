@@ -15,17 +15,9 @@ import pytest
 import infoset
 from experiments import load_scenario
 from guidance import (
-    GameNoise,
     Kalman,
-    Patient,
-    Predictive,
-    ProportionalNavigation,
-    RandomNoise,
-    ScriptedNoise,
     SymmetricMiss,
     Thruster,
-    TieRule,
-    symmetric_impulse,
 )
 from infoset import (
     AngleSensor,
@@ -39,11 +31,7 @@ from infoset import (
     SetModel,
     SetSettings,
     StateBox,
-    to_omega_alpha,
 )
-from rendezvous.multipoint import DriftingTargets, Tour
-from rendezvous.multipoint import Target as Visited
-from rendezvous.relative_motion import ClohessyWiltshire
 from sim import (
     Body,
     Campaign,
@@ -55,9 +43,6 @@ from sim import (
     StoppingRule,
     Sun,
     Target,
-    empirical_distribution,
-    estimate_hits,
-    estimate_quantiles,
     fly_one,
     simulate,
 )
@@ -256,14 +241,6 @@ def test_what_is_no_error_bound(value: Any) -> None:
     refused(lambda: information().measure_range(-1.0, 0.05), "range_m")
 
 
-@pytest.mark.parametrize(
-    "where", [1, [1, 0], [True], [[True], [False]], math.nan, "yes", np.ma.masked_array([True, False])]
-)
-def test_what_is_no_choice_of_engagements(where: Any) -> None:
-    refused(lambda: information().measure_angle(0.0, where), "where")
-    refused(lambda: information().stop(where), "where")
-
-
 @pytest.mark.parametrize("value", NO_COUNTS)
 def test_what_is_no_count(value: Any) -> None:
     scenario = load_scenario("asteroid-1997")
@@ -282,53 +259,6 @@ def test_what_is_no_count(value: Any) -> None:
     for name in ("runs", "chunk", "seed"):
         numbers = {"runs": 4, "chunk": 2, "seed": 0, name: value}
         refused(partial(Campaign, scenario, folder="runs", **numbers), name)
-
-
-def test_single_precision_is_refused_and_integers_are_numbers() -> None:
-    refused(partial(AngleSensor, np.float32(0.5), 1e-4, 1e-4, 5.8e6), "period_s")  # type: ignore[arg-type]
-    assert AngleSensor(np.float64(0.5), 1e-4, 1e-4, 5_800_000).error_bound(0.0) == 1e-4
-    refused(partial(InformationSet, None), "model")  # type: ignore[arg-type]
-
-
-def test_runs_are_integers() -> None:
-    scenario = load_scenario("asteroid-1997")
-    for runs in ([0.5, 1.0], [[0, 1]], [True, False], [1, -1], [], 0):
-        refused(partial(simulate, scenario, runs), "run")  # type: ignore[arg-type]
-
-
-def test_an_engagement_that_is_not_there() -> None:
-    for call in (lambda: information().sections(2), lambda: information().section_at(5.5e6, 2)):
-        with pytest.raises(IndexError, match="engagement must be less than 2, the number of engagements: got 2"):
-            call()
-
-
-def test_a_range_at_which_rates_are_too_large() -> None:
-    assert np.isfinite(to_omega_alpha(square(), 1e-25, 3e8).vertices).all()
-    with pytest.raises(ValueError, match="range_m must be at least 1e-25: got 1e-100"):
-        to_omega_alpha(square(), 1e-100, 3e8)
-
-
-@pytest.mark.parametrize("value", [value for value in NO_NUMBERS if value is not None])
-def test_what_is_no_number(value: Any) -> None:
-    given = information(1)
-    refused(lambda: given.section_at(value), "label_m")
-    refused(lambda: to_omega_alpha(square(), value, 1.0), "range_m")
-    refused(lambda: to_omega_alpha(square(), 1.0, value), "closing_speed_m_s")
-    refused(lambda: symmetric_impulse(given.predicted_miss(), value), "closing_speed_m_s")
-    refused(lambda: Kalman(dead_zone=value), "dead_zone")
-    refused(lambda: Kalman(process_noise=value), "process_noise")
-    refused(lambda: Kalman(last_s=value), "last_s")
-    refused(lambda: ProportionalNavigation(ratio=value), "ratio")
-    refused(lambda: ProportionalNavigation(dead_band_m_s=value), "dead_band_m_s")
-    refused(lambda: Predictive(spacing=value), "spacing")
-    if np.ndim(value) == 0:
-        refused(lambda: ConvexPolygons.from_box((0.0, 0.0), value), "upper")
-
-
-@pytest.mark.parametrize("share", [-0.1, 1.1, math.nan, "a"])
-def test_a_share_is_a_part(share: Any) -> None:
-    with pytest.raises(REFUSALS):
-        Patient(share)
 
 
 def square() -> ConvexPolygons:
@@ -359,28 +289,6 @@ def test_what_is_no_point_of_a_polygon(value: Any) -> None:
     refused(lambda: polygon.contains(value), "point")
     if len(several[0]) == 2:
         refused(lambda: polygon.linear_map(several), "matrix")
-
-
-def test_points_of_three_coordinates_are_no_points() -> None:
-    refused(lambda: ConvexPolygons.from_points(np.zeros((2, 3))), "points")
-    refused(lambda: square().linear_map([[1.0, 2.0]]), "matrix")
-    refused(lambda: ConvexPolygons([[0.0, 1.0]], 1.5), "counts")
-    refused(lambda: ConvexPolygons([[0.0, 1.0]], True), "counts")
-    refused(lambda: square().cut((1.0, 0.0), [0.0, 1.0]), "lower")
-
-
-@pytest.mark.parametrize(
-    "draws",
-    [np.full((1, 3), 1.1), np.full((1, 3), math.nan), np.zeros(3), [[0.0]], np.zeros((1, 3), dtype=complex), None],
-)
-def test_what_are_no_errors_of_a_noise(draws: Any) -> None:
-    zeros = np.zeros((1, 3))
-    refused(lambda: RandomNoise({"angle": draws}), "errors['angle']")
-    refused(lambda: RandomNoise({"angle": zeros, "range": draws}), "errors['range']")
-    refused(lambda: GameNoise(TieRule.UPPER, draws), "tie_draws")
-    refused(lambda: GameNoise("upper", zeros), "tie")  # type: ignore[arg-type]
-    refused(lambda: ScriptedNoise({"angle": draws}), "errors['angle']")
-    refused(lambda: RandomNoise({"angle": zeros, "range": zeros, "rate": draws}), "errors['rate']")
 
 
 class Returns:
@@ -455,35 +363,3 @@ def test_sensors_that_measure_now_and_then_are_asked_now_and_then(brief: Scenari
     always = replace(scenario, rate_sensor=None)
     both = Returns(lambda sight: {"angle": sight.alpha_rad, "range": sight.range_m})
     refused(lambda: fly_one(always, noise=both), "sensor 'range' does not measure at this step, only ['angle']")
-
-
-@pytest.mark.parametrize("sample", [[], [math.nan], [1.0, math.inf], [1j], np.ma.masked_array([1.0], [True]), ["a"]])
-def test_what_is_no_sample(sample: Any) -> None:
-    for call in (
-        lambda: empirical_distribution(sample),
-        lambda: estimate_quantiles(sample, [0.5]),
-    ):
-        with pytest.raises(REFUSALS):
-            call()
-
-
-@pytest.mark.parametrize("level", [-0.1, 1.1, math.nan])
-def test_what_is_no_level(level: float) -> None:
-    refused(lambda: estimate_quantiles([1.0, 2.0], [level]), "levels")
-
-
-@pytest.mark.parametrize(
-    ("hits", "runs", "confidence", "name"),
-    [(0, 0, 0.95, "runs"), (3, 2, 0.95, "hits"), (-1, 2, 0.95, "hits"), (1, 2, 1.0, "confid")],
-)
-def test_hits_are_a_part_of_the_runs(hits: Any, runs: int, confidence: float, name: str) -> None:
-    refused(lambda: estimate_hits(hits, runs, confidence), name)
-
-
-@pytest.mark.parametrize("order", [(-1, 0), (0, 2), (0, 5), (0.5, 1.0), (0, 10**30)])
-def test_what_is_no_order_of_targets(order: Any) -> None:
-    motion = ClohessyWiltshire(1e-3)
-    states = np.array([[0.0, 1e3, 0.0, 0.0, 0.0, 0.0], [0.0, 2e3, 0.0, 0.0, 0.0, 0.0]])
-    tour = Tour(motion, DriftingTargets((Visited("near"), Visited("far")), motion, states), np.zeros(6))
-    assert len(tour.fly((1, 0), [1e3, 2e3]).nodes.arrive_s) == 2
-    refused(lambda: tour.fly(order, [1e3, 2e3]), "order must hold numbers of targets, from 0 to 1")

@@ -14,7 +14,6 @@ import experiments
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PROSE = ("README.md", "SECURITY.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
 
 
 def blocks(language: str) -> list[str]:
@@ -47,10 +46,6 @@ def test_the_readme_is_short() -> None:
     assert max(map(len, lines)) <= 100
 
 
-def test_two_commands_do_all_the_set_up() -> None:
-    assert blocks("sh")[:2] == [command("experiment"), command("tests")]
-
-
 def test_contributing_is_short() -> None:
     assert (ROOT / "CONTRIBUTING.md").stat().st_size < 6000
 
@@ -79,14 +74,6 @@ def test_constraints_hold_names_and_versions_only() -> None:
 def normal(name: str) -> str:
     """Return the normalised name of a distribution."""
     return re.sub(r"[-_.]+", "-", name).lower()
-
-
-@pytest.mark.parametrize("name", PROSE)
-def test_files_named_in_the_prose_exist(name: str) -> None:
-    text = (ROOT / name).read_text(encoding="utf-8")
-    paths = re.findall(r"`((?:[\w.-]+/)+[\w.-]*|[\w-]+\.(?:md|toml|cff|txt)|LICENSE)`", text)
-    made = ("docs/_build",)
-    assert [path for path in paths if not (ROOT / path).exists() and path not in made] == []
 
 
 def test_exports_of_experiments_are_loaded_late() -> None:

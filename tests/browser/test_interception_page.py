@@ -10,11 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.interception.page import interception_page
-from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind
-from infoset import InitialSet, Model, RateSensor, Recovery
-from sim import Record, fly_one
-from sim.scenario import of_model
+from sim import Record
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]
@@ -199,33 +195,3 @@ def test_the_policy_stops_what_is_not_the_pages_own(open_page: Open, single: str
     assert all("Content Security Policy" in message or "Fetch" in message for message in opened.console)
     opened.console.clear()
     opened.requests[:] = opened.requests[:1]
-
-
-@pytest.mark.parametrize("kind", ["lost", "guaranteed", "one step"])
-def test_odd_engagements_are_drawn_to_their_end(open_page: Open, kind: str) -> None:
-    scenario = load_scenario("asteroid-1997")
-    model = scenario.set_model
-    if kind == "lost":  # from then on there is no section and no interval
-        recovery = replace(model, recovery=Recovery.NONE)
-        record = fly_one(replace(scenario, noise=NoiseKind.GAME, **of_model(recovery)), 2)
-        assert record.steps[-1].predicted_miss_m is None
-    else:
-        sound = replace(model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
-        record = fly_one(replace(scenario, **of_model(sound), rate_sensor=RateSensor(1.0, 2e-6)))
-    if kind == "one step":
-        record = replace(record, steps=record.steps[:1])
-    opened = open_page(interception_page([record]), 800)
-    last = 4 * len(record.steps) - 1
-    for frame in sorted({*range(0, last, 37), *range(max(0, last - 8), last + 1)}):
-        opened.page.evaluate(f"player.show({frame})")
-    assert opened.page.evaluate("player.frame") == last
-    opened.page.evaluate(f"player.show({last - 2})")  # after the last measurement
-    said = rows_of(opened)
-    assert said["sections"] == opened.page.evaluate("String(columns[0].sections.length)")
-    assert (said["predicted miss"] == "no set is left") == (record.steps[-1].predicted_miss_m is None)
-
-
-def rows_of(opened: Opened) -> dict[str, str]:
-    """The numbers of the first record."""
-    cells = opened.page.locator("table").first.locator("th, td").all_inner_texts()
-    return dict(zip(*[iter(cells)] * 2, strict=True))

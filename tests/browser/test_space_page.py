@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -75,47 +73,6 @@ def test_the_b_plane_shows_the_predicted_misses_of_the_record(open_page: Open, p
     pixels = opened.page.evaluate(f"(({{ left, right, top, bottom }}) => [right - left, bottom - top])({panel}.chart)")
     scale = [(high - low) / length for (low, high), length in zip(limits, pixels, strict=True)]
     assert scale[0] == pytest.approx(scale[1])
-
-
-def test_an_impulse_moves_the_rectangles(open_page: Open, page: str, space: list[Record]) -> None:
-    opened = open_page(page)
-    boxes = []
-    for frame, stage in ((MEASURED, "MEASURED"), (IMPULSE, "IMPULSE")):
-        opened.page.evaluate(f"player.show({frame})")
-        boxes.append(np.array(opened.page.evaluate(f"engagements[0].joint[0].rectangles({stage}, true)")))
-    step, speed = space[1].steps[STEP], space[1].scenario.set_model.closing_speed_m_s
-    assert step.impulse_m_s > 0.0
-    times_s = np.array([section.range_m / speed for section in step.sections])
-    impulse = np.array([step.axes[axis].impulse_m_s for axis in AXES] * 2)
-    np.testing.assert_allclose(boxes[1], boxes[0] - times_s[:, None] * impulse, atol=1e-6)
-
-
-def test_engagements_in_space_and_in_a_plane_side_by_side(
-    open_page: Open, space: list[Record], records: list[Record], screenshots: Path
-) -> None:
-    opened = open_page(interception_page([records[1], space[1]]))
-    page = opened.page
-    last = page.evaluate("player.frames") - 1
-    for frame in (*range(0, last, 101), last):
-        page.evaluate(f"player.show({frame})")
-    page.evaluate(f"player.show({MEASURED})")
-    assert page.evaluate("columns.map((column) => column.record.axis)") == ["z", "y", "z"]
-    assert page.evaluate("columns[0].limits === columns[2].limits")
-    assert page.evaluate("engagements.map((engagement) => engagement.joint.length)") == [0, 1]
-    page.screenshot(path=screenshots / "space-and-plane.png", full_page=True)
-
-
-def test_two_long_flights_have_the_same_steps() -> None:
-    """The steps of both are those that one of them needs, for example at an impulse."""
-    scenario = load_scenario("dart-2022", ["angle_sensor.first_image_s=7200"])
-    records = [fly_one(replace(scenario, noise=kind)) for kind in NoiseKind]
-    data = json.loads(
-        re.findall(r"<script type=\"application/json\"[^>]*>(.*?)</script>", interception_page(records))[0]
-    )
-    times = [record["time_s"] for record in data["records"]]
-    assert times[0] == times[1]
-    assert max(len(kept_steps(record)) for record in records) <= MAX_STEPS
-    assert len(times[0]) < 2 * MAX_STEPS
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,8 @@ import pytest
 
 from experiments.cli import commands, main
 
+pytestmark = pytest.mark.docs
+
 if TYPE_CHECKING:
     from tests.docs.conftest import Page
 

@@ -50,13 +50,6 @@ def test_links_lead_somewhere(page: Page) -> None:
             assert anchor in anchors(source), f"{page.name}: {link}: no such heading"
 
 
-def test_links_into_the_gallery_say_that_it_needs_the_site(page: Page) -> None:
-    # A clone has no docs/gallery, so the link works on the site only.
-    for paragraph in page.prose().split("\n\n"):
-        if any("gallery/" in link for link in _LINK.findall(paragraph)):
-            assert re.search(r"\bsite\s+is\s+built\b", paragraph), f"{page.name}: {paragraph}"
-
-
 def test_tables_of_contents_name_pages_that_exist(page: Page) -> None:
     for block in page.blocks("{toctree}"):
         for line in block.text.splitlines():
@@ -78,19 +71,6 @@ def test_every_page_of_the_site_is_in_a_table_of_contents(pages: list[Page]) -> 
         if (entry := _TOCTREE_ENTRY.match(line)) is not None
     }
     assert {page.path.with_suffix("") for page in site} - listed == {DOCS / "index"}
-
-
-def test_files_named_in_the_site_exist(page: Page) -> None:
-    named = re.findall(r"`((?:docs|tests|benchmarks|infoset|guidance|sim|rendezvous|experiments)/[\w./-]+)`", page.text)
-    made = ("docs/_build",)
-    missing = [name for name in named if not (ROOT / name).exists() and not name.startswith(made)]
-    assert missing == [], page.name
-
-
-def test_examples_link_to_pages_that_exist() -> None:
-    for example in (DOCS / "examples").iterdir():
-        for link in re.findall(r"<(\.\./[\w-]+)\.html>`_", example.read_text(encoding="utf-8")):
-            assert (DOCS / "gallery" / f"{link}.md").resolve().is_file(), f"{example.name}: {link}"
 
 
 def test_pictures_are_small_and_made_by_commands() -> None:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+pytestmark = pytest.mark.docs
+
 if TYPE_CHECKING:
     from tests.docs.conftest import Page
 

@@ -7,7 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,6 @@ from infoset import _compile
 from infoset.kernels import VARIABLE, cache_folder
 from infoset.limits import shown
 from rendezvous import _compile as _compile_of_rendezvous
-from tests.faults.conftest import begin, ended
 
 pytestmark = pytest.mark.thorough
 
@@ -126,16 +125,6 @@ def environment_of(installation: Path, temporary: Path, home: Path) -> dict[str,
     }
 
 
-def test_a_read_only_installation_and_a_home(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
-    (tmp_path / "home").mkdir()
-    environment = environment_of(installation, tmp_path, tmp_path / "home")
-    left = ended(begin("pareto", folder=tmp_path, environment=environment, prefix=ordinary))
-    assert left.code == 0
-    assert left.err.count("compiling") == 1
-    assert f"the machine code is stored in {tmp_path / 'home'}" in left.err
-    assert list((tmp_path / "home").rglob("*.nbc"))
-
-
 def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
     """The library alone, as in a notebook: it works, and one line says what to do."""
     code = "from rendezvous.relative_motion.clohessy_wiltshire import angle_less_sine; print(angle_less_sine(1.0))"
@@ -153,20 +142,3 @@ def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: 
     assert abs(float(done.stdout) - 0.1585290151921035) < 1e-15  # 1 - sin 1
     assert done.stderr.count("compiling") == 1
     assert "set NUMBA_CACHE_DIR" in done.stderr
-
-
-@pytest.mark.parametrize("command", [("pareto", "--json", "-"), ("multipoint", "--json", "-")])
-def test_two_processes_compile_at_once_into_one_cache(command: tuple[str, ...], tmp_path: Path) -> None:
-    environment: Mapping[str, str] = {VARIABLE: str(tmp_path / "kernels")}
-    both = [begin(*command, folder=tmp_path, environment=environment) for _ in range(2)]
-    one, other = (ended(process) for process in both)
-    after = ended(begin(*command, folder=tmp_path, environment=environment))
-    for left in (one, other, after):
-        assert left.code == 0
-        assert "Traceback" not in left.err
-    assert without_times(one.out) == without_times(other.out) == without_times(after.out)
-    assert "compiling" not in after.err
-
-
-def without_times(text: str) -> list[str]:
-    return [line for line in text.splitlines() if "elapsed" not in line and "_took_" not in line]

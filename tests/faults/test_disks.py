@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import itertools
 import os
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import pytest
 
 from experiments.common.figure_style import new_figure
 from experiments.common.output import Output
-from sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 from tests.faults.conftest import begin, ended, need_whole
 
@@ -57,18 +55,3 @@ def test_a_figure_replaces_the_one_before_only_when_it_is_whole(
     with pytest.raises(OSError, match="No space left on device"):
         Output(tmp_path, {}, overwrite=True).figure("figure", figure)
     assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == before
-
-
-def test_a_campaign_does_not_depend_on_the_clock(
-    infoset: Command, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked = ("campaign", file, "--runs", 400, "--chunk", 16, "--until", "miss_m p50 ci<2", "-q", "--workers", 1)
-    assert infoset(*asked, "--out", "sound")[0] == 0
-    clock = itertools.accumulate(itertools.cycle((0.5, -3e7, 3e8, 0.0, -0.25)), initial=1e9)
-    with monkeypatch.context() as patched:
-        for name in ("time", "monotonic", "perf_counter"):
-            patched.setattr(f"time.{name}", lambda: next(clock))
-        assert infoset(*asked, "--out", "wild")[0] == 0
-    sound, wild = (CampaignFolder.read(tmp_path / name) for name in ("sound", "wild"))
-    assert wild.runs().equals(sound.runs())
-    assert 0 < wild.finished_runs < 400

@@ -13,10 +13,8 @@ from typing import Any
 
 import pytest
 
-from infoset.model import Model
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import CampaignFolder
-from sim.storage.codec import to_json
 from tests.experiments.command_line import Command
 from tests.faults.conftest import begin, ended, need_whole
 
@@ -49,18 +47,6 @@ def test_an_interrupt_says_how_to_go_on(
     need_whole(tmp_path / "runs")
     assert infoset(*asked, "--resume", "-q")[0] == 0
     assert CampaignFolder.read(tmp_path / "runs").complete
-
-
-def test_an_interrupt_while_a_scenario_is_encoded_stays_an_interrupt(
-    brief: Scenario, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(_: object) -> None:
-        raise KeyboardInterrupt
-
-    to_json(brief)  # makes pydantic's serializer
-    monkeypatch.setattr(Model, "value", property(interrupt), raising=False)
-    with pytest.raises(KeyboardInterrupt):
-        to_json(brief)
 
 
 COMMANDS: dict[str, list[object]] = {

@@ -163,19 +163,6 @@ def test_patient_relies_on_the_later_impulses_of_the_schedule(
     assert wanted == pytest.approx(symmetric if not later else (1000.0 - expected) / 50.0, rel=1e-6)
 
 
-def test_patient_gives_at_the_last_time_what_cannot_be_corrected_later(known: Scenario) -> None:
-    """It waits for the second impulse, unless the second one is too weak for the whole miss that is possible."""
-    box = StateBox((-100.0, 500.0), (RANGE, RANGE), (0.0, 0.0), (-E, -E))
-    model = replace(known.set_model, bounds=box, angle_sensor=AngleSensor(0.5, 0.9, 0.9, RANGE))
-    wide = replace(known, **of_model(model), dispersion=replace(box, z_m=(500.0, 500.0)))
-    strategy = Patient(1.0)
-    strong = impulses(with_thruster(wide, impulses_s=(80.0, 40.0)), strategy=strategy)
-    assert strong == pytest.approx({60.0: 200.0 / 40.0})
-    weak = impulses(with_thruster(wide, impulses_s=(80.0, 40.0), max_impulse_m_s=8.0), strategy=strategy)
-    # At most 320 m can be corrected later: 180 m are given now, and the middle of what is left, 20 m, at the end.
-    assert weak == pytest.approx({20.0: 180.0 / 80.0, 60.0: 20.0 / 40.0})
-
-
 def test_a_strategy_sees_the_schedule(known: Scenario) -> None:
     seen: list[Situation] = []
 

@@ -322,43 +322,6 @@ def test_images_are_taken_from_the_first_to_the_last_and_measured_from_then_on()
     assert [step.time_s for step in odd.steps if "angle" in step.measured] == times_s[1:-1]
 
 
-class Witness:
-    """A strategy that fires nothing and stores what it sees."""
-
-    name = "witness"
-
-    def __init__(self) -> None:
-        self.situations: list[Situation] = []
-
-    def start(self, batch: int) -> None:
-        pass
-
-    def decide(self, situation: Situation, state: None) -> Floats:
-        self.situations.append(situation)
-        return np.zeros_like(situation.last_impulse_m_s)
-
-
-def test_lost_images_are_the_same_for_all_noises_and_known_to_strategies() -> None:
-    scenario = camera_scenario(miss_probability=0.4)
-    seen = []
-    for noise in NoiseKind:
-        witness = Witness()
-        simulate(replace(scenario, noise=noise), 8, strategy=witness)
-        angles = [situation for situation in witness.situations if situation.step % 2 == 0]
-        seen.append(np.array([situation.is_new("angle") for situation in angles[:200]]))
-        before: Floats | None = None
-        for situation in angles[:200]:
-            now, new = situation.measured["angle"], situation.is_new("angle")
-            assert situation.new == ({"angle"} if new.any() else set())
-            if before is not None:
-                assert np.array_equal(now[~new], before[~new], equal_nan=True)
-            assert np.isfinite(now[new]).all()
-            before = now
-        assert not witness.situations[1].is_new("angle").any()
-    assert np.array_equal(seen[0], seen[1])
-    assert 0.35 < 1.0 - seen[0].mean() < 0.45
-
-
 def test_a_lost_image_is_no_value_of_the_record_and_no_cut() -> None:
     scenario = camera_scenario(miss_probability=0.4)
     record: Record = fly_one(scenario, 3)

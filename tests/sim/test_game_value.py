@@ -138,6 +138,7 @@ def test_reserve_of_one_impulse_by_hand() -> None:
 CAMERA = AngleSensor.camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "change",
     [

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from infoset import Model, SetModel
+from infoset import SetModel
 from infoset.arrays import Floats
 from sim import Manoeuvre, Scenario, Sun, Target
-from sim.draws import Draws, Y, corners, draw, generator
+from sim.draws import Draws, corners, draw
 from sim.gravity import max_impulses_m_s, on_board_model, with_gravity
 from sim.kepler import KeplerMotion, sun_and_orbit
 from sim.target import acceleration_m_s2
@@ -169,34 +169,6 @@ def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
     assert (100.0 * pull[:, 2] <= model.gravity_speed_change * model.closing_speed_m_s).all()
 
 
-@pytest.mark.parametrize("wide", [1.0, 100.0])
-def test_the_acceleration_of_the_scaled_motion_is_within_its_bound(wide: float, spatial: Scenario) -> None:
-    """Gravity and the change of scale that it causes, for any direction of the Sun and a y axis of any width."""
-    start = spatial.set_model.bounds
-    box = replace(start, y_m=(-1e4 * wide, 1e4 * wide), vy_m_s=(-100.0 * wide, 100.0 * wide))
-    quiet = replace(spatial.set_model, bounds=box, model=Model.GUARANTEED, disturbance_m_s2=0.0)
-    minimum, maximum = corners(box)
-    random, worst, speed = np.random.default_rng(12), np.zeros(2), quiet.closing_speed_m_s
-    for number in range(12):
-        diagonal = (0.25 * np.pi * random.choice([-3, -1, 1, 3]), 0.0)
-        anywhere = (random.uniform(-np.pi, np.pi), np.arcsin(random.uniform(-1.0, 1.0)))
-        direction, elevation = anywhere if number % 3 else diagonal
-        sun = replace(SUN, direction_rad=direction, elevation_rad=elevation)
-        share = random.uniform(size=(40, 6))
-        states = minimum + (maximum - minimum) * np.where(random.uniform(size=(40, 6)) < 0.5, share.round(), share)
-        motion = KeplerMotion(states[:, :3], states[:, 3:], sun)
-        arrival_s, scaled = motion.arrival_s(), []
-        for second in range(80):
-            scaled.append(motion.sight().slope * speed * (arrival_s - second))
-            motion.advance(1.0)
-        model = with_gravity(quiet, sun, 0.0)
-        bounds = np.array([model.axis(name).acceleration_m_s2 for name in model.axes])
-        worst = np.maximum(worst, np.abs(np.diff(scaled, 2, axis=0)).max(axis=(0, 2)) / bounds)
-        assert np.abs(motion.velocity_m_s[:, 2] - states[:, 5]).max() < model.gravity_speed_change * speed
-    assert (worst <= 1.0).all()
-    assert worst[1] > 0.7
-
-
 def test_without_motion_along_y_the_bound_of_gravity_is_the_planar_one(asteroid: Scenario, spatial: Scenario) -> None:
     def idle(model: SetModel) -> SetModel:
         bounds = replace(model.bounds, y_m=(0.0, 0.0), vy_m_s=(0.0, 0.0))
@@ -226,33 +198,3 @@ def test_a_target_manoeuvres_along_each_axis_as_in_a_plane() -> None:
                 np.testing.assert_array_equal(both[axis], planar)
     same = acceleration_m_s2(Target(Manoeuvre.CONSTANT, 0.3), draws, 0, 0.5, miss)
     assert (np.abs(same) == 0.3).all()
-
-
-def test_the_z_axis_has_the_random_numbers_of_the_plane(ranging: Scenario) -> None:
-    planar = replace(
-        ranging,
-        target=Target(Manoeuvre.RANDOM_TELEGRAPH, 0.001),
-        thruster=replace(ranging.thruster, execution_error_relative=0.01),
-    )
-    spatial = in_space(planar)
-    spatial = replace(spatial, thruster=replace(spatial.thruster, pointing_error_rad=0.02))
-    one, both = draw(planar, range(3), 8), draw(spatial, range(3), 8)
-    np.testing.assert_array_equal(both.position_m[:, 1:], one.position_m)
-    np.testing.assert_array_equal(both.velocity_m_s[:, 1:], one.velocity_m_s)
-    assert one.target is not None
-    assert both.target is not None
-    assert both.pointing is not None
-    np.testing.assert_array_equal(both.target[1], one.target)
-    np.testing.assert_array_equal(both.errors["angle"][1], one.errors["angle"])
-    np.testing.assert_array_equal(both.errors["range"], one.errors["range"])
-    assert one.execution is not None
-    np.testing.assert_array_equal(both.execution, one.execution)
-    assert one.pointing is None
-    assert both.pointing.shape == one.execution.shape
-    assert both.tie.shape == (2, *one.tie.shape)
-    assert (both.steps, both.errors["angle"].shape) == (one.steps, (2, *one.errors["angle"].shape))
-    y = spatial.dispersion.axis("y")
-    lateral = np.stack([both.position_m[:, 0], both.velocity_m_s[:, 0]], axis=1)
-    minimum, maximum = np.transpose([y.z_m, y.vz_m_s])
-    fresh = np.stack([generator(8, run, Y).uniform(size=2) for run in range(3)])
-    np.testing.assert_array_equal(lateral, minimum + (maximum - minimum) * fresh)
