@@ -94,6 +94,7 @@ def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(worst: Wor
             assert abs(step.measured["angle"] - step.true_angle_rad) <= bound * (1.0 + 1e-12)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["ranging", "comet"])
 def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.FixtureRequest) -> None:
     given = guaranteed(request.getfixturevalue(name))

@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import linprog
 
 from experiments import load_scenario
-from guidance import NoiseKind, Situation, Thruster, TieRule
+from guidance import NoiseKind, Thruster, TieRule
 from infoset import (
     AngleSensor,
     Bias,

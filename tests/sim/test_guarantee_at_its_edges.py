@@ -13,15 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind, RandomNoise, Thruster, TieRule
-from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
-from infoset.arrays import Floats
+from guidance import NoiseKind, Thruster, TieRule
+from infoset import AngleSensor, InformationSet, InitialSet, Model, SetModel, StateBox
 from infoset.history import LastSight
 from infoset.section_law import BOUND_SLACK, SectionLaw, section_laws
 from infoset.section_life import rate_band
 from sim import Outcome, Results, Scenario, simulate
-from sim.draws import draw
-from sim.engagement import Engagements, Step
 from sim.scenario import of_model
 
 CASES = Path(__file__).parent / "cases"
