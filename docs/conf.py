@@ -69,6 +69,7 @@ nitpick_ignore = [
         "infoset.sensors": ("RangeOrRanges",),
         "infoset.set_queries": ("SetQueries",),
         "infoset.set_state": ("SetState",),
+        "rendezvous.multipoint._shooting": ("ShotPath",),
         "sim.engagement": ("Step",),
         "sim.target": ("GivenTarget", "TargetMotion"),
         "rendezvous.pursuit_evasion._pair": ("Node",),

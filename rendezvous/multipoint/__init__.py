@@ -1,6 +1,5 @@
 """Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their order."""
 
-from rendezvous.multipoint._shooting import Flown
 from rendezvous.multipoint.kepler import KeplerTargets, KeplerTour
 from rendezvous.multipoint.order import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
 from rendezvous.multipoint.segments import Nodes, NotSettledError, Path, solve_segments
@@ -13,7 +12,6 @@ __all__ = [
     "BestTimes",
     "DriftingTargets",
     "Effort",
-    "Flown",
     "KeplerTargets",
     "KeplerTour",
     "Meet",
