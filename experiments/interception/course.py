@@ -26,9 +26,6 @@ MAX_COURSES = 1000
 UNITS = (("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0))
 """Units of times before the arrival."""
 
-TICKS_S = (0.01, 0.1, 1.0, 10.0, 60.0, 600.0, 3600.0, 21600.0, 86400.0, 864000.0)
-"""Possible ticks of a logarithmic time axis, s."""
-
 
 @dataclass(frozen=True)
 class Clock:

@@ -140,18 +140,6 @@ def blocks_of(start_s: float, start_state: Floats, nodes: Nodes, gravitational_p
     return blocks
 
 
-def unknowns_of(path: Path, gravitational_parameter_m3_s2: float) -> list[Floats]:
-    """Return the unknowns of each block of a known path."""
-    unknowns, first = [], 0
-    for block in blocks_of(float(path.starts_s[0]), path.start_states[0], path.nodes, gravitational_parameter_m3_s2):
-        scale = block.costate_units
-        start = path.costate_start if first == 0 else path.costate_after[first - 1]
-        last = first + len(block.time_s) - 1
-        unknowns.append(np.concatenate([start / scale, (path.jumps[first:last, :3] / scale[:3]).ravel()]))
-        first = last + 1
-    return unknowns
-
-
 @dataclass(frozen=True, eq=False)
 class Shot:
     """A block's trajectory: lambda at the start, then the jumps at all nodes but the last, in units of the block."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats, Integers
-from rendezvous.multipoint._shooting import MIN_RADIUS, ROUNDING, Flown, ShotPath, blocks_of, shoot, unknowns_of
+from rendezvous.multipoint._shooting import MIN_RADIUS, ROUNDING, Flown, ShotPath, blocks_of, shoot
 from rendezvous.multipoint.segments import Nodes, NotSettledError, Path, check_times, solve_segments
 from rendezvous.multipoint.tour import MovingTargets, Target, Visits, nodes_of
 from rendezvous.relative_motion import TimeVaryingMotion
@@ -279,8 +279,8 @@ class KeplerTour(Visits):
             return self._relinearise(nodes, coasting, rounds=FEW_ROUNDS)
         return self.flyer(order)(nodes.arrive_s).settled()
 
-    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
-        """Return a function of N times that shoots paths of one `order`, from the nearest known one, at first `near`.
+    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Flown]:
+        """Return a function of N times that shoots paths of one `order`, each from the nearest one before.
 
         Raises
         ------
@@ -290,8 +290,6 @@ class KeplerTour(Visits):
         """
         mu = self.targets.gravitational_parameter_m3_s2
         known: list[tuple[Floats, list[Floats]]] = []
-        if near is not None:
-            known.append((near.nodes.arrive_s, unknowns_of(near, mu)))
 
         def fly(time_s: Floats) -> ShotPath:
             nodes = nodes_of(self.targets, order, time_s)

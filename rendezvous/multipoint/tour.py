@@ -115,8 +115,8 @@ class Visits(ABC):
         """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""
 
     @abstractmethod
-    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
-        """Return a function of N times that finds paths of one `order`, the first one near a known path `near`."""
+    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Flown]:
+        """Return a function of N times that finds paths of one `order`, each near one before if that helps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +138,8 @@ class Tour(Visits):
         """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""
         return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
 
-    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
-        """Return `fly` for one `order`; the path is unique, so `near` has no effect."""
+    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Flown]:
+        """Return `fly` for one `order`; the path is unique."""
         return lambda time_s: self.fly(order, time_s)
 
 

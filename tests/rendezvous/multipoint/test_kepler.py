@@ -122,7 +122,7 @@ def test_targets_far_from_the_coasting_orbit(scale: float) -> None:
 def test_a_flyer_goes_on_from_the_last_path() -> None:
     case = tour(scale=8.0)
     path = case.fly((0, 1), [2.0, 5.0])
-    fly = case.flyer((0, 1), path)
+    fly = case.flyer((0, 1))
     assert fly(np.array([2.0, 5.0])).cost == pytest.approx(path.cost, rel=1e-9)
     near = fly(np.array([2.01, 5.0]))
     assert near.cost == pytest.approx(path.cost + 0.01 * path.time_gradient[0], rel=2e-2)
