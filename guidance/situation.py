@@ -71,7 +71,6 @@ class Situation:
     seen: Mapping[str, Flags] = field(default_factory=dict)
     may_fire: bool = True
     lead_s: float = 0.0
-    arrival_s: float = math.inf
     later_times_s: Floats | None = None
     pending: tuple[tuple[float, Floats], ...] = ()
 

@@ -318,7 +318,6 @@ class Engagements:
             sensors=self._sensors,
             may_fire=may_fire,
             lead_s=lead_s,
-            arrival_s=self.scenario.nominal_arrival_s - time_s,
             later_times_s=later_times_s,
             pending=pending,
             seen={name: seen for name, seen in self._seen.items() if name in measured},

@@ -81,13 +81,11 @@ def fly(
     observation: Observation | None = None,
     seed: int | np.random.SeedSequence = 0,
     solution: Solution | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> Flight:
     """Simulate a pursuer that computes a new plan at regular times, `replan_s` apart, and follows each until the next.
 
     `steering` is that of the evader; None is optimal against the true state of the pursuer. No `observation` observes
     the evader exactly; otherwise `seed` is that of its errors. `solution` is that of the game, if it is known.
-    `progress` is called with the fraction of the predicted time that has passed.
 
     Raises
     ------
@@ -111,7 +109,7 @@ def fly(
     seen = observation or Observation()
     random = np.random.default_rng(seed)
     flight = _Pursuit(game, units, steering, seen, random)
-    return flight.run(solution.capture.extremal, replan_s / units.time_s, progress)
+    return flight.run(solution.capture.extremal, replan_s / units.time_s)
 
 
 def fly_many(
@@ -155,15 +153,13 @@ class _Pursuit:
         self._dry = game.pursuer.dry_mass_kg / units.mass_kg, game.evader.dry_mass_kg / units.mass_kg
         self._time, self._work = 0.0, MAX_WORK
         self._past: list[tuple[float, PathNow]] = []
-        self._log: list[tuple[float, float, float]] = []
+        self._log: list[tuple[float, float, Floats]] = []
 
-    def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
+    def run(self, plan: Node, leg: float) -> Flight:
         own = plan
         while len(self._log) < _MAX_PLANS:
-            apart = float(np.linalg.norm(self._evader.start[:3] - self._pursuer.start[:3]))
+            apart = self._evader.start[:3] - self._pursuer.start[:3]
             self._log.append((self._time, self._time + plan.duration, apart))
-            if progress is not None:
-                progress(min(1.0, self._time / (self._time + plan.duration)))
             last = plan.duration <= leg
             spell = min(leg, plan.duration * _PAST) if last else leg
             if spell > _lasts(self._pursuer, self._dry[0]):
@@ -281,14 +277,14 @@ class _Pursuit:
 
     def _flight(self, ended: Ended, time: float, distance: float) -> Flight:
         units = self._units
-        planned, predicted, distances = (np.array(column) for column in zip(*self._log, strict=True))
+        planned, predicted, apart = (np.array(column) for column in zip(*self._log, strict=True))
         return Flight(
             ended=ended,
             time_s=time * units.time_s,
             distance_m=distance * units.length_m,
             planned_s=planned * units.time_s,
             predicted_s=predicted * units.time_s,
-            distances_m=distances * units.length_m,
+            distances_m=np.linalg.norm(apart, axis=1) * units.length_m,
         )
 
 
