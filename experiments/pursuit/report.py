@@ -30,7 +30,7 @@ INERTIAL_AXES = "inertial, z along the planet's axis"
 
 @dataclass(frozen=True)
 class Feedback:
-    """Simulations with feedback, and their settings; `policy` is that of the evader, or the file of its script."""
+    """Simulations with feedback, and their settings; `policy` is that of the evader."""
 
     policy: str
     replan_s: float

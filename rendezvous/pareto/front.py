@@ -16,11 +16,9 @@ from rendezvous.pareto.solution import EncounterSolution
 class ParetoSet:
     """Pareto-optimal meetings.
 
-    Each meeting minimises the weighted sum of excesses with its row of `weights`, shape (k, n), of sum one. `points`,
-    shape (k, f), are free terminal values, and `excess`, shape (k, n), is J_i^2 - J_i*^2, m^2/s^3.
+    `points`, shape (k, f), are free terminal values, and `excess`, shape (k, n), is J_i^2 - J_i*^2, m^2/s^3.
     """
 
-    weights: Floats
     points: Floats
     excess: Floats
 
@@ -42,7 +40,7 @@ def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:
     left = np.einsum("kn,nab->kab", shares, matrices)
     right = np.einsum("kn,nab,nb->ka", shares, matrices, scaled)
     points = middle + np.linalg.solve(left, right[..., None])[..., 0] @ back.T
-    return ParetoSet(shares, points, solution.excess(points))
+    return ParetoSet(points, solution.excess(points))
 
 
 def simplex_weights(craft: int, count: int) -> Floats:

@@ -124,14 +124,9 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
 
     Raises
     ------
-    ValueError
-        If the preferred values are not f finite numbers.
     NotOptimalError
         If the computed point does not satisfy the conditions of the nearest one.
     """
-    preferred = np.asarray(preferred, dtype=np.float64)
-    if preferred.shape != solution.point.shape or not np.isfinite(preferred).all():
-        raise ValueError(f"a preferred meeting must be {solution.point.size} finite numbers, found {preferred}")
     roots, ideals, _, weights = _parts(solution)
     matrices = np.einsum("nca,ncb->nab", roots, roots)
     sizes = np.trace(matrices, axis1=1, axis2=2)

@@ -23,9 +23,7 @@ class PlanSamples:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The minimum-energy flight of one craft from its start to the meeting; `costate`, shape (6,), is at the
-    meeting.
-    """
+    """The minimum-energy flight of one craft from its start to the meeting, where its `costate`, shape (6,), is."""
 
     craft: Craft
     meeting_s: float
@@ -221,12 +219,11 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
 class DurationSweep:
     """An encounter at k meeting times.
 
-    `points`, shape (k, f), are the free values that minimise the `group_loss`, shape (k,); `cost_squared` and
-    `ideal_cost_squared`, shape (k, n), are J_i^2 and J_i*^2. Costs are in m^2/s^3.
+    `group_loss`, shape (k,), is the minimum one; `cost_squared` and `ideal_cost_squared`, shape (k, n), are J_i^2 and
+    J_i*^2 there. Costs are in m^2/s^3.
     """
 
     meeting_s: Floats
-    points: Floats
     cost_squared: Floats
     ideal_cost_squared: Floats
     group_loss: Floats
@@ -238,7 +235,6 @@ def sweep_meeting_time(encounter: Encounter, meeting_s: ArrayLike) -> DurationSw
     solutions = [solve_encounter(replace(encounter, meeting_s=float(time))) for time in times]
     return DurationSweep(
         times,
-        np.array([solution.point for solution in solutions]),
         np.array([solution.cost_squared() for solution in solutions]),
         np.array([[cost.ideal_cost_squared for cost in solution.costs] for solution in solutions]),
         np.array([float(solution.group_loss()) for solution in solutions]),

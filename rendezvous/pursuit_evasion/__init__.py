@@ -12,7 +12,7 @@ from rendezvous.pursuit_evasion.maps import STATUSES, CaptureMap, PointStatus, c
 from rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.solver import solve
-from rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Script, Steering
+from rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Steering
 
 __all__ = [
     "STATUSES",
@@ -35,7 +35,6 @@ __all__ = [
     "Policy",
     "RandomSteering",
     "Route",
-    "Script",
     "Solution",
     "Steering",
     "Units",

@@ -26,6 +26,7 @@ MAX_INTEGRATOR_GAP = 1e-7
 """In units of length: metres of a geostationary orbit."""
 MAX_GAIN_S = 1e-2
 MAX_EXCESS = 1e-6
+"""In units of length: the scan is less accurate than the solution of the game."""
 
 _PANELS, _POINTS, _MAX_CHANGES = 32, 8, 3
 _BEYOND = 1.0 + 1e-6
@@ -122,7 +123,7 @@ class Certificate:
                 failures.append(f"the answer to {deviation.name} could not be followed")
             elif deviation.capture_s is None or deviation.capture_s > self.capture_s + MAX_GAIN_S:
                 failures.append(f"the evader gains by {deviation.name}")
-        if self.max_excess_m is not None and self.max_excess_m > self.excess_tolerance_m:
+        if self.max_excess_m is not None and self.max_excess_m > MAX_EXCESS * self.unit_length_m:
             failures.append(f"another direction keeps the evader {self.max_excess_m:.3g} m away")
         return tuple(failures)
 
@@ -133,11 +134,6 @@ class Certificate:
             return ("the other directions at the capture were not compared",)
         undecided = self.directions_tried - self.directions_found
         return (f"{undecided} of {self.directions_tried} directions were not decided",) if undecided else ()
-
-    @property
-    def excess_tolerance_m(self) -> float:
-        """Return the tolerance of `max_excess_m`: the scan is less accurate than the solution of the game."""
-        return MAX_EXCESS * self.unit_length_m
 
     @property
     def claims_saddle_point(self) -> bool:

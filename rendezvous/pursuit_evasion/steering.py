@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
@@ -38,31 +36,6 @@ class Policy(Enum):
         if self in (Policy.NORMAL, Policy.ANTINORMAL):
             return sign * np.cross(state[:3], state[3:])
         return sign * state[:3]
-
-
-@dataclass(frozen=True)
-class Script:
-    """A sequence of policies, one for each of the starting times `begin_s`, which increase from 0.
-
-    Raises
-    ------
-    ValueError
-        If there is no policy, their number is not that of the times, or the times do not increase from 0.
-    """
-
-    begin_s: tuple[float, ...]
-    policies: tuple[Policy, ...]
-
-    def __post_init__(self) -> None:
-        if not self.begin_s or len(self.begin_s) != len(self.policies):
-            raise ValueError("a script must have one time for each policy, and at least one policy")
-        if self.begin_s[0] != 0.0 or not all(a < b for a, b in pairwise(self.begin_s)):
-            raise ValueError("the times of a script must increase from 0")
-
-    def __call__(self, time_s: float, state: Floats) -> Floats:
-        """Return the direction of the policy of that time."""
-        index = max(0, bisect_right(self.begin_s, time_s) - 1)
-        return self.policies[index].direction(time_s, state)
 
 
 @dataclass(frozen=True)

@@ -40,14 +40,7 @@ def discretised(
     for a unit control, of acceleration `acceleration_m_s2`.
 
     Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
-
-    Raises
-    ------
-    ValueError
-        If `periods` is less than 1.
     """
-    if periods < 1:
-        raise ValueError("there must be at least one period")
     starts = period_s * np.arange(periods if isinstance(motion, TschaunerHempel) else 1)
     transition = motion.transition(starts, starts + period_s)
     control = acceleration_m_s2 * motion.held_input(starts, starts + period_s)

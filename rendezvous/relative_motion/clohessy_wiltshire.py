@@ -54,13 +54,6 @@ class ClohessyWiltshire(LinearMotion):
         fill_gramians(self.rate_rad_s, durations.ravel(), NODES, WEIGHTS, matrices)
         return matrices.reshape(*durations.shape, 6, 6)
 
-    def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
-        durations = checked_durations(start_s, end_s)
-        matrices = np.zeros((durations.size, 6, 3))
-        fill_held_inputs(self.rate_rad_s, durations.ravel(), matrices)
-        return matrices.reshape(*durations.shape, 6, 3)
-
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian apart at most."""
         return even_breaks(start_s, end_s, self.rate_rad_s * (end_s - start_s))
@@ -110,24 +103,6 @@ def fill_transitions(rate: float, durations: Floats, matrices: Floats) -> None:
         matrix[3, 0] = 3.0 * rate * sine
         matrix[4, 0] = -6.0 * rate * versine
         matrix[5, 2] = -rate * sine
-
-
-@compiled
-def fill_held_inputs(rate: float, durations: Floats, matrices: Floats) -> None:
-    """Fill int Phi B dt of durations, shape (k, 6, 3), whose other entries are zero."""
-    for row in range(len(durations)):
-        theta, matrix = rate * durations[row], matrices[row]
-        fill_effect(theta, matrix)
-        for axis in range(3):
-            # The integral of Phi_vv is Phi_rv.
-            for column in range(3):
-                matrix[3 + axis, column] = matrix[axis, column] / rate
-        half, lag = math.sin(0.5 * theta), angle_less_sine(theta)
-        versine = 2.0 * half * half
-        matrix[0, 0] = matrix[2, 2] = versine / rate**2
-        matrix[0, 1] = 2.0 * lag / rate**2
-        matrix[1, 0] = -2.0 * lag / rate**2
-        matrix[1, 1] = (4.0 * versine - 1.5 * theta * theta) / rate**2
 
 
 @compiled

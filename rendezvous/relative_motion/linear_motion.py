@@ -1,4 +1,4 @@
-"""The base of linear relative motions: A(t), transition matrix, Gramian, effect of a held control."""
+"""The base of linear relative motions: A(t), transition matrix, Gramian."""
 
 from __future__ import annotations
 
@@ -42,10 +42,6 @@ class LinearMotion(ABC):
     @abstractmethod
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
-
-    @abstractmethod
-    def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
 
     @abstractmethod
     def breaks(self, start_s: float, end_s: float) -> Floats:

@@ -38,7 +38,7 @@ from rendezvous.pareto import (
     total_impulse,
 )
 from rendezvous.pareto.selections import nearest_in_hull
-from rendezvous.relative_motion import ClohessyWiltshire
+from rendezvous.relative_motion import ClohessyWiltshire, ConstantMotion
 
 Floats = NDArray[np.float64]
 
@@ -230,7 +230,8 @@ def test_the_min_peak_of_a_hundred_and_forty_revolutions() -> None:
     count = 5000
     grid = np.linspace(0.0, 818181.8, count + 1)
     scale = np.array([818181.8] * 3 + [1.0] * 3)
-    held = motion.transition(grid[1:], np.full(count, grid[-1])) @ motion.held_input(grid[:-1], grid[1:])
+    held_input = ConstantMotion(motion.dynamics(0.0)).held_input(grid[:-1], grid[1:])
+    held = motion.transition(grid[1:], np.full(count, grid[-1])) @ held_input
     rows = (held / scale[:, None]).transpose(1, 0, 2).reshape(6, -1)
     wanted = motion.gramian(0.0, grid[-1]) @ plan.costate / scale
     white = np.linalg.svd(rows, full_matrices=False)
@@ -273,8 +274,6 @@ def test_bounds_are_met_or_not() -> None:
     check = check_bound(plan, 0.99 * minimum)
     assert check.feasibility is Feasibility.IMPOSSIBLE
     assert check.min_peak_m_s2 == pytest.approx(minimum)
-    with pytest.raises(ValueError, match="bound on the control"):
-        check_bound(plan, 0.0)
 
 
 def test_a_min_peak_that_is_not_certified_is_no_number(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,6 @@ from rendezvous.pursuit_evasion import (
     Ended,
     Observation,
     Policy,
-    Script,
     Solution,
     Steering,
     fly,
@@ -80,10 +79,3 @@ def test_a_batch_draws_each_flight_from_its_own_stream(slides: MakeGame) -> None
     assert len({each.time_s for each in three}) == 3
     assert all(each.ended is Ended.CAPTURED for each in three)
     assert told == pytest.approx([1.0 / 3.0, 2.0 / 3.0, 1.0])
-
-
-def test_a_script_changes_its_policy_at_its_times() -> None:
-    script = Script((0.0, 100.0), (Policy.COAST, Policy.PROGRADE))
-    state = np.array([7e6, 0.0, 0.0, 0.0, 7e3, 0.0])
-    np.testing.assert_array_equal(script(99.0, state), np.zeros(3))
-    np.testing.assert_array_equal(script(100.0, state), state[3:])
