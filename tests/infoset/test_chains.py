@@ -29,7 +29,7 @@ from infoset import chain_storage, chains
 from infoset.arrays import Floats
 from infoset.chain_storage import FIRST_RING, TAKEN
 from infoset.chains import CAPACITY
-from tests.infoset.test_polygon_oracle import AXES, Exact, dot, hull
+from tests.infoset.test_polygon_oracle import AXES, Exact, dot, exact_clip, hull, outside_by
 from tests.rationals import Fraction
 
 Level = tuple[float, float, float]
@@ -75,46 +75,12 @@ def reaches(polygon: Sequence[Exact], normal: Exact) -> tuple[Fraction, Fraction
     return -highest(polygon, about, (-normal[0], -normal[1])), highest(polygon, about, normal)
 
 
-def clip(polygon: Sequence[Exact], normal: Exact, lower: Fraction, upper: Fraction) -> list[Exact]:
-    kept = list(polygon)
-    for sign, bound in ((1, lower), (-1, upper)):
-        heights = [sign * (dot(normal, point) - bound) for point in kept]
-        new: list[Exact] = []
-        for i, here in enumerate(kept):
-            before = kept[i - 1]
-            if heights[i - 1] * heights[i] < 0:
-                part = heights[i - 1] / (heights[i - 1] - heights[i])
-                new.append((before[0] + part * (here[0] - before[0]), before[1] + part * (here[1] - before[1])))
-            if heights[i] >= 0:
-                new.append(here)
-        kept = hull(new)
-    return kept
-
-
 def moved(polygon: Sequence[Exact], by: Exact) -> list[Exact]:
     return [(point[0] + by[0], point[1] + by[1]) for point in polygon]
 
 
 def with_segment(polygon: Sequence[Exact], half: Exact) -> list[Exact]:
     return hull(moved(polygon, half) + moved(polygon, (-half[0], -half[1])))
-
-
-def outside_by(points: Sequence[Exact], polygon: Sequence[Exact], box: Exact) -> Exact | None:
-    """Return a point that is not in the polygon enlarged by [-box, box], if there is one.
-
-    The normals of that sum are those of the polygon and the axes: to test these is to test containment.
-    """
-    if not polygon:
-        return points[0] if points else None
-    sides = [(b[1] - a[1], a[0] - b[0]) for a, b in zip(polygon, [*polygon[1:], polygon[0]], strict=True) if a != b]
-    about, about_points = rounded(polygon), rounded(points)
-    for normal in sides + AXES:
-        reach = highest(polygon, about, normal)
-        reach += abs(normal[0]) * box[0] + abs(normal[1]) * box[1]
-        for i in may_reach(about_points, normal, reach):
-            if dot(normal, points[i]) > reach:
-                return points[i]
-    return None
 
 
 def assert_contains(polygon: Sequence[Exact], points: Sequence[Exact], box: Exact) -> None:
@@ -281,8 +247,8 @@ class Life:
                 assert sign * (Fraction(overlap) - exact) <= doubt
                 assert alive or sign > 0 or exact <= doubt
                 assert not alive or sign < 0 or exact >= -doubt
-        self.narrow = clip(self.narrow, normal, Fraction(lower) + rounding, Fraction(upper) - rounding)
-        self.wide = clip(self.wide, normal, Fraction(lower) - rounding, Fraction(upper) + rounding)
+        self.narrow = exact_clip(self.narrow, normal, Fraction(lower) + rounding, Fraction(upper) - rounding)
+        self.wide = exact_clip(self.wide, normal, Fraction(lower) - rounding, Fraction(upper) + rounding)
         self.operations += 1
         if alive:
             assert self.wide
@@ -453,17 +419,6 @@ def test_a_life_is_the_exact_one_up_to_rounding(start: Start, story: list[Step])
         life.check_outline()
 
 
-@briefly
-@given(starts(), st.lists(steps(st.none()), min_size=1, max_size=8))
-def test_without_cuts_the_outline_is_the_exact_polygon(start: Start, story: list[Step]) -> None:
-    """Degenerate ones too: a point becomes a segment, a segment a parallelogram."""
-    life = Life(*start)
-    for step in story:
-        tell(life, step)
-    assert life.narrow == life.wide
-    life.check_outline()
-
-
 @pytest.mark.parametrize("start", [(3.0, 3.0, -50.4220476397299), (2.0, 5.0, 7.1)])
 @pytest.mark.parametrize("tau", [0.44999999999955004, 1.0, 7.3, 1e4])
 def test_a_level_segment_keeps_its_ends_where_the_level_does_not_turn(start: Level, tau: float) -> None:
@@ -562,24 +517,6 @@ def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: flo
         level = misses[peak - first] - tolerance
         assert all(miss >= level for miss in misses[near - first : peak - first + 1])
         assert near == first or misses[near - first - 1] < level
-
-
-def test_a_stale_peak_is_found_again() -> None:
-    """Asked for after every step or only at last, it is the same vertex."""
-    for band in ((-3.0, 3.0), (-3.0, 0.5), (0.5, 3.0)):
-        for ask in (True, False):
-            life = Life(4.0, (-1.0, 1.0, -1.0), (-1.0, 1.0, 1.0))
-            for k in range(12):
-                life.section.turn(life.section.tau * 0.9)
-                life.section.spread(0.1)
-                life.section.turn(life.section.tau * 0.9)
-                life.section.cut(*band) if k % 3 == 2 else None
-                if ask:
-                    life.section.peak(RIGHT)
-            for side, pick in ((RIGHT, max), (LEFT, min)):
-                number = life.section.peak(side)
-                misses = [m for _, m in life.section.chain(side)]
-                assert misses[number - life.section.numbers(side)[0]] == pick(misses)
 
 
 @pytest.mark.parametrize("part", [0.25, 0.5, 0.9])

@@ -12,8 +12,6 @@ import shapely
 
 from infoset import ConvexPolygons
 
-SHAPES = [(), (3,), (2, 3), (0,)]
-
 
 def boxes(shape: tuple[int, ...]) -> ConvexPolygons:
     """A batch of boxes [0, k + 1] x [0, 1], k counting the batch."""
@@ -32,31 +30,6 @@ SEGMENT = ConvexPolygons([(0.0, 0.0), (3.0, 4.0)], 2)
 
 
 # Batches --------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_every_operation_keeps_the_shape_of_the_batch(shape: tuple[int, ...]) -> None:
-    batch = boxes(shape)
-    sets = [
-        batch.cut((1.0, 0.0), 0.25, 0.75),
-        batch.linear_map([[0.0, 1.0], [1.0, 0.0]]),
-        batch.translate((1.0, 2.0)),
-        batch.add_segment((1.0, 1.0)),
-        batch.minkowski_sum(square()),
-        batch.minkowski_sum(batch),
-        batch.reduce_outward(4),
-    ]
-    assert [s.shape for s in sets] == [shape] * len(sets)
-    values = [
-        batch.support_function((1.0, 0.0)),
-        batch.margin((0.5, 0.5)),
-        batch.area(),
-        batch.contains((0.5, 0.5)),
-        batch.is_empty,
-    ]
-    assert [v.shape for v in values] == [shape] * len(values)
-    vectors = [batch.support_vector((1.0, 0.0)), batch.centroid(), *batch.bounding_box()]
-    assert [v.shape for v in vectors] == [(*shape, 2)] * len(vectors)
 
 
 @pytest.mark.parametrize("shape", [(3,), (2, 3)])
@@ -159,9 +132,6 @@ def test_the_empty_set_has_no_points_to_give(measure: Callable[[ConvexPolygons],
     assert np.ma.getmaskarray(values)[..., 0, 0].all()
     assert not np.ma.getmaskarray(values)[..., 1:, :].any()
     np.testing.assert_array_equal(values[..., 2, :], of_last)
-
-
-# Errors ---------------------------------------------------------------------------------------------------------
 
 
 # From points, to shapely and back ---------------------------------------------------------------------------------

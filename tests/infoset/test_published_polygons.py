@@ -30,11 +30,6 @@ def cases(pair: dict[str, Any]) -> tuple[Case, Case]:
     return one, other
 
 
-def test_there_are_many() -> None:
-    assert len(PAIRS) >= 100
-    assert {name.split(",")[0] for name in NAMES} == {"JTS", "boost geometry", "Clipper2"}
-
-
 @pytest.mark.parametrize("pair", PAIRS, ids=NAMES)
 def test_sets_of_a_pair(pair: dict[str, Any]) -> None:
     one, other = cases(pair)

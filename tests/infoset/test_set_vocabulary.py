@@ -89,6 +89,3 @@ def test_a_single_polygon_takes_many_points_and_directions() -> None:
     assert square.contains(np.zeros((0, 2))).shape == (0,)
     with pytest.raises(ValueError, match="normal must have the shape"):
         square.cut([[1, 0], [0, 1]], 0.0, 1.0)  # for a Polytope this is one intersection
-
-
-BAD_NUMBERS: list[Any] = [np.nan, np.inf, "1", None, 1e70, 1j, np.ma.masked_array([1.0], [True])]

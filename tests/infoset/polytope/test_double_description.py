@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -12,6 +10,7 @@ from hypothesis import strategies as st
 from infoset.arrays import Floats
 from infoset.polytope import Polytope
 from infoset.polytope.double_description import FacetsAndVertices
+from tests.infoset.polytope.test_published_polytopes import exact_vertices
 from tests.rationals import Fraction
 
 small = st.integers(-3, 3).map(float)
@@ -64,40 +63,11 @@ def test_cuts_have_the_vertices_of_exact_rational_arithmetic(data: st.DataObject
         limits.append(level)
     assert shape is not None
     assert is_consistent(shape)
-    exact = sorted(exact_vertices(rows, limits))
+    sides = [tuple(map(Fraction, (limit, *(-x for x in row)))) for row, limit in zip(rows, limits, strict=True)]
+    exact = sorted(tuple(round(float(x), 9) + 0.0 for x in vertex) for vertex in exact_vertices(sides, []))
     ours = sorted({tuple(round(value, 9) + 0.0 for value in vertex) for vertex in shape.vertices.tolist()})
     np.testing.assert_allclose(ours, exact, rtol=0.0, atol=2e-9)
     assert len(ours) == len(exact)
-
-
-def exact_vertices(rows: list[list[float]], limits: list[float]) -> set[tuple[float, ...]]:
-    """Vertices of {x: rows x <= limits}: solutions of n of the equations that satisfy all rows."""
-    size, vertices = len(rows[0]), set()
-    exact = [[Fraction(value) for value in (*row, limit)] for row, limit in zip(rows, limits, strict=True)]
-    for chosen in combinations(exact, size):
-        point = solution([row[:] for row in chosen])
-        if point is not None and all(
-            sum(a * x for a, x in zip(row[:-1], point, strict=True)) <= row[-1] for row in exact
-        ):
-            vertices.add(tuple(round(float(value), 9) + 0.0 for value in point))
-    return vertices
-
-
-def solution(system: list[list[Fraction]]) -> list[Fraction] | None:
-    """Solution of equations in rationals, by elimination; None if they are dependent."""
-    size = len(system)
-    for column in range(size):
-        pivot = next((row for row in range(column, size) if system[row][column]), None)
-        if pivot is None:
-            return None
-        system[column], system[pivot] = system[pivot], system[column]
-        lead = system[column][column]
-        system[column] = [value / lead for value in system[column]]
-        for row in range(size):
-            factor = system[row][column]
-            if row != column and factor:
-                system[row] = [a - factor * b for a, b in zip(system[row], system[column], strict=True)]
-    return [row[-1] for row in system]
 
 
 def test_an_empty_cut_tells_its_excess() -> None:

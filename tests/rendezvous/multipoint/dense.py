@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,33 +11,10 @@ from rendezvous.relative_motion import LinearMotion
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class DenseSolution:
-    """Solution of the dense system.
-
-    Parameters
-    ----------
-    costate_start : ndarray, shape (6,)
-        (lambda_r, lambda_V) at the start.
-    jumps : ndarray, shape (N, 3)
-        D_i = lambda_r before minus after node i; after the last it is zero.
-    velocities : ndarray, shape (N, 3)
-        The chaser's at the nodes, m/s.
-    cost : float
-        I, m^2/s^3.
-    matrix : ndarray, shape (3 N + 3, 3 N + 3)
-        Q with its rows and columns scaled to a maximum entry of one.
-    """
-
-    costate_start: Floats
-    jumps: Floats
-    velocities: Floats
-    cost: float
-    matrix: Floats
-
-
-def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> DenseSolution:
+def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> tuple[float, Floats]:
     """Solve Q P = Delta, (14) of Mironov and Mironov (2007), from the `start_state`, for `nodes` without a rendezvous.
+
+    Returns the cost, m^2/s^3, and the velocities of the chaser at the nodes, m/s, shape (N, 3).
 
     Raises
     ------
@@ -77,13 +52,11 @@ def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes
     rows, columns = np.abs(matrix).max(axis=1), np.abs(matrix).max(axis=0)
     rows = np.where(rows > 0.0, rows, 1.0)
     columns = np.abs(matrix / rows[:, None]).max(axis=0)
-    scaled = matrix / rows[:, None] / columns
-    solved = np.linalg.solve(scaled, right / rows) / columns
+    solved = np.linalg.solve(matrix / rows[:, None] / columns, right / rows) / columns
     # The paper's unknowns are lambda+ minus lambda-.
     jumps = np.empty((count, 3))
     jumps[:-1] = -solved[6:].reshape(-1, 3)
     adjoint = np.swapaxes(motion.transition(np.full(count, times[-1]), sources), 1, 2)[:, :3]
     jumps[-1] = adjoint[0] @ solved[:6] + np.einsum("kab,kb->a", adjoint[1:, :, :3], solved[6:].reshape(-1, 3))
     velocities = coast[:, 3:] + (by_velocity @ solved).reshape(count, 3)
-    cost = 0.5 * float(jumps.ravel() @ right[:-3])
-    return DenseSolution(solved[:6], jumps, velocities, cost, scaled)
+    return 0.5 * float(jumps.ravel() @ right[:-3]), velocities

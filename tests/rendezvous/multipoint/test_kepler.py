@@ -15,13 +15,10 @@ from rendezvous.multipoint import (
     KeplerTargets,
     KeplerTour,
     Meet,
-    Nodes,
     NotSettledError,
     Path,
     Target,
-    solve_segments,
 )
-from rendezvous.relative_motion import LinearMotion
 from rendezvous.two_body import coast, coasting_rates, gravity_gradient
 
 Floats = NDArray[np.float64]
@@ -71,21 +68,6 @@ def test_the_theorys_case() -> None:
     path = tour().fly((0, 1), [2.0, 4.0])
     assert path.cost == pytest.approx(4.267529653e-5, rel=1e-9)
     assert missed(path) < 1e-9
-
-
-def test_the_combined_method_settles_in_three_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    costs: list[float] = []
-
-    def noted(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> Path:
-        path = solve_segments(motion, start_s, start_state, nodes)
-        costs.append(path.cost)
-        return path
-
-    monkeypatch.setattr("rendezvous.multipoint.kepler.solve_segments", noted)
-    tour().fly((0, 1), [2.0, 4.0])
-    # The first is about the coasting orbit; from the third on nine digits stand.
-    assert costs[2] == pytest.approx(4.267529653e-5, rel=1e-9)
-    assert costs[0] != pytest.approx(4.267529653e-5, rel=1e-2)
 
 
 @pytest.mark.parametrize("meets", [(Meet.FLYBY, Meet.RENDEZVOUS), (Meet.RENDEZVOUS, Meet.FLYBY)])

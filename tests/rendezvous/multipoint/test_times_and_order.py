@@ -55,7 +55,7 @@ def test_branch_and_bound_finds_what_brute_force_finds_of_more(seed: int, count:
     assert found.objective <= by_brute_force(tour, limits) * (1.0 + 1e-7)
 
 
-@pytest.mark.parametrize("count", [2, 4, 5, 6])
+@pytest.mark.parametrize("count", [2, 5])
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 def test_orders_of_slots_against_brute_force(count: int, share: float) -> None:
     tour, slots = random_tour(10 + count, count, share), 1200.0 * np.arange(1.0, count + 1.0)
@@ -119,7 +119,7 @@ def test_a_long_stay_fits_where_it_is_last() -> None:
         best_order(tour, TimeLimits(100.0))
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_visits_that_just_fit_are_not_refused_for_rounding(seed: int) -> None:
     random, motion = np.random.default_rng(seed), ClohessyWiltshire(1.1e-3)
     stays, gap = random.uniform(10.0, 900.0, size=3), float(random.uniform(10.0, 900.0))
@@ -189,18 +189,3 @@ def test_gaps_and_stays_are_kept(tours: Make) -> None:
     assert leave[1] == pytest.approx(times[1] + 500.0)
     free = best_times(tour, (0, 1, 2), TimeLimits(latest_s=4500.0)).objective
     assert found.objective >= free * (1.0 - 1e-9)
-
-
-def test_at_best_times_every_slope_that_may_vanish_does(tours: Make) -> None:
-    path = best_times(tours(4), (3, 0, 2, 1), TimeLimits(latest_s=6000.0)).path
-    scale = path.cost / 6000.0
-    assert np.abs(path.time_gradient[:-1]).max() < 1e-8 * scale
-    assert path.time_gradient[-1] < 0.0
-    assert path.nodes.arrive_s[-1] == pytest.approx(6000.0, rel=1e-12)
-
-
-def test_visits_that_do_not_fit_are_refused(tours: Make) -> None:
-    with pytest.raises(ValueError, match="do not fit before the latest time, 1000 s"):
-        best_times(tours(3), (0, 1, 2), TimeLimits(latest_s=1000.0, min_gap_s=400.0))
-    with pytest.raises(ValueError, match="do not fit"):
-        best_order(tours(2), TimeLimits(latest_s=-5.0))

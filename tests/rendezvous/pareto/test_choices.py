@@ -29,7 +29,6 @@ from rendezvous.pareto import (
     front_of_two,
     min_peak,
     min_sum_of_costs,
-    minimax_excess,
     nearest_to,
     pareto_set,
     peak_control,
@@ -85,23 +84,6 @@ def test_the_front_of_two_in_closed_form() -> None:
     np.testing.assert_allclose(front_of_two(between, found.excess[:, 0]), found.excess[:, 1], atol=1e-12 * between**2)
 
 
-@given(SEEDS, st.integers(1, 5), st.booleans(), st.sampled_from(list(Meeting)))
-@settings(max_examples=30, deadline=None)
-def test_the_min_sum_of_costs_is_min(seed: int, count: int, own_starts: bool, meeting: Meeting) -> None:
-    solution = some(seed, count, own_starts=own_starts, meeting=meeting)
-
-    def value(point: Floats) -> float:
-        return float(solution.encounter.weights @ np.sqrt(solution.cost_squared(point)))
-
-    found = value(min_sum_of_costs(solution))
-    spread = float(np.ptp(solution.ideals, axis=0).max()) + 1.0
-    random = np.random.default_rng(seed)
-    for size in (1.0, 0.1, 1e-2, 1e-3):
-        near = min_sum_of_costs(solution) + size * spread * random.normal(size=(40, 3))
-        values = np.sqrt(solution.cost_squared(near)) @ solution.encounter.weights
-        assert values.min() >= found * (1.0 - 1e-10)
-
-
 def test_an_intercept_in_which_one_craft_outweighs_the_rest_is_where_that_one_coasts() -> None:
     solution = some(5, 3, meeting=Meeting.INTERCEPT)
     craft = tuple(
@@ -110,22 +92,6 @@ def test_an_intercept_in_which_one_craft_outweighs_the_rest_is_where_that_one_co
     heavy = solve_encounter(replace(solution.encounter, craft=craft))
     np.testing.assert_allclose(min_sum_of_costs(heavy), heavy.costs[0].ideal, rtol=1e-9)
     assert heavy.costs[0].ideal_cost_squared == 0.0
-
-
-@given(SEEDS, st.integers(2, 6), st.booleans())
-@settings(max_examples=30, deadline=None)
-def test_the_minimax_excess_is_min(seed: int, count: int, own_starts: bool) -> None:
-    solution = some(seed, count, own_starts=own_starts)
-    weights, point = solution.encounter.weights, minimax_excess(solution)
-    excess = weights * solution.excess(point)
-    top = float(excess.max())
-    # Optimal where a mix of the slopes of those that bind vanishes: then no direction lowers them all.
-    bound = np.flatnonzero(excess > top * (1.0 - 1e-7))
-    slopes = np.array(
-        [weights[each] * solution.costs[each].matrix @ (point - solution.costs[each].ideal) for each in bound]
-    )
-    mixed = nearest_in_hull(slopes, np.zeros(3)) @ slopes
-    assert np.linalg.norm(mixed) <= 1e-6 * np.linalg.norm(slopes, axis=1).max()
 
 
 @given(SEEDS, st.integers(2, 5))
@@ -147,19 +113,6 @@ def test_nearest_in_hulls_that_are_no_bodies() -> None:
     assert nearest_in_hull(same, np.ones(2)) @ same == pytest.approx([1.0, 1.0])
     line = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [0.5, 0.5]])
     assert nearest_in_hull(line, np.array([2.0, 0.0])) @ line == pytest.approx([1.0, 1.0])
-
-
-@pytest.mark.parametrize("own_starts", [False, True])
-def test_a_preferred_meeting_that_is_one_of_the_best_stays(own_starts: bool) -> None:
-    solution = some(11, 4, own_starts=own_starts)
-    spread = float(np.ptp(solution.ideals, axis=0).max())
-    np.testing.assert_allclose(nearest_to(solution, solution.point), solution.point, atol=1e-5 * spread)
-    far = solution.ideals[0] + 1e4 * (solution.ideals[0] - solution.point)
-    chosen = nearest_to(solution, far)
-    # It is one of the set: some weights make it best.
-    slopes = np.array([each.matrix @ (chosen - each.ideal) for each in solution.costs])
-    mixed = nearest_in_hull(slopes, np.zeros(3)) @ slopes
-    assert np.linalg.norm(mixed) <= 1e-6 * np.linalg.norm(slopes, axis=1).max()
 
 
 def one_line() -> EncounterSolution:

@@ -25,12 +25,10 @@ from rendezvous.pareto import (
 )
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
-pytestmark = pytest.mark.thorough
-
 Floats = NDArray[np.float64]
 Check = Callable[[int], None]
 
-MANY = range(1000, 3000)
+FEW, MANY = range(30), range(1000, 3000)
 
 
 def some_motion(random: np.random.Generator, rate: float, *, elliptic: float = 0.2) -> LinearMotion:
@@ -175,6 +173,12 @@ def test_craft_of_weight_zero_have_no_influence_on_the_minimax_excess() -> None:
     np.testing.assert_array_equal(minimax_excess(solution), solution.ideals[1])
 
 
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_random_encounters(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+    check_seeds(check, FEW)
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_many_random_encounters(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
     check_seeds(check, MANY)

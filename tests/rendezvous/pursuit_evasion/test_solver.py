@@ -232,22 +232,3 @@ def test_a_capture_that_misses_the_conditions_is_not_returned(
     solution = solve(game, change_branch=False)
     assert solution.verdict is Verdict.BRANCH_NOT_CERTIFIED
     assert solution.capture is None
-
-
-@pytest.mark.parametrize(
-    ("position", "velocity", "message"),
-    [
-        ((7e6, 0.0, 0.0), (0.0, 12e3, 0.0), "hyperbola"),
-        ((7e6, 0.0, 0.0), (100.0, 0.0, 0.0), "fall along a line"),
-        ((7e6, 0.0, 0.0), (0.0, 5e3, 0.0), "meets the planet"),
-        ((0.0, 0.0, 0.0), (0.0, 5e3, 0.0), "centre of the planet"),
-        ((8e6, 0.0, 0.0), (0.0, 7058.0, 0.0), "same position"),
-        ((8e6, 500.0, 0.0), (0.0, 7058.0, 0.0), "within the capture radius"),
-    ],
-)
-def test_what_is_no_game_is_refused(
-    position: tuple[float, float, float], velocity: tuple[float, float, float], message: str
-) -> None:
-    pursuer = Player((8e6, 0.0, 0.0), (0.0, 7058.0, 0.0), 100.0, 50.0, 1.0, 300.0)
-    with pytest.raises(ValueError, match=message):
-        Game(Gravity(MU_M3_S2, EARTH_M), pursuer, Player(position, velocity, 100.0, 50.0, 1.0, 300.0), 1e3)

@@ -7,7 +7,6 @@ import pytest
 from numpy.typing import NDArray
 
 from rendezvous.reachability import MotionModel, NonlinearMotion, ReachabilityProblem, replan
-from rendezvous.reachability.closed_loop import relaxed
 from rendezvous.relative_motion import EllipticOrbit
 
 Floats = NDArray[np.float64]
@@ -62,8 +61,3 @@ def test_noise_is_flown_through_with_bounds_relaxed_where_they_must_be(
     kicked = replan(problem, lambda t, state, _: state - (400.0 if t == 0 else 0.0) * np.eye(6)[1])
     assert kicked.relaxations[0] == 0.0
     assert kicked.relaxations[1] > 0.0
-
-
-def test_relaxed_bounds(paper: Paper) -> None:
-    wider = relaxed(paper(), 0.1)
-    np.testing.assert_allclose(wider.state_bounds, [3300.0] * 3 + [8.25] * 3)

@@ -98,7 +98,7 @@ def test_just_under_the_min_bound_that_reaches_zero(paper: Paper, thrust: Thrust
 
 
 @pytest.mark.parametrize("route", list(Route))
-@pytest.mark.parametrize("bound", [0.115, 0.12, 0.125, 0.14, 0.15, 0.16, 0.17, 0.172])
+@pytest.mark.parametrize("bound", [0.115, 0.14, 0.172])
 def test_flat_sets_of_optimal_controls(paper: Paper, bound: float, route: Route) -> None:
     problem = paper(bound=bound)
     optimal = solve(problem, route).optimal
@@ -149,7 +149,7 @@ def miss_in_metres(paper: Paper) -> float:
     return solve(paper(bound=0.1726)).optimal.miss
 
 
-@pytest.mark.parametrize("size", [1e-6, 1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_lengths_of_any_size(paper: Paper, miss_in_metres: float, size: float) -> None:
     problem = paper(bound=0.1726)
     other = replace(

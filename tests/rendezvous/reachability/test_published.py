@@ -20,7 +20,6 @@ from rendezvous.reachability import (
     SetCounts,
     SetKind,
     Solution,
-    ThrustShape,
     effort,
     min_periods,
     minimum_energy,
@@ -59,13 +58,10 @@ TUBE = {
 TABLE_1 = [
     [-0.1206, 0.0555, -0.2164], [-0.0337, 0.0042, -0.0883], [0.0358, -0.0690, 0.0414], [0.0821, -0.1623, 0.1703]
 ]  # fmt: skip
-TABLE_2 = [
-    [-0.1254, 0.0373, -0.2612], [-0.0034, 0.0021, -0.0012], [0.0055, -0.0019, 0.0001], [0.0893, -0.2055, 0.1685]
-]  # fmt: skip
 TABLE_3 = [
     [-0.0879, 0.0559, -0.1314], [-0.0899, 0.0115, -0.2357], [0.0519, -0.0732, 0.0846], [0.0895, -0.1655, 0.1913]
 ]  # fmt: skip
-"""u(0) y in tables 2 and 3 without the minus sign that is printed, which is a misprint."""
+"""u(0) y in table 3 without the minus sign that is printed, which is a misprint."""
 
 TABLE_1_LINEAR = [
     [1884.2, -2014.2, 2114.6, -5.42, 3.98, -3.06],
@@ -124,17 +120,6 @@ def test_counts(exact: Solution, lifted: Solution) -> None:
     assert lifted.sets.counts(SetKind.TUBE, 2) is None
 
 
-def test_route_is_told(paper: Paper) -> None:
-    chosen = solve(paper())
-    assert chosen.route is Route.EXACT
-    assert chosen.reason == "blocks of 4, 2 states"
-    assert solve(paper(thrust=ThrustShape.BALL)).reason == "for thrust in a ball the sets are not polytopes"
-    assert (
-        solve(paper(periods=32, period_s=22.5)).reason
-        == "rounding errors lose facets of hulls after more than 16 periods"
-    )
-
-
 def test_min_norms(paper: Paper, exact: Solution) -> None:
     problem = paper()
     assert exact.optimal.miss == 0.0
@@ -178,18 +163,6 @@ def test_table_3_is_optimal_to_its_rounding(exact: Solution) -> None:
     problem = exact.problem
     assert (np.abs(problem.run(from_paper(TABLE_3))[-1]) <= rounding_at_the_end(problem)).all()
     assert float(problem.excess(from_paper(TABLE_3))) <= 0.0
-
-
-def test_table_2_is_near_the_control_of_min_l1_and_contradicts_itself(exact: Solution) -> None:
-    problem, sparse = exact.problem, minimum_l1(exact.optimal)
-    printed = from_paper(TABLE_2)
-    np.testing.assert_allclose(sparse[[0, 3]], printed[[0, 3]], atol=1e-3)
-    assert np.abs(sparse - printed).max() < 6e-3
-    # Its controls lead tens of metres past zero, its states are those of the minimum L1.
-    ends = np.abs(problem.run(printed)[-1])
-    assert (ends[:2] > 4.0 * rounding_at_the_end(problem)[:2]).all()
-    states = problem.run(sparse)
-    assert np.abs(to_paper(states[1:3, :3]) - [[1868.5, -2057.1, 2005.9], [954.3, -1343.4, 1219.6]]).max() < 5.0
 
 
 @pytest.mark.parametrize(

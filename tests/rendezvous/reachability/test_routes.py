@@ -166,16 +166,6 @@ def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
     assert all(product(each.ravel()) < best for each in samples(optimal, 200, np.random.default_rng(0)))
 
 
-def test_a_unique_optimal_control(paper: Paper) -> None:
-    optimal = solve(paper().first(2)).optimal
-    assert optimal.dimension == 0
-    choices = [minimum_energy, minimum_l1, minimum_norms, minimum_peak, chebyshev_centre, analytic_centre]
-    for choice in choices:
-        np.testing.assert_allclose(choice(optimal), vertices(optimal)[0], atol=1e-12)
-    assert samples(optimal, 3, np.random.default_rng(0)).shape == (3, 2, 3)
-    np.testing.assert_allclose(optimal.ranges()[..., 0], optimal.ranges()[..., 1], atol=1e-12)
-
-
 def test_vertices_are_refused_where_they_cannot_be_listed(paper: Paper) -> None:
     with pytest.raises(TooManyVerticesError, match="span 28 dimensions"):
         vertices(solve(paper(periods=16, period_s=45.0), Route.LIFTED).optimal)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -84,25 +84,6 @@ def test_matrices_satisfy_their_differential_equations(name: str, duration: floa
         np.testing.assert_allclose(effect, wanted, rtol=0.0, atol=2e-10 * float(np.abs(wanted).max()))
 
 
-@pytest.mark.parametrize("name", MOTIONS)
-@given(st.floats(0.0, 5000.0), st.floats(1.0, 3000.0), st.floats(1.0, 3000.0))
-@settings(max_examples=8, deadline=None)
-def test_intervals_join(name: str, start: float, first: float, second: float) -> None:
-    motion = MOTIONS[name]()
-    one, other = motion.segment(start, start + first), motion.segment(start + first, start + first + second)
-    whole = motion.segment(start, start + first + second)
-    scale = np.array([first + second] * 3 + [1.0] * 3)
-    joined = other.transition @ one.transition
-    weight = scale[None, :] / scale[:, None]
-    size = np.abs(other.transition * weight).max() * np.abs(one.transition * weight).max()
-    np.testing.assert_allclose(joined * weight, whole.transition * weight, rtol=0.0, atol=1e-11 * size)
-    spread = other.transition @ one.gramian @ other.transition.T + other.gramian
-    by = np.sqrt(np.outer(np.diag(whole.gramian), np.diag(whole.gramian)))
-    np.testing.assert_allclose(spread / by, whole.gramian / by, rtol=0.0, atol=1e-10)
-    back = motion.transition(start + first, start)
-    np.testing.assert_allclose(back @ one.transition * weight, np.eye(6), rtol=0.0, atol=1e-9)
-
-
 def test_an_ellipse_without_eccentricity_is_a_circle() -> None:
     circle, ellipse = ClohessyWiltshire(RATE), TschaunerHempel(EllipticOrbit(RATE, 0.0, 2.0))
     for end in (30.0, 800.0, 9000.0):
@@ -131,19 +112,6 @@ def test_drift_of_a_general_motion() -> None:
     found = integrated(pushed, 0.0, end)[1]
     np.testing.assert_allclose(pushed.gramian(0.0, end), found, rtol=0.0, atol=1e-9 * found.max())
     assert pushed.forcing(3.0) == pytest.approx([0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-5])
-
-
-def test_times_may_be_arrays() -> None:
-    for name, make in MOTIONS.items():
-        motion = make()
-        ends = np.array([[100.0, 2000.0], [30.0, 900.0]])
-        found = motion.segment(10.0, ends)
-        assert found.transition.shape == (2, 2, 6, 6), name
-        assert found.gramian.shape == (2, 2, 6, 6)
-        assert found.drift.shape == (2, 2, 6)
-        if isinstance(motion, TschaunerHempel | TimeVaryingMotion):
-            assert motion.held_input(10.0, ends).shape == (2, 2, 6, 3)
-        np.testing.assert_allclose(found.gramian[1, 1], motion.gramian(10.0, 900.0), rtol=1e-9)
 
 
 def test_the_published_gramian() -> None:
