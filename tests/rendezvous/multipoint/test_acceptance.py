@@ -30,32 +30,6 @@ Make = Callable[..., Tour]
 NINE_DIGITS = 1e-9
 
 # fmt: off
-TWO = {
-    "ts": [1500.0, 3000.0],
-    "I": 0.007795510260921629,
-    "dIdt": [-6.24060550433381e-06, -5.373459637752182e-06],
-    "rho": [
-        [31.51847269310474, 1702.0818606885607, 11.368543273740888],
-        [167.15334997629645, 3774.791445440797, 66.66563434481041],
-    ],
-    "V": [
-        [0.2196204318954927, 0.4269567271323058, 0.03236416977047909],
-        [1.9769811412917153, 1.2715747540329572, 0.007513042806914164],
-    ],
-    "D": [
-        [1.3308553676728513e-05, 3.5002481504945973e-06, -7.98679653438238e-09],
-        [7.272570953753556e-07, 2.4075971985474965e-06, 6.294668438927745e-08],
-    ],
-    "lam_r0": [-4.075723170006945e-06, 5.907845349042094e-06, -6.002510891782189e-08],
-    "lam_V0": [-0.003825759371289969, 0.001787893059077129, -2.070918131693907e-05],
-    "t_opt": [1783.951356443025, 3000.0],
-    "I_opt": 0.006940766364176047,
-    "I_rdv_last": 0.014481329119272785,
-    "I_rdv_all": 0.017027253321755767,
-    "I_rdv_last_opt": 0.0143926742,
-}
-# fmt: on
-# fmt: off
 THREE = {
     "ts": [1200.0, 2600.0, 4000.0],
     "I": 0.021142280110555873,
@@ -84,16 +58,10 @@ THREE = {
     "I_rdv_last_opt": 0.02315574123,
 }
 # fmt: on
-CASES = pytest.mark.parametrize("case", [TWO, THREE], ids=["two", "three"])
 
 
-def at_times(case: dict[str, object]) -> Floats:
-    return np.array(case["ts"])
-
-
-@CASES
-def test_flybys_at_given_times(tours: Make, case: dict[str, object]) -> None:
-    times = at_times(case)
+def test_flybys_at_given_times(tours: Make) -> None:
+    times = np.array(THREE["ts"])
     path = tours(len(times)).fly(range(len(times)), times)
     for found, key in (
         (path.cost, "I"),
@@ -104,29 +72,27 @@ def test_flybys_at_given_times(tours: Make, case: dict[str, object]) -> None:
         (path.costate_start[:3], "lam_r0"),
         (path.costate_start[3:], "lam_V0"),
     ):
-        np.testing.assert_allclose(found, np.array(case[key]), rtol=NINE_DIGITS, err_msg=key)
+        np.testing.assert_allclose(found, np.array(THREE[key]), rtol=NINE_DIGITS, err_msg=key)
     assert np.abs(path.jumps[:, 3:]).max() < 1e-12 * np.abs(path.costate_before[:, 3:]).max()
 
 
-@CASES
-def test_rendezvous_at_given_times(tours: Make, case: dict[str, object]) -> None:
-    times, count = at_times(case), len(at_times(case))
+def test_rendezvous_at_given_times(tours: Make) -> None:
+    times, count = np.array(THREE["ts"]), 3
     last = tours(count, [Meet.FLYBY] * (count - 1) + [Meet.RENDEZVOUS]).fly(range(count), times)
-    assert last.cost == pytest.approx(case["I_rdv_last"], rel=NINE_DIGITS)
+    assert last.cost == pytest.approx(THREE["I_rdv_last"], rel=NINE_DIGITS)
     every = tours(count, [Meet.RENDEZVOUS] * count).fly(range(count), times)
-    assert every.cost == pytest.approx(case["I_rdv_all"], rel=NINE_DIGITS)
+    assert every.cost == pytest.approx(THREE["I_rdv_all"], rel=NINE_DIGITS)
 
 
-@CASES
-def test_best_times(tours: Make, case: dict[str, object]) -> None:
-    times, count = at_times(case), len(at_times(case))
+def test_best_times(tours: Make) -> None:
+    times, count = np.array(THREE["ts"]), 3
     limits = TimeLimits(latest_s=float(times[-1]))
     found = best_times(tours(count), range(count), limits, [times])
-    np.testing.assert_allclose(found.time_s, np.array(case["t_opt"]), rtol=NINE_DIGITS)
-    assert found.path.cost == pytest.approx(case["I_opt"], rel=NINE_DIGITS)
+    np.testing.assert_allclose(found.time_s, np.array(THREE["t_opt"]), rtol=NINE_DIGITS)
+    assert found.path.cost == pytest.approx(THREE["I_opt"], rel=NINE_DIGITS)
     last = tours(count, [Meet.FLYBY] * (count - 1) + [Meet.RENDEZVOUS])
     cost = best_times(last, range(count), limits, [times]).path.cost
-    assert cost == pytest.approx(case["I_rdv_last_opt"], rel=5e-9)  # the theory prints 9 or 10 digits
+    assert cost == pytest.approx(THREE["I_rdv_last_opt"], rel=5e-9)  # the theory prints 9 or 10 digits
 
 
 def test_a_priced_last_time(tours: Make) -> None:

@@ -94,7 +94,7 @@ def test_time_gradients_against_finite_differences() -> None:
         assert (4.0 * near - far) / 3.0 == pytest.approx(path.time_gradient[index], rel=1e-6, abs=1e-6 * size)
 
 
-@pytest.mark.parametrize("scale", [8.0, 20.0])
+@pytest.mark.parametrize("scale", [8.0, pytest.param(20.0, marks=pytest.mark.thorough)])
 def test_targets_far_from_the_coasting_orbit(scale: float) -> None:
     # Here re-linearising does not settle by itself: the trajectory is shot first.
     path = tour(scale=scale).fly((0, 1), [2.0, 5.0])

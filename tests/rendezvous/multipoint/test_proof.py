@@ -102,7 +102,7 @@ def test_flying_the_control_passes_the_nodes_at_the_cost(name: str, seed: int) -
 
 @pytest.mark.parametrize("name", MOTIONS)
 @given(SEEDS)
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=2, deadline=None)
 def test_time_gradients_against_finite_differences(name: str, seed: int) -> None:
     tour, times = some_tour(seed, MOTIONS[name](), dwell=True)
     order = range(len(times))

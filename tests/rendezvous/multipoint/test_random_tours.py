@@ -1,4 +1,4 @@
-"""Random tours and their edges against least squares over controls, grids of times and brute force over orders."""
+"""Random tours and their edges against sampled times and brute force over orders."""
 
 from __future__ import annotations
 

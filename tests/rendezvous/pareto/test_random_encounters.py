@@ -1,4 +1,4 @@
-"""Random encounters and their edges against dense least squares, cone programs and brute force."""
+"""Random encounters and their edges against cone programs and brute force."""
 
 from __future__ import annotations
 

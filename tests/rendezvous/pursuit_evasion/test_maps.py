@@ -41,6 +41,7 @@ def test_points_from_neighbours_are_those_solved_from_nothing(slides: MakeGame) 
     np.testing.assert_allclose(seeded.closing_speed_m_s, followed.closing_speed_m_s, rtol=1e-5)
 
 
+@pytest.mark.thorough
 def test_a_neighbours_answer_that_is_not_the_first_capture_is_replaced(slides: MakeGame) -> None:
     # Ahead of the pursuer an early extremal lives on where the evader has a better branch.
     columns = np.linspace(4.0, 24.0, 11)

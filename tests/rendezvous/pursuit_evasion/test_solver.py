@@ -76,11 +76,6 @@ def test_capture_radii(radius_m: float, capture_s: float, slides: MakeGame) -> N
     np.testing.assert_allclose(apart, radius_m * capture.direction, atol=1e-3)
 
 
-def test_a_greater_radius_is_reached_earlier_by_the_closing_speed(slides: MakeGame) -> None:
-    point, near = captured(solve(slides())), captured(solve(slides(capture_radius_m=10.0)))
-    assert (near.time_s - point.time_s) / 10.0 == pytest.approx(-1.0 / point.closing_speed_m_s, rel=1e-5)
-
-
 def test_a_capture_within_seconds_is_found(slides: MakeGame) -> None:
     game = slides()
     x, y, z = game.pursuer.position_m
@@ -198,9 +193,7 @@ def independent_capture(game: Game, capture: Capture) -> float:
     return float(found[12]) * units.time_s
 
 
-@pytest.mark.parametrize(
-    ("thrust_n", "anomaly_deg", "inclination_deg"), [(10.0, 312.0, 0.3), (10.0, 325.0, 2.0), (14.0, 305.0, 1.0)]
-)
+@pytest.mark.parametrize(("thrust_n", "anomaly_deg", "inclination_deg"), [(10.0, 312.0, 0.3), (10.0, 325.0, 2.0)])
 def test_other_geometries_agree_with_an_independent_solver(
     thrust_n: float, anomaly_deg: float, inclination_deg: float, slides: MakeGame
 ) -> None:

@@ -68,14 +68,20 @@ def vertices_of(polyhedron: ppl.C_Polyhedron) -> list[Rationals]:
 
 def rounded(polyhedron: ppl.C_Polyhedron) -> RationalSet:
     """Return a bounded polyhedron with its vertices rounded."""
-    return _rounded(polyhedron, polyhedron.space_dimension())
+    size = polyhedron.space_dimension()
+    if polyhedron.is_empty():
+        return RationalSet(np.zeros((0, size)), 0, -1, np.zeros((size, 2)))
+    facets = sum(1 for row in polyhedron.minimized_constraints() if row.is_inequality())
+    vertices = np.array([[float(value) for value in point] for point in vertices_of(polyhedron)])
+    bounds = np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=-1)
+    return RationalSet(vertices, facets, int(polyhedron.affine_dimension()), bounds)
 
 
 def rational_intersection(normals: Floats, offsets: Floats) -> RationalSet:
     """Return {x: normals x <= offsets}, exactly, for normals of shape (m, n)."""
     polyhedron = ppl.C_Polyhedron(normals.shape[1], "universe")
     _cut(polyhedron, normals, offsets, range(normals.shape[1]))
-    return _rounded(polyhedron, normals.shape[1])
+    return rounded(polyhedron)
 
 
 def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
@@ -110,9 +116,7 @@ def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
         both = ppl.C_Polyhedron(step)
         both.intersection_assign(forward[t])
         tube.append(both)
-    return [_rounded(polyhedron, size) for polyhedron in forward], [
-        _rounded(polyhedron, size) for polyhedron in reversed(tube)
-    ]
+    return [rounded(polyhedron) for polyhedron in forward], [rounded(polyhedron) for polyhedron in reversed(tube)]
 
 
 def _step(block: Block, period: int, before: int, after: int) -> ppl.C_Polyhedron:
@@ -149,19 +153,6 @@ def _fix(polyhedron: ppl.C_Polyhedron, state: Floats, axes: range) -> None:
     for value, axis in zip(state, axes, strict=True):
         exact = Fraction(float(value))
         polyhedron.add_constraint(exact.denominator * ppl.Variable(axis) == exact.numerator)
-
-
-def _rounded(polyhedron: ppl.C_Polyhedron, size: int) -> RationalSet:
-    if polyhedron.is_empty():
-        return RationalSet(np.zeros((0, size)), 0, -1, np.zeros((size, 2)))
-    points = [
-        [Fraction(int(generator.coefficient(ppl.Variable(i))), int(generator.divisor())) for i in range(size)]
-        for generator in polyhedron.minimized_generators()
-    ]
-    facets = sum(1 for row in polyhedron.minimized_constraints() if row.is_inequality())
-    vertices = np.array([[float(value) for value in point] for point in points])
-    bounds = np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=-1)
-    return RationalSet(vertices, facets, int(polyhedron.affine_dimension()), bounds)
 
 
 def _whole(values: Rationals) -> tuple[list[int], int]:

@@ -67,14 +67,6 @@ def test_feedback_keeps_what_no_fixed_control_keeps(paper: Paper) -> None:
     np.testing.assert_array_equal(plan.run(moves)[1][:3], plan.run(later)[1][:3])
 
 
-def test_without_a_disturbance_feedback_changes_nothing(paper: Paper) -> None:
-    problem = paper()
-    plan = feedback_plan(problem, pushes(problem, 0.0))
-    assert plan.worst_miss < 1e-5
-    np.testing.assert_allclose(plan.lower, plan.upper)
-    np.testing.assert_array_equal(plan.gains, 0.0)
-
-
 def test_the_terminal_spread_is_what_the_last_disturbance_does(paper: Paper) -> None:
     # Earlier ones can be answered, the last one cannot: its own effect is a lower bound.
     problem = paper()

@@ -19,7 +19,6 @@ from rendezvous.reachability import (
     SetKind,
     ThrustShape,
     TooLargeError,
-    TooManyVerticesError,
     analytic_centre,
     chebyshev_centre,
     effort,
@@ -81,14 +80,6 @@ def test_exact_route_has_the_vertices_of_exact_rationals(random_problem: Random,
             found = part.polytope(SetKind.TUBE, 1)
             assert found is not None
             assert np.abs(np.stack(found.bounding_box(), axis=-1) - tube[1].bounds).max() < 1e-9
-
-
-@pytest.mark.parametrize("seed", [0, 4, 8, 12])
-def test_singular_transitions_are_no_obstacle(random_problem: Random, seed: int) -> None:
-    problem = random_problem(seed, 3)
-    assert np.linalg.matrix_rank(problem.transition[0]) < 3
-    both = [solve(problem, route).sets.bounds(SetKind.TUBE) for route in Route]
-    assert np.abs(both[0] - both[1]).max() < 1e-9 * problem.state_bounds.max()
 
 
 @pytest.mark.parametrize("thrust", list(ThrustShape))
@@ -164,15 +155,6 @@ def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
 
     best = product(centre)
     assert all(product(each.ravel()) < best for each in samples(optimal, 200, np.random.default_rng(0)))
-
-
-def test_vertices_are_refused_where_they_cannot_be_listed(paper: Paper) -> None:
-    with pytest.raises(TooManyVerticesError, match="span 28 dimensions"):
-        vertices(solve(paper(periods=16, period_s=45.0), Route.LIFTED).optimal)
-    with pytest.raises(TooManyVerticesError, match="27 vertices, more than the limit of 20"):
-        vertices(solve(paper(), Route.LIFTED).optimal, most=20)
-    with pytest.raises(TooManyVerticesError, match="ball"):
-        vertices(solve(paper(thrust=ThrustShape.BALL), Route.LIFTED).optimal)
 
 
 def test_exact_route_is_refused_before_it_takes_too_long_or_too_much(
