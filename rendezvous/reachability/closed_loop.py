@@ -27,11 +27,13 @@ _MAX_RELAXATION = 1e3
 class Flight:
     """Simulation in closed loop: true states, shape (T + 1, n), and the controls applied, shape (T, m).
 
+    `expected_misses`, shape (T,), are the minimum terminal norms of the plans, in the units of the states.
     `relaxations`, shape (T,), are the fractions by which constraints on states were relaxed for each plan; otherwise 0.
     """
 
     states: Floats
     controls: Floats
+    expected_misses: Floats
     relaxations: Floats
 
     @property
@@ -60,9 +62,9 @@ def replan(
         optimal, relaxation = _plan(problem, t, estimated, relative)
         control = minimum_energy(optimal)[0]
         state = truth(t, state, control)
-        steps.append((state, control, relaxation))
-    states, controls, relaxations = (np.array(column) for column in zip(*steps, strict=True))
-    return Flight(np.vstack([problem.initial, states]), controls, relaxations)
+        steps.append((state, control, optimal.miss, relaxation))
+    states, controls, misses, relaxations = (np.array(column) for column in zip(*steps, strict=True))
+    return Flight(np.vstack([problem.initial, states]), controls, misses, relaxations)
 
 
 def relaxed(problem: ReachabilityProblem, fraction: float) -> ReachabilityProblem:

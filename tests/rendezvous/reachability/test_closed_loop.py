@@ -35,6 +35,8 @@ def test_replanning_on_the_nonlinear_truth(
     flight = replan(problem, truth)
     assert flight.miss < plain
     np.testing.assert_array_equal(flight.relaxations, 0.0)
+    np.testing.assert_allclose(flight.expected_misses[:3], 0.0)
+    assert flight.expected_misses[3] > 0.0
     assert flight.states.shape == (5, 6)
     assert flight.controls.shape == (4, 3)
 
