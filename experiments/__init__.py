@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from experiments.interception.figures.bound import draw_bound
-    from experiments.interception.figures.plot import plot
+    from experiments.interception.figures.commands import plot
     from experiments.interception.figures.process import draw_process
     from experiments.interception.figures.sets import draw_sets
     from experiments.interception.python_interface import find_worst, fly_one, lower_bound, save, simulate
@@ -29,7 +29,7 @@ _NAMES = {
     "interception.scenario_file": ("load_scenario",),
     "interception.record_file": ("load_record",),
     "interception.python_interface": ("find_worst", "fly_one", "lower_bound", "save", "simulate"),
-    "interception.figures.plot": ("plot",),
+    "interception.figures.commands": ("plot",),
     "interception.figures.bound": ("draw_bound",),
     "interception.figures.process": ("draw_process",),
     "interception.figures.sets": ("draw_sets",),

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator
 
 from experiments.campaigns.run_tables import groups
-from experiments.common.figure_style import CURVE_LOOKS, HALO, INK, legend_below, letters, style, subplots
+from experiments.common.figure_style import CURVE_LOOKS, HALO, INK, legend_below, letters, plain_ticks, style, subplots
 from experiments.common.screen import some_runs
 from experiments.interception.figures.b_plane import Cloud, draw_b_plane, max_guarantee
 from experiments.interception.figures.distributions import MAX_POINTS, Sample, axis_limit, draw_samples
@@ -89,8 +89,7 @@ def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
         axes.fill_between(found.index, found["lower"], found["upper"], color=colour, alpha=0.18, linewidth=0.0)
     axes.set(xlim=(0.9 * counts[0], 1.1 * counts[-1]), xscale="log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if sample.size < _DECADES_FROM else (1.0,)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    plain_ticks(axes.xaxis)
     bottom, top = axes.get_ylim()
     axes.set_ylim(bottom if bottom > 0.5 * top else 0.0, top)
 

@@ -12,7 +12,7 @@ from functools import partial
 from experiments.campaigns.cluster import workers_of
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
-from experiments.common.screen import NOT_FINITE, progress_bar, say
+from experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
 from experiments.interception.scenario_file import scenario_warnings, study_scenario
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import MANIFEST, CampaignFolder, StorageError, need_free, read_manifest
@@ -46,14 +46,13 @@ class Flown:
 def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
     """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr."""
     need_free(options.out, resume=options.resume)
-    note = partial(say, quiet=options.quiet)
     scenarios = campaign.cells or (campaign.scenario,)
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
-    for line in notes:
-        note(line)
-    for warning in warnings[: MAX_WARNINGS if campaign.cells else None]:
-        note(f"warning: {warning}")
-    with workers_of(options, note) as (executor, workers), progress_bar(options.quiet) as begin:
+    say_warnings(warnings[: MAX_WARNINGS if campaign.cells else None], options.quiet, notes)
+    with (
+        workers_of(options, partial(say, quiet=options.quiet)) as (executor, workers),
+        progress_bar(options.quiet) as begin,
+    ):
         began_s = time.perf_counter()
         folder = campaign.run(executor, workers=workers, resume=options.resume, progress=begin("campaign"))
     return Flown(folder, warnings, time.perf_counter() - began_s)
@@ -85,14 +84,3 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
             raise
         reason = str(error)[:200] or type(error).__name__
         raise InputError(f"a worker process or the cluster has stopped ({reason}){resume_hint}") from None
-
-
-def duration(seconds: float) -> str:
-    """Return a time in suitable units: 40 s, 3 min, 2 h 10 min, 5 days."""
-    if seconds < 100.0:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60.0)
-    if minutes < 100:
-        return f"{minutes} min"
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours < 48 else f"{hours / 24.0:.0f} days"

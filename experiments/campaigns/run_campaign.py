@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from experiments.campaigns.command import Campaign as Options
-from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, duration, fly, scenario_of
+from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, scenario_of
 from experiments.campaigns.run_tables import COLUMNS, heading, records, summary, summary_parts
 from experiments.common.errors import input_errors
 from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import show, some_runs
+from experiments.interception.course import duration_text
 from experiments.interception.strategies import own_strategy
 from experiments.interception.study import study_title
 from sim import Campaign, CampaignNoise, StoppingRule
@@ -45,7 +46,7 @@ def run(options: Options) -> None:
         stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
         parts = [
             study_title(manifest.scenario, manifest.strategy, manifest.seed),
-            f"{some_runs(stored.finished_runs)}{stopped}, {duration(flown.elapsed_s)}; "
+            f"{some_runs(stored.finished_runs)}{stopped}, {duration_text(flown.elapsed_s)}; "
             f"quantiles with {'' if stopped else '95 % '}confidence limits",
             *summary_parts(stored, table),
         ]

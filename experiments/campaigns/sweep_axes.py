@@ -11,9 +11,9 @@ import re
 from collections.abc import Sequence
 from decimal import Context, Decimal
 
-from experiments.common.display_units import split_unit
 from experiments.common.errors import InputError, input_errors, shown
 from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
+from experiments.common.units import split_unit
 from sim.scenario import Scenario
 from sim.storage import MAX_CELLS, Axis
 

@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis as MatplotlibAxis
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator
 
 from experiments.campaigns.sweep_axes import key_label
 from experiments.campaigns.sweep_table import SweepTable, above_bound, spans_decades
@@ -31,6 +31,7 @@ from experiments.common.figure_style import (
     first_panels,
     legend_below,
     letters,
+    plain_ticks,
     style,
     subplots,
 )
@@ -65,10 +66,7 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> 
 
     With one axis there is a panel for each quantity, with the quantiles as lines; with two axes there is a map of the
     decisions, and a heat map for each other quantile that the runs show. The panel of the requirement is the first.
-    Raise ValueError if there are more axes, or no quantile.
     """
-    if len(table.axes) not in (1, 2) or not shown:
-        raise ValueError("only a sweep with one or two axes can be drawn, with at least one quantile")
     figure = (_lines if len(table.axes) == 1 else _maps)(table, table.of_noise(noise), shown)
     figure.suptitle(f"{noise} noise")
     return figure
@@ -229,8 +227,7 @@ def _name_values(one: MatplotlibAxis, axis: Axis) -> None:
 def _plain_decades(one: MatplotlibAxis) -> None:
     """Write 1, 2, 5, 10, ... at a logarithmic axis."""
     one.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
-    one.set_minor_formatter(NullFormatter())
+    plain_ticks(one)
 
 
 def _column(table: SweepTable, quantile: QuantileName) -> str:

@@ -11,9 +11,11 @@ from typing import Any
 import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 STYLE: list[Any] = [Path(__file__).with_name("infoset.mplstyle")]
@@ -116,6 +118,12 @@ def legend_below(figure: Figure, columns: int, **more: Any) -> None:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, **more)
+
+
+def plain_ticks(one: Axis) -> None:
+    """Write the ticks of a logarithmic axis as numbers, the minor ones without labels."""
+    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
+    one.set_minor_formatter(NullFormatter())
 
 
 def plain(text: str) -> str:

@@ -33,7 +33,6 @@ ENDS = ("min", "max")
 KeyPath = tuple[str, ...]
 Kind = TypeVar("Kind")
 
-_IS_MISSING = "is missing"
 _UNTRAPPED = Context(prec=60, traps=[])
 """Products beyond the range of decimal numbers are infinite, which is refused as any infinite value."""
 _MAX_FAULTS = 50
@@ -219,7 +218,7 @@ class _Reading:
         if details["type"] == "missing" and path in self._guessed:
             return
         text = details["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-        text = _IS_MISSING if details["type"] == "missing" else re.sub(r"^[A-Z]\w+: ", "", text)
+        text = "is missing" if details["type"] == "missing" else re.sub(r"^[A-Z]\w+: ", "", text)
         while path and path not in self._written and path[-1].isdecimal():
             text, path = f"number {int(path[-1]) + 1} {text}", path[:-1]
         self._faults.setdefault(path, text)

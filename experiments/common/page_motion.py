@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from experiments.common.display_units import Unit, time_unit
 from experiments.common.page_document import page
+from experiments.common.units import Unit, time_unit
 from infoset.arrays import Floats
 
 _SPEEDS = (5, 30, 60, 120)

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.display_units import length_unit
 from experiments.common.figure_style import (
     BOUND,
     EVENT,
@@ -27,6 +26,7 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
+from experiments.common.units import length_unit
 from experiments.multipoint.report import Report, Scene
 from infoset.arrays import Floats
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.common.display_units import length_unit
 from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
+from experiments.common.units import length_unit
 from experiments.multipoint.report import Report
 
 MOMENTS = 401

@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from experiments.common.display_units import Unit, time_unit
 from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
 from experiments.common.problem_command import trajectories_csv
 from experiments.common.screen import Part, number_table
+from experiments.common.units import Unit, time_unit
 from experiments.multipoint.file import MultipointProblem
 from infoset.arrays import Floats
 from rendezvous.multipoint import BestOrder, Path, Tour, Visits

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
-from experiments.common.display_units import length_unit
 from experiments.common.figure_style import (
     BOUND,
     EVENT,
@@ -29,9 +28,10 @@ from experiments.common.figure_style import (
     subplots,
 )
 from experiments.common.hill_axes import AXIS_TITLES, component_titles
+from experiments.common.units import length_unit
 from experiments.pareto.report import Report
 from infoset.arrays import Floats
-from rendezvous.pareto import DurationSweep, EncounterSolution, distances, front_of_two, pareto_set, simplex_weights
+from rendezvous.pareto import DurationSweep, EncounterSolution, pareto_set, simplex_weights
 
 _VIEWS: tuple[tuple[int, ...], ...] = ((1, 0), (0, 1, 2), (1, 2), (0, 2))
 """Axes of the panels: three planes, and space in the second one."""
@@ -179,10 +179,6 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
         (third,) = {0, 1, 2} - set(shown)
         shade = axes.scatter(excess[:, shown[0]], excess[:, shown[1]], c=excess[:, third], s=4.0, cmap="cividis")
         axes.figure.colorbar(shade, ax=axes, location="top", label=f"$e$ of {names[third]}, {_COST}")
-    elif solution.same_matrix:
-        distance = float(distances(solution)[0, 1])
-        along = np.linspace(0.0, distance**2, _POINTS)
-        axes.plot(along, front_of_two(distance, along), color=SET_EDGE)
     else:
         axes.plot(excess[:, 0], excess[:, 1], color=SET_EDGE)
     for choice, values in chosen.items():

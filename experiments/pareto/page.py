@@ -6,9 +6,9 @@ from importlib import resources
 
 import numpy as np
 
-from experiments.common.display_units import length_unit
 from experiments.common.hill_axes import AXES, AXIS_TITLES
 from experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
+from experiments.common.units import length_unit
 from experiments.pareto.report import Report
 from infoset.arrays import Floats
 from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights

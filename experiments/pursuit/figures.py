@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from experiments.common.display_units import M_PER_KM, length_unit, time_unit
 from experiments.common.figure_style import (
     BOUND,
     IMPULSE,
@@ -25,6 +24,7 @@ from experiments.common.figure_style import (
     subplots,
 )
 from experiments.common.hill_axes import AXIS_TITLES, INERTIAL_TITLES
+from experiments.common.units import M_PER_KM, length_unit, time_unit
 from experiments.pursuit.report import Report, thrust_angles
 from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict, history, orbital_axes

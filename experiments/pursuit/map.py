@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.errors import InputError, shown
 from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
 from experiments.common.output import Cell, to_csv
 from experiments.common.problem_command import ProblemCommand
 from experiments.common.screen import BeginProgress
+from experiments.common.units import M_PER_KM, S_PER_HOUR
 from experiments.pursuit.command import PursuitMap
 from experiments.pursuit.file import PursuitProblem
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, Game, PointStatus, capture_map

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.display_units import S_PER_HOUR, split_unit
 from experiments.common.figure_style import HALO, INK, LIMIT, legend_below, style, subplots
+from experiments.common.units import S_PER_HOUR, split_unit
 from experiments.pursuit.map import STATUS_WORDS, MapReport, counted
 from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.problem_command import trajectories_csv
 from experiments.common.screen import Part, number, number_table
+from experiments.common.units import M_PER_KM, S_PER_HOUR
 from experiments.pursuit.file import PursuitProblem
 from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import (

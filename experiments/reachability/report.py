@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from rich.table import Table
 
-from experiments.common.display_units import Unit, length_unit
 from experiments.common.hill_axes import AXES
 from experiments.common.problem_command import trajectories_csv
 from experiments.common.screen import Part, number, number_table
+from experiments.common.units import Unit, length_unit
 from experiments.reachability.file import Rendezvous
 from infoset.arrays import Floats
 from rendezvous.reachability import FeedbackPlan, Flight, SetKind, Solution, ThrustShape, effort

@@ -11,7 +11,7 @@ from rendezvous.pareto.feasibility import (
     peak_control,
     total_impulse,
 )
-from rendezvous.pareto.front import ParetoSet, distances, front_of_two, pareto_set, simplex_weights
+from rendezvous.pareto.front import ParetoSet, distances, pareto_set, simplex_weights
 from rendezvous.pareto.selections import NotOptimalError, min_sum_of_costs, minimax_excess, nearest_to
 from rendezvous.pareto.solution import (
     CraftCost,
@@ -45,7 +45,6 @@ __all__ = [
     "analyse_coalitions",
     "check_bound",
     "distances",
-    "front_of_two",
     "min_peak",
     "min_sum_of_costs",
     "minimax_excess",

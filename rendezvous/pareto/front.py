@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 from rendezvous._halton import halton
@@ -63,22 +62,6 @@ def simplex_weights(craft: int, count: int) -> Floats:
 
 
 def distances(solution: EncounterSolution) -> Floats:
-    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, shape (n, n).
-
-    Raises
-    ------
-    ValueError
-        If the craft have different M.
-    """
-    if not solution.same_matrix:
-        raise ValueError("the craft have different cost matrices: there is no one distance between their ideals")
+    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, shape (n, n)."""
     scaled = solution.ideals @ solution.costs[0].root.T
     return np.asarray(np.linalg.norm(scaled[:, None] - scaled, axis=-1))
-
-
-def front_of_two(distance: float, excess: ArrayLike) -> Floats:
-    """Return e_2, m^2/s^3, on the Pareto front of two craft: sqrt(e_1) + sqrt(e_2) = d_12.
-
-    `distance` is d_12, m/s^1.5, and `excess` is e_1, from 0 to d_12^2, m^2/s^3.
-    """
-    return np.asarray((distance - np.sqrt(np.asarray(excess, dtype=np.float64))) ** 2)

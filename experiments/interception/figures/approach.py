@@ -48,8 +48,6 @@ def draw_approach(records: Sequence[Record]) -> Figure:
     contains those of all sections. After an impulse that centres the box it is half the diagonal of the box. Both end
     when the first section leaves at the range threshold.
     """
-    if not records:
-        raise ValueError("at least one record is needed")
     figure = new_figure(25.0 + 75.0 * len(records))
     rows = figure.subfigures(len(records), 1, squeeze=False)[:, 0]
     for row, record, title in zip(rows, records, record_titles(records), strict=True):

@@ -108,8 +108,6 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     miss, and the maximum guaranteed miss. All panels have the same limits, unless the median misses differ much. The
     radius of the body, m, is drawn as a disc.
     """
-    if not clouds:
-        raise ValueError("at least one cloud is needed")
     medians = [float(np.median(each.miss_m)) for each in clouds]
     alone = max(medians) > _OWN_LIMITS_FROM * min(medians)
     columns = min(_MAX_COLUMNS, len(clouds))

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import StrMethodFormatter
 
 from experiments.common.figure_style import BOUND, CURVE_LOOKS, INK, SET_EDGE, SET_FILL, letters, style, subplots
 from experiments.common.screen import number
@@ -116,7 +115,7 @@ def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -
         axes.annotate(f"{number(miss_m)} m", (miss_m, place), fontsize="small", **beside)
     if bound_m > 0.0 and maximum > _WIDE * bound_m:
         axes.set(xscale="log", xlim=(0.6 * bound_m, maximum * (maximum / bound_m) ** 0.4))
-        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.xaxis.set_major_formatter("{x:g}")
     else:
         axes.set_xlim(0.0, 1.3 * maximum or 1.0)
     axes.set_ylim(len(rows) - 0.4, -0.6)

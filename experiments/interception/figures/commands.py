@@ -1,4 +1,4 @@
-"""The figures of the commands, in the order of their names; each is drawn after the one before is written."""
+"""The figures of the commands, in the order of their names, each drawn when the last one is written, and `plot`."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from experiments.common.figure_style import CURVE_LOOKS
+from experiments.common.screen import some_runs
 from experiments.interception.course import Clock, Courses
 from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import cloud, draw_b_plane
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.figures.corridor import draw_corridor
-from experiments.interception.figures.distributions import draw_distributions
+from experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
 from experiments.interception.study import Comparison, Curve
 from guidance import NoiseKind
-from sim import Record, Scenario
+from sim import Record, Results, Scenario
 
 DEFAULT_TIMES = (0.5, 4.0, 8.0)
 NOISES = {NoiseKind.RANDOM: "random noise", NoiseKind.GAME: "game noise, worst tie rule"}
@@ -61,3 +63,17 @@ def _default_times(records: Sequence[Record]) -> tuple[float, ...]:
         return DEFAULT_TIMES
     arrival_s, step_s = records[0].scenario.nominal_arrival_s, records[0].scenario.set_model.step_s
     return tuple((arrival_s - np.geomspace(arrival_s, step_s, 5)[1:4]).tolist())
+
+
+def plot(results: Results | Record | Sequence[Record]) -> Figure:
+    """Draw results, or the course of up to two engagements.
+
+    Parameters
+    ----------
+    results : Results, Record or sequence of Record
+        Results give the distributions of miss and impulse, each with its 95 % confidence band. Records give angle,
+        rate, predicted miss and impulses over time (`draw_process`).
+    """
+    if not isinstance(results, Results):
+        return draw_process([results] if isinstance(results, Record) else results)
+    return draw_samples([Sample(some_runs(len(results)), CURVE_LOOKS[1], results.miss_m, results.impulse_m_s)])

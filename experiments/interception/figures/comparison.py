@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from experiments.common.figure_style import INK, SET, legend_below, letters, style, subplots
+from experiments.common.figure_style import INK, SET, legend_below, letters, plain_ticks, style, subplots
 from experiments.common.screen import some_runs
 from experiments.interception.figures.distributions import draw_radius
 from experiments.interception.study import Comparison
@@ -31,8 +30,6 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
     Random noise is left, game noise right. Misses are on a logarithmic axis, with a line at the radius of the body, m.
     """
     names = list(dict.fromkeys(each.strategy for each in compared))
-    if not names:
-        raise ValueError("at least one strategy is needed")
     figure, grid = subplots(45.0 + 16.0 * len(names), 2, 2, sharex="row", sharey=True)
     misses, impulses = [each.miss_m for each in compared], [each.impulse_m_s for each in compared]
     edges = _logarithmic(misses), np.linspace(0.0, 1.04 * float(np.max(impulses)) or 1.0, _BINS + 1)
@@ -45,8 +42,7 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
             axes.grid(visible=False, axis="y")
     for axes in grid[0]:
         axes.set(xscale="log", xlabel="miss, m")
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        plain_ticks(axes.xaxis)
         draw_radius(axes, radius_m)
     for axes in grid[1]:
         axes.set_xlabel("impulse spent, m/s")

@@ -9,7 +9,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import IMPULSE, SET_EDGE, SET_FILL, TRUTH, legend_below, letters, style, subplots
+from experiments.common.figure_style import (
+    IMPULSE,
+    SET_EDGE,
+    SET_FILL,
+    TRUTH,
+    first_panels,
+    legend_below,
+    letters,
+    style,
+    subplots,
+)
 from experiments.common.screen import some_runs
 from experiments.interception.course import Courses
 from experiments.interception.figures.shared import count_down, draw_levels, name_events
@@ -32,15 +42,9 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
     complete set (see `Courses`), and end when these are less than half of the runs. Quantiles for which the runs are
     too few are not drawn.
     """
-    if not curves:
-        raise ValueError("at least one curve is needed")
     rows, columns = -(-len(curves) // 2), min(2, len(curves))
     figure, grid = subplots(20.0 + 75.0 * rows, 2 * rows, columns, sharex=True, height_ratios=[2.4, 1.0] * rows)
-    above, below = [*grid[::2].flat], [*grid[1::2].flat]
-    for pair in [*zip(above, below, strict=True)][len(curves) :]:
-        for axes in pair:
-            axes.remove()
-    above, below = above[: len(curves)], below[: len(curves)]
+    above, below = (first_panels(part, len(curves)) for part in (grid[::2], grid[1::2]))
     titles = []
     for first, second, curve, course in zip(above, below, curves, courses, strict=True):
         _draw_possible(first, course)

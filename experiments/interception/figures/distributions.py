@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from experiments.common.figure_style import CURVE_LOOKS, LIMIT, legend_below, letters, style, subplots
+from experiments.common.figure_style import CURVE_LOOKS, LIMIT, legend_below, letters, plain_ticks, style, subplots
 from experiments.common.screen import some_runs
 from experiments.interception.figures.shared import RADIUS
 from experiments.interception.study import Curve
@@ -61,8 +60,6 @@ def draw_samples(samples: Sequence[Sample], radius_m: float | None = None) -> Fi
     Where a few values are far beyond the others, the axis ends before them and its label says how many; where the
     curves lie decades apart, the axis of the miss is logarithmic. The radius of the body, m, is a line in (a).
     """
-    if not samples:
-        raise ValueError("at least one curve is needed")
     figure, (panels,) = subplots(85.0, 1, 2, sharey=True)
     left, right = panels
     misses, impulses = [sample.miss_m for sample in samples], [sample.impulse_m_s for sample in samples]
@@ -92,8 +89,7 @@ def scale_misses(axes: Axes, samples: Sequence[Floats]) -> None:
     if 0.0 < _LOGARITHMIC_FROM * min(medians) < max(medians):
         first = min(float(np.quantile(sample[sample > 0.0], _MIN_SHOWN)) for sample in samples)
         axes.set(xscale="log", xlim=(0.5 * first, 2.0 * max(float(sample.max()) for sample in samples)))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        plain_ticks(axes.xaxis)
     else:
         axes.set_xlim(0.0, 1.04 * axis_limit(samples) or 0.5)
 

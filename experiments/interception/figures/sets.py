@@ -25,28 +25,26 @@ MEASUREMENT_MARK = "measured α, drawn at the true ω"
 SECTIONS_MARK = "sections of the set, the nearest dark"
 _TRUTH: dict[str, Any] = {"marker": "x", "color": INK, "markersize": 7.0, "markeredgewidth": 1.6, "linestyle": "none"}
 _SQUARE: dict[str, Any] = {"marker": "s", "color": INK, "markerfacecolor": "white", "markersize": 5.5}
+_SECTIONS = 5
 _SMALL_MRAD = 0.1
 """Angle below which the axes of angles are in µrad."""
 
 
 @style()
-def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0), sections: int = 5) -> Figure:
+def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0)) -> Figure:
     """Draw sections of the sets after the measurement: one row per time, one column per record and lateral axis.
 
-    The planes of a row have the same limits for each lateral axis.
+    At most five sections are drawn, evenly chosen over the range. The planes of a row have the same limits for each
+    lateral axis.
 
     Parameters
     ----------
     times_s : sequence of float
         The nearest step is shown, and the title says which it is.
-    sections : int
-        Most sections to show, evenly chosen over the range, the first and the last included.
     """
     if not records or not times_s:
         raise ValueError("at least one record and one time are needed")
-    if sections < 1:
-        raise ValueError(f"at least one section must be shown: got {sections}")
-    rows = [planes_at(records, time_s, sections) for time_s in times_s]
+    rows = [planes_at(records, time_s, _SECTIONS) for time_s in times_s]
     columns = len(rows[0])
     figure, grid = subplots(15.0 + 60.0 * len(rows), len(rows), columns, width_mm=WIDTH_MM if columns > 1 else 100.0)
     for row, planes in zip(grid, rows, strict=True):

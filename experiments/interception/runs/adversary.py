@@ -8,9 +8,9 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.screen import Part, figure_files, number, number_table, show
+from experiments.common.units import M_PER_KM
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path
 from experiments.interception.runs.engage import steps_csv

@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, show
+from experiments.common.units import M_PER_KM
 from experiments.interception.command import Bound
 from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, work_of
 from experiments.interception.scenario_file import study_scenario

@@ -16,7 +16,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from experiments.campaigns.flight import duration
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
 from experiments.interception.scenario_file import load_scenario, with_model
@@ -195,12 +194,6 @@ def test_without_an_extra_it_says_which(
     code, out, err = infoset("campaign", file, "--runs", 8, "--out", "runs", *options)
     assert (code, out) == (2, "")
     assert err.splitlines()[-1] == f"error: {library} is not installed: install infoset with the extra [{extra}]"
-
-
-def test_times_and_commands_are_readable() -> None:
-    assert [duration(each) for each in (3.0, 99.0, 150.0, 7800.0, 180_000.0, 1e7)] == [
-        *("3 s", "99 s", "2 min", "2 h 10 min", "2 days", "116 days"),
-    ]
 
 
 def command(file: Path, folder: Path, runs: int, *options: object) -> list[str]:

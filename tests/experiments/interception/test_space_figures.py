@@ -141,8 +141,6 @@ def test_quantiles_that_the_runs_do_not_show_are_left_out() -> None:
     across = np.array([[1.0, 0.0], [0.0, 2.0]])
     figure = draw_b_plane([Cloud("two", across, np.array([1.0, 2.0]))])
     assert set(circles(figure.axes[0])) == {MEDIAN}
-    with pytest.raises(ValueError, match="at least one cloud"):
-        draw_b_plane([])
 
 
 def test_process_has_the_courses_of_both_axes_and_the_moduli_of_impulses(records: list[Record]) -> None:
@@ -172,12 +170,12 @@ def test_process_has_the_courses_of_both_axes_and_the_moduli_of_impulses(records
 
 
 def test_the_sets_of_both_planes_are_side_by_side(records: list[Record]) -> None:
-    figure = draw_sets(records[:1], (0.5, 8.0), sections=3)
+    figure = draw_sets(records[:1], (0.5, 8.0))
     for number, axes in enumerate(figure.axes):
         step, axis = records[0].steps[(1, 16)[number // 2]], AXES[number % 2]
         assert axes.get_xlabel() == f"rate $\\omega_{axis}$, µrad/s"
         assert axes.get_ylabel().startswith(f"angle $\\alpha_{axis}$, ")
-        chosen = choose_sections(step.sections, 3)
+        chosen = choose_sections(step.sections, 5)
         polygons = [section.omega_alpha if axis == "z" else section.omega_alpha_y for section in chosen]
         outlines = [np.asarray(patch.get_xy()) for patch in axes.patches if isinstance(patch, Polygon)]
         for outline, polygon in zip(outlines, polygons, strict=True):

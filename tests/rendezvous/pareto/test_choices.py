@@ -25,7 +25,6 @@ from rendezvous.pareto import (
     analyse_coalitions,
     check_bound,
     distances,
-    front_of_two,
     min_peak,
     nearest_to,
     pareto_set,
@@ -79,7 +78,6 @@ def test_the_front_of_two_in_closed_form() -> None:
     between = float(distances(solution)[0, 1])
     found = pareto_set(solution, simplex_weights(2, 101))
     np.testing.assert_allclose(np.sqrt(found.excess).sum(axis=1), between, rtol=1e-12)
-    np.testing.assert_allclose(front_of_two(between, found.excess[:, 0]), found.excess[:, 1], atol=1e-12 * between**2)
 
 
 @given(SEEDS, st.integers(2, 5))
