@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from experiments.common.input_file import to_toml
+from sim import Scenario
 from tests.experiments.command_line import Command
+from tests.space import in_space
 
 
 @pytest.fixture
@@ -45,3 +48,19 @@ def mine(tmp_path: Path) -> Callable[[str], Path]:
         return file
 
     return write
+
+
+@pytest.fixture
+def file(brief: Scenario, infoset: Command, tmp_path: Path) -> Path:
+    """The scenario `brief` as a file in the empty folder."""
+    path = tmp_path / "brief.toml"
+    path.write_text(to_toml(brief))
+    return path
+
+
+@pytest.fixture
+def space_file(brief: Scenario, tmp_path: Path) -> Path:
+    """The scenario `brief` in space as a file."""
+    path = tmp_path / "space.toml"
+    path.write_text(to_toml(in_space(brief)))
+    return path

@@ -9,11 +9,9 @@ from typing import Any
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.common.file_kinds import PROBLEMS, SCENARIO, built_in_files
+from experiments.common.file_kinds import SCENARIO, built_in_files
 from experiments.common.input_file import read_input, read_text, to_toml
-from experiments.interception.scenario_file import load_scenario
 from sim.storage.codec import fingerprint
-from tests.built_in import scenario_text
 from tests.experiments.command_line import Command
 from tests.fuzzing.subjects import text_files
 
@@ -58,15 +56,6 @@ def test_a_file_is_replaced_only_if_asked(noun: str, infoset: Command) -> None:
     assert file.read_text() == FILES[MINE[noun]].text
 
 
-def test_warnings_of_a_check(infoset: Command, tmp_path: Path) -> None:
-    file = tmp_path / "wide.toml"
-    file.write_text(scenario_text("asteroid-1997").replace("z_km = [-1.0, 1.0]", "z_km = [-12.0, 1.0]"))
-    code, out, err = infoset("scenarios", "check", file)
-    assert (code, out[:4]) == (0, "ok  ")
-    assert err.startswith("warning: dispersion.z_m reaches 2000 m below uncertainty.z_m")
-    assert len(json.loads(infoset("scenarios", "check", file, "--json")[1])["warnings"]) == 1
-
-
 @pytest.mark.parametrize(
     ("line", "message"),
     [
@@ -89,37 +78,9 @@ def test_what_is_wrong_is_one_message(line: str, message: str, infoset: Command)
     assert message in infoset.refused(*arguments)
 
 
-def test_all_faults_of_a_file_are_listed_one_a_line(infoset: Command) -> None:
-    text = FILES["service-2"].text.replace("1.13e-3", '"fast"').replace("time_s = 1500.0", "time = 1500.0")
-    Path("bad.toml").write_text(text)
-    code, out, err = infoset("problems", "check", "bad.toml")
-    assert (code, out) == (2, "")
-    assert sorted(line.split(": ")[-2] for line in err.splitlines()) == ["orbit_rate_rad_s", "target.#1.time"]
-
-
-def test_a_file_of_another_kind_is_one_message_with_its_command(infoset: Command) -> None:
-    commands = {**{problem.command: kind for kind, problem in PROBLEMS.items()}, "engage": SCENARIO}
-    for command, taken in commands.items():
-        for name in ("asteroid-1997", "service-3", "pareto-2008"):
-            file = FILES[name]
-            Path("mine.toml").write_text(file.text)
-            right = "engage" if file.kind == SCENARIO else PROBLEMS[file.kind].command
-            what = "a scenario" if file.kind == SCENARIO else f"a problem of kind {file.kind}"
-            if taken != file.kind:
-                for given, path in ((name, name), ("mine.toml", "FILE")):
-                    message = infoset.refused(command, given)
-                    assert message == f"error: {given}: this is {what}; use infoset {right} {path}\n"
-
-
 def test_no_more_than_the_limit_is_read(tmp_path: Path) -> None:
     file = tmp_path / "x.toml"
     file.write_bytes(b"x" * 10)
     assert read_input(file, 10) == b"x" * 10
     with pytest.raises(InputError, match="has more than 9 bytes"):
         read_input(file, 9)
-
-
-@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="the system has no such device")
-def test_an_endless_device_is_read_to_the_limit_only() -> None:
-    with pytest.raises(InputError, match="/dev/zero: has more than 100000 bytes"):
-        load_scenario("/dev/zero")

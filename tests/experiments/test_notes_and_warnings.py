@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -62,25 +60,3 @@ def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command
     assert len(notes) == 2
     _, out, _ = infoset("report", "out", "--require", "impulse_m_s p50<100")
     assert "is met in " in out
-
-
-@pytest.mark.usefixtures("unrendered")
-def test_a_requirement_decided_with_random_errors_carries_a_caution(infoset: Command) -> None:
-    pytest.importorskip("pyarrow")
-    arguments = ["sweep", "dart-2022", *LONG_STEPS, "--vary", "thruster.last_impulse_s=150:300:2", "--runs", "1"]
-    _, out, _ = infoset(*arguments, "--noise", "mixed", "--out", "out")
-    caution = "random noise (uniform errors within the bounds, independent from one measurement to the next"
-    assert f"{caution}, with a constant centroid error) is one model of many" in out
-    assert "is one adversary, not the worst case" in out
-    _, out, _ = infoset(*arguments, "--set", "angle_sensor.bias=random", "--out", "other")
-    assert f"{caution}) is one model of many: a decision holds for it only" in out
-    assert infoset.json("report", "other")["notes"][0].startswith(caution)
-
-
-def test_every_output_with_game_noise_names_its_tie_rule(infoset: Command) -> None:
-    _, out, _ = infoset("experiment", "haiv-2013", *LONG_STEPS, "--runs", "1", "--json", "out.json")
-    assert "game noise with the tie rule upper" in out.splitlines()[0]
-    assert "is one adversary" in json.loads(Path("out.json").read_text())["notes"][0]
-    _, out, _ = infoset("compare", "haiv-2013", *LONG_STEPS, "--runs", "1", "--strategies", "patient")
-    assert "game noise: for each run, the worst of the four tie rules" in out.splitlines()[0]
-    assert "is one adversary" in out

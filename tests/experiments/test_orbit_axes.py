@@ -7,22 +7,7 @@ import pytest
 
 from experiments.common.hill_axes import from_paper, to_paper
 from experiments.reachability.file import load_rendezvous
-from tests.built_in import problem_text
 from tests.experiments.command_line import Command
-
-HILL = "x radially outward, y along the motion, z along the orbit's normal"
-
-
-@pytest.mark.parametrize("command", ["reach", "multipoint", "pareto", "pursuit"])
-def test_help_states_the_axes(infoset: Command, command: str) -> None:
-    assert HILL in " ".join(infoset(command, "--help")[1].split())
-
-
-@pytest.mark.parametrize(
-    "name", ["rendezvous-2021", "approach-cone", "rendezvous-16-periods", "pareto-2008", "service-2", "service-5"]
-)
-def test_built_in_files_state_the_axes(name: str) -> None:
-    assert HILL in problem_text(name)
 
 
 def test_the_papers_axes() -> None:
@@ -38,14 +23,8 @@ def test_the_papers_axes() -> None:
     ("command", "problem", "settings", "key"),
     [
         ("reach", "rendezvous-2021", ["orbit.semi_major_axis_km={}"], "orbit: semi_major_axis_m"),
-        ("multipoint", "service-2", ["orbit_rate_rad_s={rate}"], "orbit_rate_rad_s"),
         ("pareto", "pareto-2008", ["orbit_rate_rad_s={rate}"], "orbit_rate_rad_s"),
         ("pursuit", "leo-pursuit", ["pursuer.orbit.semi_major_axis_km={}"], "pursuer"),
-        (
-            *("multipoint", "asteroid-tour"),
-            ["gravitational_parameter_km3_s2=398600.4418", "chaser.elements.semi_major_axis_km={}"],
-            "chaser",
-        ),
     ],
 )
 def test_an_orbit_inside_the_earth_is_refused(

@@ -7,7 +7,6 @@ import hashlib
 import html
 import json
 import re
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,15 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.common.errors import InputError
-from experiments.common.page_document import asset, embedded_json, page
+from experiments.common.page_document import embedded_json, page
 from experiments.interception.page import STEPS_OF_A_BOX, TOLERANCE, interception_page, packed_outlines, replayed
 from experiments.interception.scenario_file import load_scenario
-from experiments.multipoint import run as multipoint
-from experiments.multipoint.command import Multipoint
-from experiments.multipoint.page import multipoint_page
-from experiments.pursuit import run as pursuit
-from experiments.pursuit.command import Pursuit
-from experiments.pursuit.page import pursuit_page
 from guidance import NoiseKind
 from infoset import InitialSet, Model, RateSensor, Recovery
 from sim import Outcome, Record, fly_one
@@ -147,57 +140,3 @@ def test_outlines_of_long_flights_have_few_vertices() -> None:
     assert np.hypot(*chords.T).min() > 1.0 - 8.0 * TOLERANCE
     boxes = np.frombuffer(base64.b64decode(packed["boxes"])).reshape(-1, 4)
     np.testing.assert_allclose(boxes[0], [-1.0, -1.0, 1.0, 1.0])
-
-
-def luminance(colour: str) -> float:
-    """Relative luminance, as the Web Content Accessibility Guidelines 2.1 define it."""
-    parts = [int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5)]
-    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
-    return sum(weight * part for weight, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
-
-
-def contrast(one: str, other: str) -> float:
-    """Contrast ratio of two colours, from 1 to 21."""
-    lights = sorted((luminance(one), luminance(other)))
-    return (lights[1] + 0.05) / (lights[0] + 0.05)
-
-
-def palettes() -> dict[str, dict[str, str]]:
-    """The colours of the style sheet: light, and dark."""
-    light, dark = (
-        dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6});", block))
-        for block in re.findall(r":root[^{]*\{(.*?)\}", asset("page.css"), flags=re.DOTALL)
-    )
-    return {"light": light, "dark": dark}
-
-
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_contrast(theme: str) -> None:
-    colours = palettes()[theme]
-    for back in ("paper", "panel"):
-        for text in ("ink", "quiet"):
-            assert contrast(colours[text], colours[back]) >= 4.5, (text, back)
-        for line in ("line", "near", "far", "set", "measured", "impulse", "extra", "focus"):
-            assert contrast(colours[line], colours[back]) >= 3.0, (line, back)
-
-
-def _visits() -> str:
-    return multipoint_page(multipoint.COMMAND.report(Multipoint(problem="service-5")))
-
-
-def _pursuit() -> str:
-    return pursuit_page(pursuit.COMMAND.report(Pursuit()))
-
-
-@pytest.mark.parametrize("draw", [_visits, _pursuit])
-def test_no_two_marks_of_a_page_are_alike(draw: Callable[[], str]) -> None:
-    moving = re.findall(r'colour: "\w+", dash: .*mark: "(\w+)"', asset("motion.js"))
-    assert len(set(moving)) == len(moving) == 5
-    found = re.search(r'<script type="application/json"[^>]*>(.*?)</script>', draw(), re.DOTALL)
-    assert found is not None
-    for view in json.loads(found[1])["views"]:
-        looks = [track["look"] for track in view["tracks"]]
-        assert len(set(looks)) == len(looks)
-        named = [mark["kind"] for mark in view["marks"] if mark["name"]]
-        assert len(set(named)) == len(named)
-        assert not set(named) & set(moving)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from experiments import load_scenario
 from experiments.common.input_file import to_toml
 from infoset import Model
 from sim import Scenario
@@ -37,23 +36,6 @@ def test_the_default_model_is_the_guaranteed_one(infoset: Command, brief: Scenar
             assert read_manifest(tmp_path / name).scenario.information_set.model.value == name
         else:
             assert json.loads(out)["model"] == name
-
-
-def test_a_new_scenario_has_the_guaranteed_model(infoset: Command, tmp_path: Path) -> None:
-    assert infoset("scenarios", "new", "mine.toml")[0] == 0
-    assert load_scenario(tmp_path / "mine.toml").information_set.model is Model.GUARANTEED
-    assert load_scenario("asteroid-1997").information_set.model is Model.PAPER
-
-
-def test_a_scenario_outside_the_conditions_of_the_model_is_refused(
-    infoset: Command, brief: Scenario, tmp_path: Path
-) -> None:
-    text = to_toml(brief).replace("vx_m_s = [-58000.0, -57500.0]", "vx_m_s = [-130e3, -57.5e3]", 1)
-    (tmp_path / "wide.toml").write_text(text)
-    message = infoset.refused("experiment", "wide.toml", "--runs", 2, "--model", "guaranteed")
-    assert "SetModel: the guaranteed model needs a closing speed" in message
-    assert "brief with --model guaranteed: " in infoset.refused("compare", "wide.toml", "--runs", 2)
-    assert infoset("experiment", "wide.toml", "--runs", 2)[0] == 0
 
 
 def test_a_resumed_folder_keeps_its_model(infoset: Command, brief_file: Path, tmp_path: Path) -> None:

@@ -17,28 +17,17 @@ from tests.experiments.command_line import Command
             [
                 r"captured at 45343\.620266 s \(12\.5955 h\)",
                 r"^x +-39420.497090 +0.250766441 +1.612976850 +1.436953246$",
-                r"0\.05030 and 0\.69579 times 42166 km",
+                r"0\.0503 and 0\.6958 times 42166 km",
             ],
         ),
         (
             "reach --select energy --replan",
             [
-                r"^control +u\^2 +u +u +u +m/s +m/s +m/s +m/s",
+                r"^control +u\^2 +u +m/s +\(m, m/s\) +periods$",
                 r"nonlinear miss [\d.]+ \(m, m/s\), Delta-v [\d.]+ m/s$",
             ],
         ),
         ("multipoint asteroid-tour", [r"^target +meet +days ", r"^Itokawa +flyby +265 "]),
-        (
-            "pursuit-map --x phase_deg=-20:20:2 --y thrust_ratio=0.2:0.5:2",
-            [r"^capture times from \d+\.\d{4} to \d+\.\d{4} h$"],
-        ),
-        (
-            "pursuit leo-pursuit --feedback random --runs 2",
-            [
-                r"^  capture time, s: smallest [\d.]+, median [\d.]+, largest [\d.]+$",
-                r"^  distance at the end, m: smallest [\d.]+, median [\d.]+, largest [\d.]+$",
-            ],
-        ),
     ],
 )
 def test_tables_have_units(line: str, patterns: list[str], infoset: Command) -> None:

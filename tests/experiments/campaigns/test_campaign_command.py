@@ -17,7 +17,6 @@ import pandas as pd
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.common.input_file import to_toml
 from experiments.interception.scenario_file import load_scenario, with_model
 from experiments.interception.strategies import load_strategy
 from guidance import NoiseKind
@@ -29,13 +28,6 @@ from sim.versions import versions
 
 Infoset = Callable[..., tuple[int, str, str]]
 needs_kill = pytest.mark.skipif(os.name != "posix", reason="there is no kill -9")
-
-
-@pytest.fixture
-def file(brief: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
-    path = tmp_path / "brief.toml"
-    path.write_text(to_toml(brief))
-    return path
 
 
 def stored_runs(folder: Path) -> pd.DataFrame:
@@ -109,32 +101,29 @@ class Half:
 """
 
 
-@pytest.mark.parametrize("command", [["campaign"], ["sweep", "--vary", "thruster.budget_m_s=100:200:2"]])
 def test_a_strategy_of_a_file_in_threads_and_processes(
-    command: list[str], infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "path", list(sys.path))
-    module = f"half_{command[0]}"
-    (tmp_path / f"{module}.py").write_text(OWN)
-    asked = [*command, file, "--runs", 12, "--chunk", 4, "--strategy", f"{module}.py:Half", "-q"]
+    (tmp_path / "halved.py").write_text(OWN)
+    asked = ["campaign", file, "--runs", 12, "--chunk", 4, "--strategy", "halved.py:Half", "-q"]
     assert infoset(*asked, "--out", "threads") == (0, "", "")
-    assert infoset(*asked, "--out", "processes", "--processes", 2 if command == ["campaign"] else 1) == (0, "", "")
+    assert infoset(*asked, "--out", "processes", "--processes", 2) == (0, "", "")
     assert stored_runs(Path("threads")).equals(stored_runs(Path("processes")))
     digest = hashlib.sha256(OWN.encode()).hexdigest()[:16]
-    assert CampaignFolder.read(Path("threads")).manifest.strategy == f"{module}.py:Half sha256:{digest}"
-    if command == ["campaign"]:
-        worst = json.loads(infoset("report", "threads", "--json", "-")[1])["worst"][0]
-        _, *arguments = shlex.split(worst["replay"])
-        assert json.loads(infoset(*arguments, "--json", "-")[1])["miss_m"] == worst["miss_m"]
-    (tmp_path / f"{module}.py").write_text(OWN.replace("0.5", "0.25"))
-    pickled = pickle.dumps(load_strategy(f"{module}.py:Half"))
-    del sys.modules[module]
+    assert CampaignFolder.read(Path("threads")).manifest.strategy == f"halved.py:Half sha256:{digest}"
+    worst = json.loads(infoset("report", "threads", "--json", "-")[1])["worst"][0]
+    _, *arguments = shlex.split(worst["replay"])
+    assert json.loads(infoset(*arguments, "--json", "-")[1])["miss_m"] == worst["miss_m"]
+    (tmp_path / "halved.py").write_text(OWN.replace("0.5", "0.25"))
+    pickled = pickle.dumps(load_strategy("halved.py:Half"))
+    del sys.modules["halved"]
     with pytest.raises(InputError, match="has changed since the command started"):
         pickle.loads(pickled)
-    del sys.modules[module]  # the next command reads the changed file, as in a new process
+    del sys.modules["halved"]  # the next command reads the changed file, as in a new process
     code, _, err = infoset(*asked, "--out", "threads", "--resume")
     assert code == 2
-    assert f'strategy: "{module}.py:Half sha256:{digest}" in the folder, "{module}.py:Half sha256:' in err
+    assert f'strategy: "halved.py:Half sha256:{digest}" in the folder, "halved.py:Half sha256:' in err
 
 
 def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -> None:

@@ -15,13 +15,13 @@ import pytest
 
 from experiments.campaigns.cluster import cluster
 from experiments.common.errors import InputError
-from experiments.common.input_file import to_toml
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("default")  # of the cluster's own client
 @pytest.mark.parametrize(
     ("address", "is_open"),
@@ -94,12 +94,6 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
     with found.stack:
         found.wait_until_up()
         yield found
-
-
-@pytest.fixture
-def file(infoset: Infoset, brief: Scenario, tmp_path: Path) -> Path:
-    (tmp_path / "brief.toml").write_text(to_toml(brief))
-    return Path("brief.toml")
 
 
 def kill_after(shards: Path, number: int, process: subprocess.Popen[bytes]) -> threading.Thread:

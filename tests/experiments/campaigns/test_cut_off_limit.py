@@ -40,6 +40,7 @@ IDEAL = [
 """An ideal engine, a known range and speed, and no disturbance."""
 
 
+@pytest.mark.thorough
 def test_the_limit_of_the_chart_is_the_closed_form(infoset: Command, tmp_path: Path) -> None:
     """The noise of the game leaves the misses of the closed form possible, and the last impulse centres them."""
     file = tmp_path / "ideal.toml"

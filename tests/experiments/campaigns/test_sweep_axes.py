@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.campaigns.sweep_axes import key_label, sweep_axes, sweep_cells
+from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.common.errors import InputError
 from experiments.interception.scenario_file import load_scenario
 from sim import Scenario
@@ -125,27 +125,17 @@ RISING = "must go from a smaller to a greater value, with a count from 2 to 1000
             "angle_sensor.scale=1:2:2,angle_sensor.error_at_zero_range_rad=1e-4:2e-4:2",
             "angle_sensor.scale and angle_sensor.error_at_zero_range_rad vary the same value",
         ),
-        ("angle_sensor.scale=1:2:2,angle_sensor.scale=1:2:2", "vary the same value"),
         ("thruster.budget_m_s=thruster.budget_m_s=1:2:2", "vary the same value"),
-        ("angle_sensor.scale=0:4:3", "must be greater than 0"),
         ("thruster.budget_m_s=log:0:1:3", "must be greater than 0"),
-        ("rate_sensor.scale=1:2:2", "has no numeric key"),
-        ("thruster.scale=1:2:2", "has no numeric key"),
-        ("strategy=1:2:2", "has no numeric key"),
         ("thruster.budget=1:2:2", "did you mean thruster.budget_m_s?"),
-        ("budget_m_s=1:2:2", "did you mean thruster.budget_m_s?"),
-        ("target.acceleration_m_s2=1:2:2", "target.manoeuvre: is missing"),
         *((text, FORM) for text in ("", "thruster.budget_m_s")),
         *((f"thruster.budget_m_s={text}", FORM) for text in ("1:2", "1:2:3:4", "lin:1:2:3", "inf:1:3", "1_0:20:2")),
         ("thruster.budget_m_s=" + "9" * 5000 + ":2:2", FORM),
-        ("thruster.budget_m_s=1:2:" + "9" * 5000, FORM),
         *((f"thruster.budget_m_s={text}", RISING) for text in ("2:1:3", "1:1:3", "1:2:1", "1:2:1001")),
         ("thruster.budget_m_s=1:1e99:3", "at most 1e+60"),
         ("information_set.sections=9:10:5", "are not all different"),
         ("thruster.budget_m_s=1:2:1000,nominal_range_km=5800:5801:1000", "1000000 cells are more than the limit"),
-        (",".join(["thruster.budget_m_s=1:2:2"] * 5), "at most 4 keys"),
         ("thruster.max_impulse_m_s=0.1:5:3", "asteroid-1997 with thruster.max_impulse_m_s = 0.1: thruster: "),
-        ("angle_sensor.error_at_zero_range_rad=0.1:2:2", "error bound must be positive"),
     ],
 )
 def test_what_cannot_be_varied(text: str, part: str, asteroid: Scenario) -> None:
@@ -153,18 +143,3 @@ def test_what_cannot_be_varied(text: str, part: str, asteroid: Scenario) -> None
         sweep_cells(asteroid, sweep_axes(text, asteroid))
     assert part in str(refused.value)
     assert len(str(refused.value)) < 3000
-
-
-@pytest.mark.parametrize(
-    ("key", "label"),
-    [
-        ("angle_sensor.error_at_zero_range_rad", "angle sensor: error at zero range, rad"),
-        ("uncertainty.vx_km_s.min", "uncertainty: vx min, km/s"),
-        ("information_set.sections", "information set: sections"),
-        ("range_sensor.scale", "range sensor: factor of the error bounds"),
-        ("sun.gravitational_parameter_km3_s2", "sun: gravitational parameter, km³/s²"),
-        ("a.one_m=b.two_m", "a: one = b: two, m"),
-    ],
-)
-def test_keys_as_labels(key: str, label: str) -> None:
-    assert key_label(key) == label

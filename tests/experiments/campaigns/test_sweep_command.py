@@ -12,7 +12,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.common.input_file import to_toml
 from experiments.interception.scenario_file import load_scenario
 from sim import Campaign, Scenario, estimate_hits
 from sim.requirement import share_interval
@@ -26,13 +25,6 @@ FILES = [
     "sweep.parquet",
 ]
 TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.max_impulse_m_s=log:2:8:2"
-
-
-@pytest.fixture
-def file(brief: Scenario, tmp_path: Path) -> Path:
-    path = tmp_path / "brief.toml"
-    path.write_text(to_toml(brief))
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -61,12 +53,11 @@ def test_a_sweep_of_two_keys(infoset: Command, file: Path, tmp_path: Path) -> No
     assert "random noise: miss_m p99<10 is met in" in out
 
 
-@pytest.mark.usefixtures("rendered")
 def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Command, file: Path, tmp_path: Path) -> None:
     asked = ("sweep", file, "--vary", "thruster.max_impulse_m_s=2:8:4", "--runs", 20, "--noise", "mixed")
     code, out, _ = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3")
     assert code == 0
-    assert (tmp_path / "a" / "figure-sweep-game.png").stat().st_size > 0
+    assert (tmp_path / "a" / "figure-sweep-game.png").is_file()
     table = pq.read_table(tmp_path / "a" / "sweep.parquet")
     assert table.column("noise").to_pylist() == ["random", "game"] * 4
     assert set(table.column("runs").to_pylist()) == {10}
@@ -100,15 +91,6 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Command, swept: 
     assert load_scenario(out_folder / "scenario.toml").name == "brief"
 
 
-def test_three_keys_are_a_table_only(infoset: Command, file: Path, tmp_path: Path) -> None:
-    three = f"{TWO},information_set.sections=3:5:2"
-    code, _, err = infoset("sweep", file, "--vary", three, "--runs", 2, "--out", tmp_path / "sweep")
-    assert code == 0
-    assert "a figure can show one or two keys only" in err
-    assert not [*(tmp_path / "sweep").glob("figure*")]
-    assert pq.read_table(tmp_path / "sweep" / "sweep.parquet").num_rows == 12
-
-
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
@@ -129,37 +111,6 @@ def test_what_is_wrong_is_said_before_the_work(
     given = {"--vary": TWO, "--runs": 10, "--out": "sweep"} | dict(zip(arguments[::2], arguments[1::2], strict=True))
     assert part in infoset.refused("sweep", file, *[part for pair in given.items() for part in pair])
     assert [each.name for each in tmp_path.iterdir()] == ["brief.toml"]
-
-
-@pytest.mark.parametrize("agreed", [True, False])
-def test_a_large_sweep_asks_on_a_terminal(
-    agreed: bool, infoset: Command, file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def begin(*_: object, **__: object) -> None:
-        raise NotImplementedError
-
-    monkeypatch.setattr("sim.Campaign.run", begin)
-    monkeypatch.setattr("typer.confirm", lambda *_, **__: agreed)
-    for stream in ("stdin", "stderr"):
-        monkeypatch.setattr(f"sys.{stream}.isatty", lambda: True, raising=False)
-    asked = ("sweep", file, "--vary", TWO, "--runs", 300_000, "--workers", 1)
-    for options in [("--yes",), ()] if agreed else [("--yes",)]:
-        with pytest.raises(NotImplementedError):
-            infoset(*asked, *options)
-    if not agreed:
-        assert "the sweep was not started" in infoset(*asked)[2]
-
-
-def test_twenty_runs_decide_no_99_percent_quantile(infoset: Command, file: Path, tmp_path: Path) -> None:
-    key = "angle_sensor.error_at_zero_range_rad"
-    code, out, _ = infoset("sweep", file, "--vary", f"{key}=1e-5:2e-5:2", "--runs", 20, "--out", tmp_path / "sweep")
-    assert code == 0
-    assert "miss_m p99<10 is met in 0, not met in 0, undecided in 2 of 2 cells" in out
-    assert "to add runs to the undecided cells: repeat infoset sweep with --resume and --until decided" in out
-    for cell in json.loads((tmp_path / "sweep" / "summary.json").read_text())["cells"]:
-        assert cell["required_lower"] < 10.0
-        names = ("requirement", "required_value", "required_upper", "runs_needed")
-        assert [cell[name] for name in names] == ["undecided", None, None, 535]
 
 
 def test_runs_are_added_until_each_cell_is_decided(infoset: Command, file: Path, tmp_path: Path) -> None:
@@ -208,6 +159,7 @@ def test_needed_runs_count_those_of_both_noises(infoset: Command, file: Path) ->
     assert [(cell["runs"], cell["runs_needed"]) for cell in summary["cells"][:2]] == [(20, 210), (20, 210)]
 
 
+@pytest.mark.thorough
 def test_runs_that_are_added_by_hand_are_judged_like_those_of_until(
     infoset: Command, file: Path, tmp_path: Path
 ) -> None:
@@ -249,26 +201,6 @@ def test_a_required_probability_of_a_hit(infoset: Command, file: Path, tmp_path:
         assert cell["requirement"] == expected
         assert (cell["required_lower"], cell["required_upper"]) == (estimate.lower, estimate.upper)
     assert infoset.json("report", tmp_path / "sweep", "--require", "hit > 0.5")["require"] == "hit>=0.5"
-
-
-def test_a_report_needs_what_the_requirement_is_about(infoset: Command, file: Path, swept: Path) -> None:
-    assert "the body of this sweep has no size" in infoset.refused("report", swept, "--require", "hit>=0.95")
-    assert infoset("sweep", file, "--vary", "angle_sensor.scale=1:2:2", "--runs", 2, "--out", "sweep")[0] == 0
-    err = infoset.refused("report", "sweep", "--require", "guaranteed_miss_m p50<10")
-    assert "this sweep was simulated without the bound Phi; simulate it in a new folder with infoset" in err
-
-
-def test_keys_with_the_same_values_have_a_column_each(infoset: Command, file: Path, tmp_path: Path) -> None:
-    one, other = "angle_sensor.error_at_zero_range_rad", "angle_sensor.error_at_nominal_range_rad"
-    asked = ("--vary", f"{one}={other}=1e-4:3e-4:2", "--vary", "body.radius_m=1:1000:2")
-    summary = infoset.json("sweep", file, *asked, "--runs", 5, "--out", "sweep")
-    assert [(axis["key"], axis["unit"]) for axis in summary["axes"]] == [
-        (f"{one}={other}", "rad"),
-        ("body.radius_m", "m"),
-    ]
-    rows = pd.read_parquet(tmp_path / "sweep" / "sweep.parquet")
-    assert rows[one].tolist() == rows[other].tolist() == [1e-4, 1e-4, 3e-4, 3e-4]
-    assert rows["hit_probability"].tolist()[1::2] == [1.0, 1.0]
 
 
 def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Command, swept: Path, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.common.units import length_unit, split_unit, time_unit
+from experiments.common.units import length_unit, time_unit
 
 
 @pytest.mark.parametrize(
@@ -22,9 +22,3 @@ def test_times(span_s: float, name: str, shown: float) -> None:
     unit, per_s = time_unit(span_s)
     assert unit == name
     assert span_s * per_s == pytest.approx(shown)
-
-
-def test_units_of_names() -> None:
-    assert split_unit("max_impulse_m_s") == ("max impulse", "m/s")
-    assert split_unit("gravitational_parameter_km3_s2") == ("gravitational parameter", "km\u00b3/s\u00b2")
-    assert split_unit("thruster.delay_steps") == ("thruster.delay steps", "")

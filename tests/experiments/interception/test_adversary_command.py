@@ -69,27 +69,6 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     ]
 
 
-def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path) -> None:
-    code, out, _ = infoset(
-        "adversary", "--budget", BUDGET, "--model", "guaranteed", "--no-range-sensor", "--strategy", "patient"
-    )
-    assert code == 0
-    assert "asteroid-1997, without range sensor, model guaranteed, strategy patient: 12 simulated" in out
-    lines = (
-        "patient",
-        "maximum miss of any state of the set, m",
-        "miss of the simulated truth, m",
-        "searched: starts in the uncertainty, errors within their bounds, target accelerations up to 0.005 m/s^2 "
-        "along z; objective: any-state",
-        "set never empty, set also empty",
-        "initial z, x, km",
-        "engagements, ",
-    )
-    for part in (*lines, "greater misses may exist"):
-        assert part in out
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Scenario, tmp_path: Path) -> None:
     file = tmp_path / "space.toml"
     file.write_text(to_toml(in_space(brief)))
@@ -115,6 +94,7 @@ def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Sc
         assert max(map(abs, errors)) <= sensor.error_bound(step.true_range_m) * (1.0 + 1e-9)
 
 
+@pytest.mark.thorough
 def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
     monkeypatch.setattr("sim.bound.PERIODS_LOOKED_AT", 1)  # few pairs
@@ -135,30 +115,6 @@ def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytes
     assert "the target of the scenario; objective: fixed-truth" in shown
     assert found["searched_accelerations_m_s2"] == {}
     assert "use --model guaranteed, whose set keeps the true state" in shown
-
-
-def test_the_worst_in_a_folder_as_engage_writes_it(infoset: Command, tmp_path: Path) -> None:
-    options = ("--budget", BUDGET, "--model", "paper", "--keep-set", "--out", "worst")
-    code, _, err = infoset("adversary", *options)
-    assert code == 0
-    files = sorted(each.name for each in (tmp_path / "worst").iterdir())
-    figures = [
-        f"{name}.{kind}" for name in ("figure-2-process", "figure-3-sets", "figure-approach") for kind in ("pdf", "png")
-    ]
-    assert files == [*figures, "record-worst.npz", "results.json", "scenario.toml", "steps.csv"]
-    assert all(name in err for name in files)
-    found = json.loads((tmp_path / "worst" / "results.json").read_text())
-    record = load_record(tmp_path / "worst" / "record-worst.npz")
-    assert float(record.result.miss_m[0]) == found["worst_miss_m"]
-    assert found["worst_any_state_miss_m"] == found["worst_of_search_set_kept_m"]
-    assert not record.result.set_emptied[0]
-    rows = (tmp_path / "worst" / "steps.csv").read_text().splitlines()
-    assert len(rows) == 1 + len(record.steps)
-    assert rows[1].startswith("worst-found,0,")
-    assert fingerprint(load_scenario(tmp_path / "worst" / "scenario.toml")) == found["scenario_hash"]
-    code, _, err = infoset("adversary", *options)
-    assert code == 2
-    assert "exists already" in err
 
 
 @pytest.mark.parametrize(

@@ -1,17 +1,13 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from experiments.common.input_file import to_toml
-from experiments.common.screen import number
 from experiments.interception.figures.bound import draw_bound
 from experiments.interception.scenario_file import load_scenario
 from guidance import strategy_names
@@ -21,6 +17,7 @@ from sim.bound import LowerBound, lower_bound, pair_at
 from sim.scenario import of_model
 from sim.storage.codec import fingerprint
 from sim.versions import versions
+from tests.experiments.command_line import Command
 from tests.space import in_space
 
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
@@ -29,15 +26,6 @@ KEYS = [
     *("lower_bound_m", "reached_at", "at_nominal_range", "by_label", "strategies", "value"),
 ]
 IS_VALUE = "the bound is the value of the game up to a reserve of "
-
-Infoset = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def infoset(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> Infoset:
-    """Run `infoset bound` in an empty folder."""
-    monkeypatch.setenv("COLUMNS", "80")
-    return partial(infoset, "bound")
 
 
 @pytest.fixture(scope="module")
@@ -63,17 +51,18 @@ def known(planar: LowerBound, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
+def short_file(short: Scenario, tmp_path: Path, infoset: Command) -> Path:
     file = tmp_path / "short.toml"
     file.write_text(to_toml(short))
     return file
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_bound_into_a_folder(
-    infoset: Infoset, short: Scenario, planar: LowerBound, short_file: Path, tmp_path: Path
+    infoset: Command, short: Scenario, planar: LowerBound, short_file: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "results"
-    code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed", "--budget", 3)
+    code, out, err = infoset("bound", short_file, "--out", folder, "--model", "guaranteed", "--budget", 3)
     assert (code, err) == (0, f"wrote scenario.toml, results.json, figure-bound.pdf, figure-bound.png in {folder}\n")
     assert sorted(each.name for each in folder.iterdir()) == FILES
     found = json.loads((folder / "results.json").read_text())
@@ -92,7 +81,6 @@ def test_bound_into_a_folder(
     nominal = found["at_nominal_range"]
     assert (nominal["label_m"], nominal["closing_speed_m_s"]) == (1745e3, 58e3)
     assert nominal["bound_m"] == pair_at(short, 1745e3, -58e3).bound_m <= expected.bound_m
-    assert f"at the range 1745.0 km and closing speed 58 km/s, the nominal ones: {nominal['bound_m']:.3g} m" in out
     assert [each["name"] for each in found["strategies"]] == strategy_names()
     for each in found["strategies"]:
         assert each["worst_found_m"] >= found["lower_bound_m"] * (1.0 - 1e-4)
@@ -106,12 +94,6 @@ def test_bound_into_a_folder(
         assert each["worst_of_search_set_kept_m"] == each["worst_of_search_m"]
         assert each["worst_found_m"] == max(pairs, each["worst_of_search_m"])
         assert all(all(flight["truth_kept"]) for flight in each["flights"])
-        assert each["name"] in out
-    assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
-    for title in ("pairs", "set never", "also", "closing speed", "equal measurements until", "guaranteed"):
-        assert title in out
-    assert "miss / bound: maximum miss of pairs and search, without sets that became empty" in out
-    assert re.search(r"^guaranteed: ", out, re.MULTILINE)
     best = min(found["strategies"], key=lambda each: each["worst_found_m"])
     assert found["value"] == {
         "at_least_m": found["lower_bound_m"],
@@ -121,22 +103,23 @@ def test_bound_into_a_folder(
         "best_strategy": best["name"],
         "best_strategy_worst_found_m": best["worst_found_m"],
     }
-    assert (
-        f"the value of the game is at least {found['lower_bound_m']:.3g} m; minimum of the maximum misses found: "
-        f"{best['worst_found_m']:.3g} m, of {best['name']}\n"
-    ) in out
-    assert (
-        "no upper end is proved, because of: gravity, range not exactly known, closing speed not exactly known\n"
-    ) in out
     assert IS_VALUE not in out
 
 
-def test_value_where_range_and_speed_are_known(infoset: Infoset, short: Scenario, tmp_path: Path) -> None:
+def test_value_where_range_and_speed_are_known(infoset: Command, short: Scenario, tmp_path: Path) -> None:
     box = replace(short.set_model.bounds, x_m=(1745e3, 1745e3), vx_m_s=(-58e3, -58e3))
     free = replace(short, sun=None, dispersion=box, **of_model(replace(short.set_model, bounds=box)))
     file = tmp_path / "free.toml"
     file.write_text(to_toml(free))
-    options = (file, "--strategies", "least-effort,symmetric-miss", "--json", tmp_path / "found.json", "--overwrite")
+    options = (
+        "bound",
+        file,
+        "--strategies",
+        "least-effort,symmetric-miss",
+        "--json",
+        tmp_path / "found.json",
+        "--overwrite",
+    )
     code, out, _ = infoset(*options, "--budget", 100)
     assert code == 0
     found = json.loads((tmp_path / "found.json").read_text())
@@ -149,8 +132,6 @@ def test_value_where_range_and_speed_are_known(infoset: Infoset, short: Scenario
     assert value["at_most_m"] == pytest.approx(found["lower_bound_m"] + total)
     assert found["lower_bound_m"] <= symmetric["worst_found_m"] <= value["at_most_m"] < 1.1 * found["lower_bound_m"]
     assert f"{IS_VALUE}{total:.3g} m: no strategy guarantees less than {found['lower_bound_m']:.3g} m" in out
-    assert re.search(r"^reserve, m: lower bound \S+, tangent \S+, dead zone \S+, range threshold \S+$", out, re.M)
-    assert "no upper end" not in out
     code, out, _ = infoset(*options, "--budget", 0, "--set", "thruster.budget_m_s=100")
     assert code == 0
     value = json.loads((tmp_path / "found.json").read_text())["value"]
@@ -164,13 +145,12 @@ def test_value_where_range_and_speed_are_known(infoset: Infoset, short: Scenario
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_bound_in_space(infoset: Infoset, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
+def test_bound_in_space(infoset: Command, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
     spatial = in_space(short)
     file = tmp_path / "space.toml"
     file.write_text(to_toml(spatial))
     options = ("--strategies", "symmetric-miss", "--budget", 1, "--model", "guaranteed", "--out", tmp_path / "results")
-    code, out, _ = infoset(file, *options)
-    assert code == 0
+    assert infoset("bound", file, *options)[0] == 0
     found = json.loads((tmp_path / "results" / "results.json").read_text())
     expected = lower_bound(spatial)
     assert found["disturbance_y_m_s2"] == 0.005
@@ -187,8 +167,6 @@ def test_bound_in_space(infoset: Infoset, short: Scenario, planar: LowerBound, t
     (strategy,) = found["strategies"]
     assert strategy["worst_found_m"] == max(strategy["worst_of_pairs_m"], strategy["worst_of_search_m"])
     assert strategy["worst_found_m"] <= strategy["guaranteed_m"]
-    for axis in ("y", "z"):
-        assert f"acceleration of the object along {axis} in these pairs: at most 0.005 m/s^2" in out
     (_, right) = draw_bound(spatial, expected).axes
     assert right.get_ylabel() == "offset from the midpoint, m"
     half = right.get_lines()[2].get_ydata()[-1]  # type: ignore[index]
@@ -196,7 +174,7 @@ def test_bound_in_space(infoset: Infoset, short: Scenario, planar: LowerBound, t
 
 
 def test_a_program_without_a_solution_is_one_message(
-    infoset: Infoset, short_file: Path, monkeypatch: pytest.MonkeyPatch
+    infoset: Command, short_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from sim import BoundError
 
@@ -204,59 +182,14 @@ def test_a_program_without_a_solution_is_one_message(
         raise BoundError("label 1 m")
 
     monkeypatch.setattr("experiments.interception.runs.bound.lower_bound", fail)
-    code, out, err = infoset(short_file, "-q")
+    code, out, err = infoset("bound", short_file, "-q")
     assert (code, out) == (2, "")
     assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")
 
 
-def test_figure_of_the_labels(short: Scenario, planar: LowerBound) -> None:
-    few = planar
-    left, right = draw_bound(short, few).axes
-    assert [line.get_label() for line in left.get_lines()[:2]] == ["58 km/s", "57.5 km/s"]
-    assert f"{few.bound_m:.1f} m" in {text.get_text() for text in left.texts}
-    assert "s" in right.get_xlabel()
-    np.testing.assert_array_equal(np.asarray(left.get_lines()[0].get_ydata()), few.curve(few.speeds_m_s[0])[1])
-
-
-@pytest.mark.parametrize("max_m", [40.0, 4e3])
-def test_figure_of_strategies(max_m: float, short: Scenario, planar: LowerBound) -> None:
-    worst_m = {"patient": max_m, "least-effort": 26.0, "module.OfAnEngineer": 30.0}
-    figure = draw_bound(short, planar, worst_m)
-    axes = figure.axes[2]
-    assert axes.get_xscale() == ("linear" if max_m < 100.0 else "log")
-    (marks,) = [np.asarray(line.get_xydata()) for line in axes.get_lines() if line.get_marker() == "o"]
-    assert marks.tolist() == [[26.0, 0.0], [30.0, 1.0], [max_m, 2.0]]
-    assert np.asarray(axes.get_lines()[0].get_xdata()).tolist() == [planar.bound_m] * 2
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["least-effort", "module.OfAnEngineer", "patient"]
-    assert [text.get_text() for text in axes.texts] == ["26 m", "30 m", f"{number(max_m)} m"]
-
-
-@pytest.mark.usefixtures("unrendered")
-def test_bound_by_one_motion(infoset: Infoset, short: Scenario, tmp_path: Path) -> None:
-    """From 1.1 km with impulses of at most 0.5 m/s, for which 30 s are too few."""
-    model = short.set_model
-    box = replace(model.bounds, z_m=(900.0, 1100.0), vz_m_s=(0.0, 0.0))
-    weak = replace(short, thruster=replace(short.thruster, max_impulse_m_s=0.5))
-    weak = replace(weak, **of_model(replace(model, bounds=box)), dispersion=box)
-    file = tmp_path / "weak.toml"
-    file.write_text(to_toml(weak))
-    options = ("--strategies", "symmetric-miss", "--budget", 0, "--out", tmp_path / "results")
-    code, out, _ = infoset(file, *options)
-    assert code == 0
-    assert "one motion: a start that all impulses together do not bring nearer" in out
-    assert "one motion\n" in out.replace(" \n", "\n")
-    found = json.loads((tmp_path / "results" / "results.json").read_text())
-    assert found["reached_at"]["motions"] == 1
-    assert found["lower_bound_m"] > 1.1e3 - 0.5 * 61 * 0.5 * 30.5
-    assert found["strategies"][0]["worst_of_pairs_m"] >= found["lower_bound_m"]
-    (_, right) = draw_bound(weak, lower_bound(weak)).axes
-    assert right.get_title("left") == "(b) state that proves the bound"
-    assert right.get_lines()[0].get_ydata()[-1] > found["lower_bound_m"]  # type: ignore[index]
-
-
 @pytest.mark.thorough
-def test_bound_of_the_published_scenario_in_the_guaranteed_model(infoset: Infoset) -> None:
-    code, out, _ = infoset("asteroid-1997", "--model", "guaranteed", "--json", "-")
+def test_bound_of_the_published_scenario_in_the_guaranteed_model(infoset: Command) -> None:
+    code, out, _ = infoset("bound", "asteroid-1997", "--model", "guaranteed", "--json", "-")
     assert code == 0
     found = json.loads(out)
     assert 24.0 < found["lower_bound_m"] < 25.0

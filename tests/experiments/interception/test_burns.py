@@ -38,12 +38,6 @@ def test_the_burns_of_a_schedule(infoset: Command) -> None:
     assert burns_key(load_scenario("asteroid-1997", SETTINGS), results)["burns"] in [curve["burns"] for curve in curves]
 
 
-def test_without_a_schedule_there_are_no_burns(infoset: Command) -> None:
-    arguments = ["experiment", "asteroid-1997", "--runs", 2, "--set", "thruster.last_impulse_s=20.0"]
-    assert "burn" not in infoset(*arguments, "--json", "results.json")[1]
-    assert not any("burns" in curve for curve in strict(Path("results.json").read_text())["curves"])
-
-
 def test_burns_are_columns_of_the_results() -> None:
     scenario = load_scenario("asteroid-1997", SETTINGS)
     results = simulate(scenario, 4)

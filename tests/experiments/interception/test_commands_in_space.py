@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -12,13 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.common.input_file import to_toml
 from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario, with_model
-from infoset import Model
-from sim import Scenario, simulate
+from experiments.interception.scenario_file import load_scenario
+from sim import simulate
 from tests.experiments.command_line import Command, strict
-from tests.space import in_space
 
 ANGLES = ["measured_angle_y_rad", "measured_angle_z_rad"]
 OF_A_STEP = [
@@ -28,19 +24,12 @@ OF_A_STEP = [
 IMPULSES = ["impulse_m_s", "impulse_y_m_s", "impulse_z_m_s"]
 
 
-@pytest.fixture
-def file(brief: Scenario, tmp_path: Path) -> Path:
-    path = tmp_path / "space.toml"
-    path.write_text(to_toml(in_space(brief)))
-    return path
-
-
 def rows(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
-def test_the_files_of_engage_name_the_axis(file: Path, infoset: Command) -> None:
-    code, out, err = infoset("engage", file, "--record", "r.npz", "--json", "r.json", "--csv", "r.csv")
+def test_the_files_of_engage_name_the_axis(space_file: Path, infoset: Command) -> None:
+    code, out, err = infoset("engage", space_file, "--record", "r.npz", "--json", "r.json", "--csv", "r.csv")
     assert code == 0
     assert err.endswith("wrote r.json, r.csv, r.npz\n")
     record = load_record("r.npz")
@@ -65,19 +54,10 @@ def test_the_files_of_engage_name_the_axis(file: Path, infoset: Command) -> None
     assert re.search(rf"^miss along z, m +{written['miss_z_m']:.3g}$", out, re.MULTILINE)
 
 
-def test_a_table_of_a_plane_and_of_space(file: Path, brief_file: Path, infoset: Command) -> None:
-    infoset("engage", file, "--record", "space.npz", "--quiet")
-    infoset("engage", brief_file, "--record", "plane.npz", "--quiet")
-    _, out, _ = infoset("replay", "plane.npz", "space.npz")
-    assert re.search(r"^miss along y, m +- +-?\d", out, re.MULTILINE)
-    _, alone, _ = infoset("replay", "plane.npz")
-    assert "along" not in alone
-
-
-def test_the_files_of_experiment_have_the_columns_of_space(file: Path, infoset: Command) -> None:
-    code, _, _ = infoset("experiment", file, "--runs", 3, "--json", "x.json", "--csv", "x.csv")
+def test_the_files_of_experiment_have_the_columns_of_space(space_file: Path, infoset: Command) -> None:
+    code, _, _ = infoset("experiment", space_file, "--runs", 3, "--json", "x.json", "--csv", "x.csv")
     assert code == 0
-    scenario = load_scenario(str(file))
+    scenario = load_scenario(str(space_file))
     flown = simulate(replace(scenario, range_sensor=None), 3).to_dict()
     lateral = ("start_y_m", "start_vy_m_s", "miss_y_m", "miss_z_m")
     table = rows(Path("x.csv").read_text())
@@ -88,29 +68,6 @@ def test_the_files_of_experiment_have_the_columns_of_space(file: Path, infoset: 
         flown[name] for name in ("miss_m", "miss_y_m", "miss_z_m")
     ]
     assert not {"start_y_m", "start_z_m"} & set(curve)
-
-
-def test_experiment_says_what_the_guaranteed_model_assumes_along_each_axis(file: Path, infoset: Command) -> None:
-    settings = ["--set", "information_set.disturbance_y_m_s2=0.002", "--set", "thruster.pointing_error_rad=0.001"]
-    _, out, _ = infoset("experiment", file, "--runs", 1, "--model", "guaranteed", *settings)
-    (line,) = [line for line in out.splitlines() if line.startswith("the guaranteed model assumes")]
-    assert "acceleration along y at most 0.002" in line
-    assert "acceleration along z at most 0.005" in line
-    assert line.endswith("error of their direction at most 0.001 rad")
-
-
-def test_compare_in_space(file: Path, infoset: Command) -> None:
-    arguments = ["compare", file, "--runs", 2, "--strategies", "patient,kalman,zero-effort-miss"]
-    code, out, _ = infoset(*arguments, "--json", "c.json", "--csv", "c.csv")
-    assert code == 0
-    assert "kalman" in out
-    table = rows(Path("c.csv").read_text())
-    scenario = load_scenario(str(file))
-    flown = simulate(with_model(replace(scenario, strategy="patient"), Model.GUARANTEED), 2).to_dict()
-    first = [row for row in table if row["strategy"] == "patient" and row["noise"] == "random"]
-    for name in ("miss_y_m", "miss_z_m"):
-        assert [float(row[name]) for row in first] == flown[name]
-    assert len(json.loads(Path("c.json").read_text())["strategies"]) == 6
 
 
 OWN = """
@@ -131,15 +88,15 @@ class Mine:
 
 
 @pytest.mark.parametrize("spatial", [False, True])
-def test_a_strategy_of_a_file_gets_one_axis_or_both(spatial: bool, file: Path, infoset: Command) -> None:
+def test_a_strategy_of_a_file_gets_one_axis_or_both(spatial: bool, space_file: Path, infoset: Command) -> None:
     whole, none = f"strategy_{spatial}.py", f"nothing_{spatial}.py"
     Path(whole).write_text(OWN.format(spatial=spatial, more=""))
-    code, out, err = infoset("engage", file, "--strategy", f"{whole}:Mine", "--json", "-")
+    code, out, err = infoset("engage", space_file, "--strategy", f"{whole}:Mine", "--json", "-")
     assert code == 0, err
     steps = strict(out)["steps"]
     assert max(abs(step["impulse_y_m_s"]) for step in steps) > 0.0
     Path(none).write_text(OWN.format(spatial=spatial, more="[:, :0]" if spatial else "[:0]"))
-    code, _, message = infoset("engage", file, "--strategy", f"{none}:Mine")
+    code, _, message = infoset("engage", space_file, "--strategy", f"{none}:Mine")
     assert code == 2
     assert f"{none}: ValueError: strategy Mine must return" in message
     assert ("shape (2, 1), along y and z" in message) == spatial

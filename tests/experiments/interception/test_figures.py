@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -16,15 +14,14 @@ from matplotlib.patches import Polygon
 
 from experiments.common.figure_style import figure_bytes
 from experiments.interception.figures.comparison import draw_comparison
-from experiments.interception.figures.distributions import axis_limit, draw_distributions
+from experiments.interception.figures.distributions import draw_distributions
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, choose_sections, draw_sets
 from experiments.interception.scenario_file import load_scenario
 from experiments.interception.study import Comparison, Curve, curve_scenarios
 from guidance import NoiseKind, TieRule
-from infoset import ConvexPolygons
 from infoset.arrays import Floats
-from sim import Record, Results, StepRecord, fly_one, simulate
+from sim import Record, Results, fly_one, simulate
 
 UNITS = (", m", ", s", ", m/s", ", mrad", ", µrad/s", "share of runs")
 RUNS = 6
@@ -42,11 +39,6 @@ def curves() -> list[Curve]:
         Curve(number, flown.noise, flown.range_sensor is not None, simulate(flown, runs=RUNS))
         for number, flown in curve_scenarios(load_scenario("asteroid-1997"))
     ]
-
-
-def along_z(step: StepRecord, **values: Any) -> StepRecord:
-    """A step of a plane with some values of its axis replaced."""
-    return replace(step, axes={"z": replace(step.axes["z"], **values)})
 
 
 def points(axes: Axes, label: str) -> Floats:
@@ -91,12 +83,6 @@ def test_process_has_four_rows_of_equal_limits_and_units(records: list[Record]) 
         np.testing.assert_array_equal(np.stack([lower, upper], axis=1), misses)
 
 
-def test_process_says_what_a_curve_beyond_the_axes_reaches(records: list[Record]) -> None:
-    last = records[1].steps[-1]
-    title = draw_process(records).axes[5].get_title()
-    assert title == f"reaches \N{MINUS SIGN}{abs(last.true_rate_rad_s) * 1e3:.3g} mrad/s"
-
-
 def test_sets_show_truth_measurement_and_sections(records: list[Record]) -> None:
     figure = draw_sets(records)
     assert len(figure.axes) == 6
@@ -118,32 +104,12 @@ def test_sets_show_truth_measurement_and_sections(records: list[Record]) -> None
     assert len(legend(figure)) == 4
 
 
-def test_sets_without_a_measurement_or_a_section(records: list[Record]) -> None:
-    blind = replace(records[0], steps=tuple(along_z(step, measured={}) for step in records[0].steps))
-    assert len(legend(draw_sets([blind]))) == 2
-    (axes,) = draw_sets(records[1:], times_s=(500.0,)).axes
-    assert axes.get_title("left") == f"game noise,\nt = {records[1].steps[-1].time_s:g} s, no section is left"
-
-
 def test_chosen_sections_keep_the_ends(records: list[Record]) -> None:
     sections = records[0].steps[0].sections
     for most in (2, 3, 5, 100):
         chosen = choose_sections(sections, most)
         assert (chosen[0], chosen[-1]) == (sections[0], sections[-1])
         assert len(chosen) == min(most, len(sections))
-
-
-@pytest.mark.parametrize("vertices", [[(0.0, -8000.0)], [(0.0, -8000.0), (50.0, -8000.0)]], ids=["point", "segment"])
-def test_a_degenerate_section_of_a_single_step_is_visible(
-    records: list[Record], vertices: Sequence[tuple[float, float]]
-) -> None:
-    step = records[0].steps[0]
-    section = replace(step.sections[0], polygon=ConvexPolygons(np.array(vertices), len(vertices)))
-    record = replace(records[0], steps=(replace(step, sections=(section,)),))
-    (axes,) = draw_sets([record], times_s=(0.5,)).axes
-    (drawn,) = [each for each in axes.lines if each.get_label() not in (TRUTH_MARK, MEASUREMENT_MARK)]
-    assert (drawn.get_marker(), len(data(drawn))) == ("o", len(vertices))
-    assert figure_bytes(draw_process([record]))
 
 
 def test_distributions_draw_the_curves_and_their_bands(curves: list[Curve]) -> None:
@@ -161,48 +127,6 @@ def test_distributions_draw_the_curves_and_their_bands(curves: list[Curve]) -> N
             for edge in (np.maximum(share - half, 0.0), np.minimum(share + half, 1.0)):
                 for corner in zip(sample, edge, strict=True):
                     assert np.isclose(band, corner).all(axis=1).any()
-
-
-def test_the_radius_of_the_body_is_a_line_with_a_label(curves: list[Curve]) -> None:
-    inside = float(np.median(curves[0].results.miss_m))
-    for radius, drawn, where in ((inside, 2, "a smaller miss is a hit"), (1e6, 0, "beyond the axis")):
-        figure = draw_distributions(curves, radius_m=radius)
-        label = f"body radius, {radius:g} m: {where}"
-        assert points(figure.axes[0], label)[:, 0].tolist() == [radius] * drawn
-        assert legend(figure)[-1] == label
-
-
-def made_up(curve: Curve, miss_m: Floats, impulse_m_s: Floats) -> Curve:
-    """Return a curve with made-up misses and impulses."""
-    alike: Results = curve.results.take(np.zeros(len(miss_m), dtype=int))
-    results = replace(alike, runs=np.arange(len(miss_m)), miss_m=miss_m, impulse_m_s=impulse_m_s)
-    return replace(curve, results=results)
-
-
-def test_few_huge_misses_leave_the_axis_legible(curves: list[Curve]) -> None:
-    miss = np.linspace(1.0, 2.0, 40)
-    miss[3] = 8e4
-    (axes, _) = draw_distributions([made_up(curves[0], miss, np.linspace(100.0, 200.0, 40))]).axes
-    assert axes.get_xlim()[1] < 3.0
-    assert axes.get_xlabel() == "miss, m\nruns beyond the axis: 1 of 40"
-    assert axis_limit([np.append(np.linspace(1.0, 2.0, 40), 8e4)]) == 2.0
-
-
-def test_curves_decades_apart_have_a_logarithmic_axis(curves: list[Curve]) -> None:
-    far = [
-        made_up(curve, curve.results.miss_m + 5e3 * (curve.number > 2), curve.results.impulse_m_s) for curve in curves
-    ]
-    (miss, impulse) = draw_distributions(far).axes
-    assert (miss.get_xscale(), impulse.get_xscale()) == ("log", "linear")
-    assert miss.get_xlim()[1] > max(float(curve.results.miss_m.max()) for curve in far)
-
-
-def test_equal_values_are_drawn(curves: list[Curve]) -> None:
-    figure = draw_distributions([made_up(curves[0], np.zeros(RUNS), np.full(RUNS, 5.0))])
-    assert [kind for kind, content in figure_bytes(figure) if content] == ["pdf", "png"]
-    for axes, value in zip(figure.axes, (0.0, 5.0), strict=True):
-        minimum, maximum = axes.get_xlim()
-        assert minimum <= value < maximum
 
 
 @pytest.mark.parametrize(
@@ -225,10 +149,3 @@ def test_files_are_written_twice_the_same_and_nothing_global_is_touched(curves: 
     (_, pdf), (_, png) = first
     assert (pdf[:4], png[:4]) == (b"%PDF", b"\x89PNG")
     assert dict(mpl.rcParams) == before
-
-
-def test_nothing_to_draw_is_an_error() -> None:
-    with pytest.raises(ValueError, match="at least one record"):
-        draw_process([])
-    with pytest.raises(ValueError, match="at least one record"):
-        draw_sets([])

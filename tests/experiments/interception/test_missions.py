@@ -26,13 +26,13 @@ def test_an_impactor_hits_and_its_guarantee_holds(name: str, noise: NoiseKind) -
 
 
 def test_three_impulses_meet_the_requirement_of_deep_impact() -> None:
-    results = simulate(load_scenario("deep-impact-2005"), runs=3)
+    results = simulate(load_scenario("deep-impact-2005"), runs=1)
     assert results.truth_kept.all()
     assert (results.miss_m <= results.guaranteed_miss_m).all()
     assert results.miss_m.max() < 700.0
     burns_m_s = results.burns_m_s
     assert burns_m_s is not None
-    assert burns_m_s.shape == (3, 3)
+    assert burns_m_s.shape == (1, 3)
     assert burns_m_s.sum(axis=1) == pytest.approx(results.impulse_m_s)
 
 

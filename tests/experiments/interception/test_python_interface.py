@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import sim
-from experiments import find_worst, fly_one, load_scenario, lower_bound, plot, save, simulate
+from experiments import find_worst, fly_one, load_scenario, lower_bound, save, simulate
 from experiments.common.errors import InputError
 from sim import Record, Results
 from sim.results import join
@@ -92,13 +91,6 @@ def test_only_results_in_space_have_the_columns_of_the_second_axis(results: Resu
     save(spatial, tmp_path / "results.csv")
     (head, *_) = csv.reader((tmp_path / "results.csv").read_text().splitlines())
     assert [name for name in head if name in columns] == columns
-
-
-def test_results_and_records_are_drawn(results: Results, record: Record) -> None:
-    figure = plot(results)
-    assert isinstance(figure, Figure)
-    assert [axes.get_xlabel() for axes in figure.axes] == ["miss, m", "impulse spent, m/s"]
-    assert len(plot(record).axes) == len(plot([record]).axes) == 4
 
 
 def test_pandas_gets_the_columns(results: Results) -> None:

@@ -13,7 +13,7 @@ from experiments.common.units import si_factor
 from experiments.interception.scenario_file import load_scenario, scenario_warnings, with_model
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
-from infoset.model import InitialSet, Model, SetModel, SetSettings, StateBox
+from infoset.model import Model, SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
 from sim.scenario import Body, Scenario, Sun, Target, of_model
 from sim.storage.codec import fingerprint
@@ -101,7 +101,6 @@ def test_the_start_for_an_own_scenario_has_every_key() -> None:
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
-        (["information_set.sections=3"], "sections must be at least fewest_sections, 5: got 3"),
         (["range_sensor.period_s=0.7"], "range_sensor.period_s must be a whole number of steps of 0.5 s: got 0.7 s"),
         (
             ["information_set.range_threshold_km=5500"],
@@ -109,18 +108,11 @@ def test_the_start_for_an_own_scenario_has_every_key() -> None:
         ),
         (["angle_sensor.error_at_nominal_range_rad=1e-6"], "its error bound must be positive up to the maximum"),
         (["sun.distance_km=6000"], "sun.distance_m must be greater than the maximum possible range"),
-        (["body.radius_km=5400"], "body.radius_m must be less than the minimum possible range"),
-        (["thruster.max_impulse_m_s=0.1"], "min_impulse_m_s must not exceed max_impulse_m_s"),
-        (["thruster.impulses_s=[20, 60]"], "impulses_s, times before the arrival, must decrease"),
         (["thruster.impulses_s=[200]"], "thruster.impulses_s: the first impulse can be given 100.022 s before"),
         (["thruster.last_impulse_s=101"], "thruster.last_impulse_s excludes all impulses"),
-        (["angle_sensor.first_image_s=1", "angle_sensor.last_image_s=2"], "first_image_s must be at least last_image"),
-        (["angle_sensor.pixel_error_rad=1e-5"], "with pixel_error_rad, a camera, leave out error_at_nominal_range"),
         (["angle_sensor.centroid_error_m=10"], "or pixel_error_rad and centroid_error_m of a camera"),
         (["angle_sensor.bias=constant"], "bias can be constant only for a camera"),
         (["uncertainty.y_km=[-1, 1]"], "y_m and vy_m_s must both be set, or neither: vy_m_s is missing"),
-        (["dispersion.y_km=0", "dispersion.vy_km_s=0"], "uncertainty and dispersion must both have y_m and vy_m_s"),
-        (["sun.elevation_deg=10"], "sun.elevation_rad is a value of an engagement in space"),
         (["angle_sensor.error_at_zero_range_y_rad=1e-4"], "angle_sensor holds a value of an engagement in space"),
         (
             ["information_set.model=guaranteed", "information_set.initial_set=box", "uncertainty.vx_km_s=[-120, -57]"],
@@ -177,28 +169,11 @@ def test_fingerprint_is_of_the_values_not_of_the_writing() -> None:
     assert fingerprint(zero) == fingerprint(positive)
 
 
-def test_hash_tells_choices_apart() -> None:
-    scenario = load_scenario("asteroid-1997")
-    variants = [
-        scenario,
-        dataclasses.replace(scenario, sun=None),
-        dataclasses.replace(scenario, range_sensor=None),
-        dataclasses.replace(scenario, noise=NoiseKind.GAME),
-        dataclasses.replace(scenario, tie=TieRule.LOWER),
-        dataclasses.replace(scenario, strategy="mine"),
-        dataclasses.replace(scenario, **of_model(dataclasses.replace(scenario.set_model, initial_set=InitialSet.BOX))),
-    ]
-    assert len({fingerprint(each) for each in variants}) == len(variants)
-
-
 @pytest.mark.parametrize(
     ("setting", "part"),
     [
         ("dispersion.z_km=[-1.0, 12.0]", "dispersion.z_m reaches 2000 m above uncertainty.z_m"),
-        ("dispersion.z_km=-10.5", "dispersion.z_m reaches 500 m below uncertainty.z_m"),
-        ("dispersion.vz_km_s=[-0.1, 0.25]", "dispersion.vz_m_s reaches 150 m/s above"),
         ("closing_speed_km_s=60.0", "closing_speed_m_s is 1000 m/s outside uncertainty.vx_m_s"),
-        ("closing_speed_km_s=56.0", "closing_speed_m_s is 1000 m/s outside uncertainty.vx_m_s"),
         ("nominal_range_km=5801300", "nominal_range_m is 5.8013e+09 m, far outside uncertainty.x_m"),
         ("thruster.budget_m_s=0.2", "no impulse can be given"),
     ],

@@ -4,32 +4,24 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
-from PIL import Image, ImageSequence
 
-from experiments.common.input_file import to_toml
-from experiments.interception.course import Clock, Courses, duration_text, possible_misses, true_predicted_misses
-from experiments.interception.figures.animation import animate
+from experiments.common.figure_style import figure_bytes
+from experiments.interception.course import Courses, possible_misses, true_predicted_misses
 from experiments.interception.figures.approach import draw_approach
-from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, max_guarantee
+from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse
 from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
-from experiments.interception.figures.sets import choose_sections, draw_sets
 from experiments.interception.scenario_file import load_scenario
 from experiments.interception.study import Curve
 from guidance import NoiseKind
 from infoset.arrays import Floats
-from sim import Record, Results, Scenario, fly_one, simulate
+from sim import Record, Results, fly_one, simulate
 from sim.scenario import of_model
-from tests.experiments.command_line import Command
-from tests.space import in_space
 
 RUNS = 12
 AXES = ("y", "z")
@@ -64,6 +56,7 @@ def legend(figure: Figure) -> list[str]:
 
 def test_the_b_plane_shows_each_miss_and_the_circles_of_its_quantiles(results: Results) -> None:
     figure = draw_b_plane([cloud("random noise", [results])])
+    assert all(content for _, content in figure_bytes(figure))
     (axes,) = figure.axes
     np.testing.assert_array_equal(drawn(axes)["miss of one run"], results.lateral_miss.data)
     quantiles = {MEDIAN: np.quantile(results.miss_m, 0.5), NINETY: np.quantile(results.miss_m, 0.9)}
@@ -85,16 +78,6 @@ def test_with_several_results_of_a_run_the_worst_is_drawn(results: Results) -> N
     np.testing.assert_array_equal(worst.across_m[~worse], near.lateral_miss.data[~worse])
 
 
-def test_the_radius_of_the_body_is_a_disc_in_front_of_which_all_is_drawn(results: Results) -> None:
-    one = cloud("random noise", [results])
-    (axes,) = draw_b_plane([one], 4.0).axes
-    (disc,) = axes.patches
-    assert np.hypot(*np.asarray(disc.get_path().vertices).T).max() == pytest.approx(4.0)
-    assert disc.get_zorder() < min(line.get_zorder() for line in axes.lines)
-    for radius in (None, 1e6):
-        assert not draw_b_plane([one], radius).axes[0].patches
-
-
 def test_ellipses_contain_their_share_of_the_runs() -> None:
     numbers = np.random.default_rng(3)
     across = numbers.normal(size=(400, 2)) @ np.array([[3.0, 1.0], [0.0, 0.5]]) + [4.0, -2.0]
@@ -108,39 +91,6 @@ def test_ellipses_contain_their_share_of_the_runs() -> None:
     assert ellipse(np.outer(np.arange(9.0), [1.0, 2.0]), 0.5) is None
     figure = draw_b_plane([Cloud("many", across, np.hypot(*across.T))])
     assert {"ellipse: 50 % of the runs", "ellipse: 99 % of the runs"} <= set(legend(figure))
-
-
-def test_the_max_guaranteed_miss_of_the_runs_is_a_circle(results: Results) -> None:
-    bound = float(results.guaranteed_miss_m.max())
-    assert cloud("paper model", [results]).guaranteed_m is None
-    sound = cloud("guaranteed", [replace(results, guarantees=True)])
-    assert sound.guaranteed_m == bound
-    figure = draw_b_plane([replace(sound, guaranteed_m=1.5 * float(results.miss_m.max()))])
-    assert circles(figure.axes[0])[GUARANTEE] == pytest.approx(1.5 * float(results.miss_m.max()))
-    far = draw_b_plane([replace(sound, guaranteed_m=1e5)]).axes[0]
-    assert GUARANTEE not in circles(far)
-    assert far.get_title("left").endswith("maximum Φ 100000.0 m")
-    assert max_guarantee([3.0, np.inf]) is None
-
-
-def test_samples_that_differ_much_have_limits_for_each_panel(results: Results) -> None:
-    small = cloud("small", [results])
-    large = Cloud("large", 20.0 * small.across_m, 20.0 * small.miss_m)
-    alike, unlike = draw_b_plane([small, small]), draw_b_plane([small, large])
-    assert alike.axes[0].get_xlim() == alike.axes[1].get_xlim()
-    assert unlike.axes[1].get_xlim()[1] == pytest.approx(20.0 * unlike.axes[0].get_xlim()[1])
-    assert unlike.legends[0].get_title().get_text() == "The scale differs from panel to panel."
-    across = np.column_stack([np.linspace(1.0, 2.0, 40), np.linspace(-1.0, 1.0, 40)])
-    across[3] = 8e4
-    (axes,) = draw_b_plane([Cloud("lost", across, np.hypot(*across.T))]).axes
-    assert axes.get_xlim()[1] < 5.0
-    assert [text.get_text() for text in axes.texts] == ["beyond the axes: 1 of 40"]
-
-
-def test_quantiles_that_the_runs_do_not_show_are_left_out() -> None:
-    across = np.array([[1.0, 0.0], [0.0, 2.0]])
-    figure = draw_b_plane([Cloud("two", across, np.array([1.0, 2.0]))])
-    assert set(circles(figure.axes[0])) == {MEDIAN}
 
 
 def test_process_has_the_courses_of_both_axes_and_the_moduli_of_impulses(records: list[Record]) -> None:
@@ -167,44 +117,6 @@ def test_process_has_the_courses_of_both_axes_and_the_moduli_of_impulses(records
             lower = [step.predicted_miss_m[0] for step in along if step.predicted_miss_m is not None]
             assert any(np.array_equal(np.asarray(line.get_ydata()), lower) for line in axes.lines)
         assert axes.get_ylim() == figure.axes[2 * row].get_ylim()
-
-
-def test_the_sets_of_both_planes_are_side_by_side(records: list[Record]) -> None:
-    figure = draw_sets(records[:1], (0.5, 8.0))
-    for number, axes in enumerate(figure.axes):
-        step, axis = records[0].steps[(1, 16)[number // 2]], AXES[number % 2]
-        assert axes.get_xlabel() == f"rate $\\omega_{axis}$, µrad/s"
-        assert axes.get_ylabel().startswith(f"angle $\\alpha_{axis}$, ")
-        chosen = choose_sections(step.sections, 5)
-        polygons = [section.omega_alpha if axis == "z" else section.omega_alpha_y for section in chosen]
-        outlines = [np.asarray(patch.get_xy()) for patch in axes.patches if isinstance(patch, Polygon)]
-        for outline, polygon in zip(outlines, polygons, strict=True):
-            assert polygon is not None
-            np.testing.assert_allclose(outline[:-1], polygon.polygon() * [1e6, 1e3])
-    early = draw_sets([fly_one(load_scenario("haiv-2013"))], (3600.0,)).axes[0]
-    assert early.get_ylabel() == "angle $\\alpha_y$, µrad"
-
-
-def test_an_animation_shows_both_axes(brief: Scenario) -> None:
-    records = [fly_one(replace(in_space(brief), noise=kind)) for kind in NoiseKind]
-    sizes = []
-    for shown in (records[:1], records):
-        with Image.open(BytesIO(animate(shown, 2))) as animation:
-            sizes.append((animation.size[0], len(list(ImageSequence.Iterator(animation)))))
-    assert sizes == [(640, 2), (1280, 2)]
-
-
-@pytest.mark.parametrize("name", ["experiment", "compare"])
-@pytest.mark.parametrize("spatial", [False, True])
-@pytest.mark.usefixtures("unrendered")
-def test_commands_write_a_b_plane_of_each_noise_in_space_only(
-    infoset: Command, brief: Scenario, tmp_path: Path, name: str, spatial: bool
-) -> None:
-    (tmp_path / "brief.toml").write_text(to_toml(in_space(brief) if spatial else brief))
-    strategies = ("--strategies", "patient") if name == "compare" else ()
-    assert infoset(name, "brief.toml", "--runs", "2", "--out", "out", *strategies)[0] == 0
-    written = {file.stem for file in (tmp_path / "out").glob("figure-b-plane-*.png")}
-    assert written == ({"figure-b-plane-random", "figure-b-plane-game"} if spatial else set())
 
 
 def scheduled(record: Record) -> Record:
@@ -300,42 +212,3 @@ def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
     assert left.get_xlim() == left_impulse.get_xlim()
     assert {"impulse: median", "guaranteed miss Φ", "body radius, 50 m", "times of the schedule"} <= set(legend(figure))
     assert "impulse: 90 %" not in legend(figure)
-
-
-def test_long_flights_and_schedules_have_a_logarithmic_time_axis(records: list[Record]) -> None:
-    assert not Clock.of(records).counts_down
-    record = scheduled(records[0])
-    assert Clock.of([record]).counts_down
-    clock, arrival_s = Clock.of([record]), record.scenario.nominal_arrival_s
-    times = {-10.0: "10 s to go", 1e-12: "at the nominal arrival", 2.0: "2 s after the nominal arrival"}
-    assert [clock.text(record, arrival_s + time_s) for time_s in times] == [*times.values()]
-    assert Clock.of([replace(records[0], steps=2 * records[0].steps)]).counts_down
-    assert {axes.get_xscale() for axes in draw_process([record]).axes} == {"log"}
-    texts = [duration_text(each) for each in (0.5, 59.0, 60.0, 100.0, 150.0, 14400.0, 86400.0)]
-    assert texts == ["0.5 s", "59 s", "1 min", "100 s", "2.5 min", "4 h", "1 d"]
-
-
-def test_the_axis_of_impulses_extends_to_small_impulses(records: list[Record]) -> None:
-    scenario = records[0].scenario
-    strong = replace(scenario, thruster=replace(scenario.thruster, max_impulse_m_s=1e3))
-    figure = draw_process([replace(records[0], scenario=strong)])
-    maximum = max(step.impulse_m_s for step in records[0].steps)
-    assert figure.axes[4].get_ylim() == pytest.approx((-1.2 * maximum, 1.2 * maximum))
-    assert "maximum 1000 m/s, beyond the axis" in legend(figure)
-
-
-def test_process_of_a_long_flight_shows_errors_moduli_and_the_true_miss(records: list[Record]) -> None:
-    record = scheduled(records[0])
-    figure = draw_process([record])
-    errors, rates, _, misses = (figure.axes[2 * row] for row in range(4))
-    seen = [step for step in record.steps if "angle" in step.axes["y"].measured]
-    expected = [1e6 * (step.axes["y"].measured["angle"] - step.axes["y"].true_angle_rad) for step in seen]
-    np.testing.assert_allclose(drawn(errors)["error of the measured angle"][:, 1], expected)
-    sensor = record.scenario.set_model.angle_sensor
-    (band,) = errors.collections
-    ends = np.asarray(band.get_paths()[0].vertices)[:, 1]
-    assert ends.max() == pytest.approx(1e6 * max(float(sensor.error_bound(step.true_range_m)) for step in seen))
-    assert np.abs(expected).max() <= ends.max()
-    true = [1e6 * abs(step.axes["y"].true_rate_rad_s) for step in record.steps]
-    np.testing.assert_allclose(drawn(rates)["true value"][:, 1], true)
-    np.testing.assert_allclose(drawn(misses)["true value"][:, 1], true_predicted_misses(record)["y"])

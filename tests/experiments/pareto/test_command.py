@@ -6,11 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.patches import Rectangle
 
-from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
-from experiments.pareto.file import load_pareto
-from rendezvous.pareto import solve_encounter, sweep_meeting_time
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command, strict
 
@@ -107,88 +103,14 @@ def test_a_preferred_meeting_that_is_none(infoset: Command, preferred: str) -> N
     [
         (changed("duration_s = 30.0", "duration_s = 1e9"), "duration_s is 1.18e+06 radians of the orbit"),
         (
-            changed('free = ["x", "z"]', "free = []"),
-            "name one or more free components",
-        ),
-        (
             changed('free = ["x", "z"]', 'free = ["x", "x"]'),
             "name one or more free components",
         ),
-        (changed("y_m = 0.0", "x_m = 5.0"), "terminal.x_m: must be left out, because free lists x"),
         (changed('free = ["x", "z"]', 'free = ["vy"]\nmeet = "intercept"'), "free only x, y and z"),
         (EXAMPLE.replace("weight = 1.0", "").replace("velocity_m_s", "weight = 0\nvelocity_m_s"), "weights are zero"),
         (changed("weight = 1.0", "start_s = 30.0"), "craft 'first': it must start before the meeting at 30.0 s"),
-        (changed('name = "second"', 'name = "first"'), "two craft have the same name"),
-        (HEAD + 51 * f"[[craft]]{CRAFT[1]}", "craft: Tuple should have at most 50 items"),
-        (HEAD, "craft: is missing"),
     ],
 )
 def test_unsound_files_are_refused(text: str, told: str, infoset: Command, mine: Callable[[str], Path]) -> None:
     assert told in infoset.refused("pareto", mine(text), "--json", "x.json")
     assert not Path("x.json").exists()
-
-
-LATE = """
-kind = "pareto-encounter"
-orbit_rate_rad_s = 6.53e-05
-duration_s = 28.9
-free = ["x"]
-meet = "intercept"
-[terminal]
-y_m = -66.4
-z_m = 87.7
-[[craft]]
-name = "c0"
-position_m = [-32.06, -67.6, -3.53]
-velocity_m_s = [0.00448, 0.1554, -0.00445]
-[[craft]]
-name = "c1"
-position_m = [-6724.3, 5328.8, 3198.4]
-velocity_m_s = [0.0145, -0.0593, -0.0749]
-weight = 0.0
-start_s = 0.1
-[[craft]]
-name = "c2"
-position_m = [-5.078, 21.6, -53.25]
-velocity_m_s = [0.0015925, 0.1168, -0.0245]
-weight = 4.85
-start_s = 15.28
-"""
-
-
-@pytest.mark.parametrize(("wanted", "nearest"), [(500.0, max), (-1e5, min)])
-def test_a_preferred_meeting_of_craft_that_start_late(
-    wanted: float, nearest: Callable[[list[float]], float], infoset: Command, mine: Callable[[str], Path]
-) -> None:
-    # With one free component the Pareto set is all between the minimum and the maximum ideal.
-    results = found(infoset, mine(LATE), "--prefer", f"x_m={wanted}")
-    ideals = [each["ideal"]["x_m"] for each in results["craft"]]
-    assert results["selections"]["preferred"]["meeting"]["x_m"] == pytest.approx(nearest(ideals), rel=1e-9)
-
-
-def test_many_craft_have_no_list_of_coalitions(infoset: Command, mine: Callable[[str], Path]) -> None:
-    tables = "".join(
-        "[[craft]]" + changed('"second"', f'"craft {each}"', CRAFT[1]).replace("40.0", f"{each}.0")
-        for each in range(13)
-    )
-    code, out, _ = infoset("pareto", mine(HEAD + tables), "--json", "found.json")
-    assert code == 0
-    assert "the coalitions are not computed" in out
-    assert strict(Path("found.json").read_text())["coalitions"] == {}
-
-
-def test_figures_draw_the_numbers_of_the_solution() -> None:
-    solution = solve_encounter(load_pareto("pareto-2008").encounter)
-    axes = draw_trajectories(solution).axes
-    titles = {"x": "x (radial), m", "y": "y (along-track), m", "z": "z (normal), m"}
-    assert [each.get_xlabel() for each in axes] == [titles[name] for name in "yxyx"]
-    assert [each.get_ylabel() for each in axes] == [titles[name] for name in "xyzz"]
-    controls = draw_controls(solution, 1.0).axes
-    assert [each.get_ylabel() for each in controls][2:] == ["$u_z$ (normal), m/s$^2$", "$|u|$, m/s$^2$"]
-    sweep = sweep_meeting_time(solution.encounter, [20.0, 30.0, 40.0])
-    front = draw_front(solution, {"min_group_loss": solution.point}, sweep).axes
-    (hull,) = front[0].patches
-    corners = np.asarray(hull.get_path().vertices)[:-1]
-    assert {tuple(each) for each in corners} == {tuple(each) for each in solution.ideals}
-    heights = [each.get_height() for each in draw_costs(solution).axes[0].patches if isinstance(each, Rectangle)]
-    np.testing.assert_allclose(heights[3:], solution.excess())

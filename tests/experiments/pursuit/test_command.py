@@ -2,25 +2,15 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.contour import ContourSet
 
-from experiments.pursuit.figures import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
-from experiments.pursuit.file import load_pursuit
-from experiments.pursuit.map_figure import axis_name, draw_map
-from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus, Policy, Solution, fly, history, solve
+from rendezvous.pursuit_evasion import Policy
 from rendezvous.pursuit_evasion._branch import follow
 from tests.experiments.command_line import Command
 
 SMALL_MAP = ["--x", "phase_deg=-9:-6:4", "--y", "evader.thrust_N=10:20:2"]
-
-
-@pytest.fixture(scope="module")
-def geo() -> Solution:
-    return solve(load_pursuit("geo-pursuit").game)
 
 
 def test_the_slides_case_as_json(infoset: Command) -> None:
@@ -126,61 +116,12 @@ def test_a_map(infoset: Command) -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["pursuit", "--feedback", "costa"], "did you mean coast"),
         (["pursuit", "--runs", "5"], "need a policy of the evader"),
         (["pursuit-map", "--x", "phase=-1:1:3"], "did you mean phase_deg"),
-        (["pursuit-map", "--x", "phase_deg=-1:1"], "KEY=FROM:TO:N"),
         (["pursuit-map", "--x", "phase_deg=1:-1:3"], "KEY=FROM:TO:N"),
-        (["pursuit-map", "--x", "phase_deg=nan:1:3"], "KEY=FROM:TO:N"),
-        (["pursuit-map", "--x", "phase_deg=-1:1:1"], "KEY=FROM:TO:N"),
         (["pursuit-map", "--y", "phase_deg=-1:1:3"], "is also the parameter of --x"),
         (["pursuit-map", "--x", "phase_deg=-1:1:2000", "--y", "thrust_ratio=0:1:2000"], "more than 100000 points"),
     ],
 )
 def test_wrong_options_are_refused(arguments: list[str], told: str, infoset: Command) -> None:
     assert told in infoset.refused(*arguments)
-
-
-def test_figures(geo: Solution) -> None:
-    sampled = history(geo)
-    space: Any = draw_orbits(sampled).axes[1]
-    assert space.get_zlabel() == "z (inertial), Mm"
-    plane, *_ = draw_relative(sampled).axes
-    assert (plane.get_xlabel(), plane.get_ylabel()) == ("y (along-track), Mm", "x (radial), Mm")
-    x, y = plane.get_lines()[0].get_xydata().T  # type: ignore[union-attr]
-    assert abs(x[-1]) < 1e-6
-    assert abs(y[-1]) < 1e-6
-    *_, switching = draw_control(sampled).axes
-    for line in switching.get_lines():
-        assert np.all(np.asarray(line.get_ydata())[:-1] > 0.0)
-    left, right = draw_distance(geo).axes
-    assert left.get_lines()[0].get_ydata()[-1] == pytest.approx(0.0, abs=1e-9)  # type: ignore[index]
-    assert "T" in right.get_xlabel()
-    flight = fly(geo.game, Policy.COAST.direction, solution=geo)
-    for flights, title in (([flight], "(b) captured at"), ([flight, flight], "(b) 2 of 2 captured")):
-        assert draw_feedback(geo, flights).axes[1].get_title("left").startswith(title)
-
-
-def test_a_map_says_below_it_what_the_terminal_said() -> None:
-    times = np.ma.masked_array(np.arange(20.0).reshape(4, 5) * 3600.0, mask=np.zeros((4, 5), dtype=bool))
-    times[1, 2] = np.ma.masked
-    status = np.where(times.mask, STATUSES.index(PointStatus.NOT_CERTIFIED), STATUSES.index(PointStatus.FOLLOWED))
-    found = CaptureMap(np.arange(5.0), np.arange(4.0), times, status, times, 19)
-    figure = draw_map(found, "phase_deg", "thrust_ratio")
-    axes = figure.axes[0]
-    assert axes.get_title() == "20 points: 19 solved from scratch, 1 not certified"
-    assert figure.axes[1].get_ylabel() == "capture time, h"
-    # No ratio below zero.
-    assert (axes.get_xlim(), axes.get_ylim()) == ((0.0, 4.0), (0.0, 3.0))
-    # No line ends beside the point that has no time: its four cells are empty.
-    (lines,) = (each for each in axes.collections if isinstance(each, ContourSet))
-    ends = np.concatenate([each.vertices for each in lines.get_paths()])
-    assert len(ends)
-    assert not ((np.abs(ends[:, 0] - 2.0) < 0.999) & (np.abs(ends[:, 1] - 1.0) < 0.999)).any()
-
-
-def test_axes_of_a_map_have_words_and_units() -> None:
-    assert axis_name("evader.orbit.inclination_deg") == "evader orbit: inclination, deg"
-    assert axis_name("phase_deg") == "lead of the evader, deg"
-    assert axis_name("thrust_ratio") == "thrust of the evader / thrust of the pursuer"
-    assert axis_name("evader.thrust_N") == "evader: thrust, N"

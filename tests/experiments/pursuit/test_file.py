@@ -46,33 +46,18 @@ ORBIT = TEXT.partition("[pursuer.orbit]")[2].partition("\n\n")[0]
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        (
-            TEXT.replace("eccentricity = 0.00016", "eccentricity = 1.2"),
-            "evader.orbit: an ellipse has a semi-major axis",
-        ),
-        (TEXT.replace("= 42166.0", "= nan", 1), "pursuer.orbit.semi_major_axis_km: must be a finite number"),
         (TEXT.replace("= 0.00013", "= 0.9"), "pursuer: the orbit meets the planet: its perigee is 4216.6 km"),
-        (TEXT.replace("inclination_deg = 1.565\n", ""), "pursuer.orbit.inclination_rad: is missing"),
         (
             TEXT + STATE.format("[1, 0, 0]", "[0, 1, 0]"),
             "evader: orbit: give either the table orbit or the table state",
         ),
-        (TEXT.partition("[evader.orbit]")[0], "evader: orbit: give either the table orbit or the table state"),
         (TEXT.replace(TEXT.partition("[evader.orbit]")[2], ORBIT), "pursuer and evader are at the same position"),
-        (
-            TEXT.replace("dry_mass_kg = 1000.0", "dry_mass_kg = 2000.0", 1),
-            "pursuer: dry_mass_kg: must be less than mass",
-        ),
-        (TEXT.replace("thrust_N = 20.0", "thrust_N = 0.0"), "the pursuer's thrust must be positive"),
         (
             TEXT.replace("capture_radius_km = 0.0", "capture_radius_km = 7000"),
             "the evader is within the capture radius",
         ),
         (TEXT.replace("[pursuer]", "j2 = 0.001\n[pursuer]"), "gravity: J2 needs the equatorial radius"),
-        (TEXT.replace("planet_radius_km = 6378.137\n", ""), "gravity.planet_radius_m: is missing"),
         (with_state("[42000.0, 0.0, 0.0]", "[0.0, 9.0, 0.0]"), "evader: the orbit is a parabola or a hyperbola"),
-        (with_state("[42000.0, 0.0, 0.0]", "[1.0, 0.0, 0.0]"), "evader: the orbit is a fall along a line"),
-        (with_state("[0.0, 0.0, 0.0]"), "evader: the position is the centre of the planet"),
     ],
 )
 def test_what_is_no_game_is_refused(text: str, line: str) -> None:

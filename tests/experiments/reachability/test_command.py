@@ -9,10 +9,8 @@ import pytest
 from experiments.common.errors import InputError
 from experiments.common.input_file import read_text
 from experiments.reachability.command import Reach
-from experiments.reachability.figures import draw_all, shown_times
 from experiments.reachability.file import Rendezvous, load_rendezvous
 from experiments.reachability.run import COMMAND
-from sim.storage.codec import fingerprint
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 
@@ -41,25 +39,15 @@ def test_the_published_problem(infoset: Command) -> None:
 
 
 @pytest.mark.parametrize("thrust", ["box", "ball"])
-def test_what_is_printed_and_delta_v(infoset: Command, thrust: str) -> None:
+def test_delta_v(infoset: Command, thrust: str) -> None:
     settings = ("--set", f'thrust="{thrust}"', "--select", "energy", "--replan")
     found = infoset.json("reach", *settings)
-    _, out, _ = infoset("reach", *settings)
     for result in (found["controls"][0], found["replan"]):
         control = 0.15 * np.array(result["controls"])
         used = result["delta_v_m_s"]
         assert [used[axis] for axis in "xyz"] == pytest.approx((180.0 * np.abs(control).sum(axis=0)).tolist())
         engines = np.abs(control).sum() if thrust == "box" else np.sqrt((control**2).sum(axis=1)).sum()
         assert used["sum"] == pytest.approx(180.0 * float(engines))
-    printed = [f" {found['controls'][0]['delta_v_m_s']['sum']:.4f}"]
-    printed += [f"Delta-v {found['replan']['delta_v_m_s']['sum']:.4f} m/s"]
-    printed += [
-        "minimum terminal norm 0",
-        "norm 0 needs at least 3 periods",
-        f"route: {found['route']}",
-        "axes: x radial",
-    ]
-    assert [text for text in printed if text not in out] == []
 
 
 def test_samples_follow_the_seed() -> None:
@@ -90,9 +78,7 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Command) -> None:
     ("arguments", "told"),
     [
         (["--select", "enrgy"], "did you mean energy?"),
-        (["--select", ""], "--select: "),
         (["--select", "samples"], "--select samples: invalid literal"),
-        (["--select", "samples:0"], "must be between 1 and 1000"),
         (["approach-cone", "--select", "vertices"], "choose for example --select samples:20"),
         ([CASES / "s2_2_68.toml"], "a convex program was not solved to 1e-07: relative gap"),
         ([CASES / "s4_1_59.toml", "--select", "vertices"], "the optimal controls have 22875 vertices, more than the"),
@@ -121,17 +107,12 @@ def test_a_conflict_says_when_and_by_how_much(infoset: Command) -> None:
     assert infoset("reach", *settings, "--set", relaxed[0], "--set", relaxed[1], "--select", "energy")[0] == 0
 
 
-@pytest.mark.parametrize("name", ["s2_1_76", "s2_1_193", "near_0.1726"])
-def test_problems_that_ended_in_a_traceback_or_a_refusal(infoset: Command, name: str) -> None:
-    found = infoset.json("reach", CASES / f"{name}.toml")
-    assert [each["name"] for each in found["controls"]] == ["energy", "l1", "norms", "peak", "chebyshev", "analytic"]
-
-
 def test_the_published_problem_with_less_thrust(infoset: Command) -> None:
     found = infoset.json("reach", "--set", "bounds.control=0.15")
     assert found["optimal_miss"] == pytest.approx(1.62757318, abs=1e-8)
 
 
+@pytest.mark.thorough
 def test_the_cone_is_inside_its_angle_and_kept() -> None:
     given = load_rendezvous("approach-cone")
     problem = given.problem
@@ -165,14 +146,10 @@ KEEP_IN = "[[keep_in]]\nnormals = {}\noffsets_m = {}\n[orbit]"
     ("problem", "old", "new", "line"),
     [
         ("rendezvous-2021", "[orbit]", KEEP_IN.format("[[1, 0, 0]]", "[1, 2]"), "offsets_m: must have 1 numbers"),
-        ("rendezvous-2021", "[orbit]", KEEP_IN.format("[[0, 0, 0]]", "[1]"), "normals: must have no row of zeros"),
-        ("rendezvous-2021", "[orbit]", CONE.format("[0, 0, 0]"), "cone: axis: must have a direction"),
         ("rendezvous-2021", "[orbit]", CONE.format("[0, -1, 0]"), "is outside its constraints: face 3 of the cone by"),
         ("rendezvous-2021", POSITION, "[3200.0, -2650.0, 2120.0]", "is outside its constraints: x by 200"),
         ("rendezvous-2021", "10000.0", "6000.0", "orbit: semi_major_axis_m: the orbit meets the planet"),
         ("rendezvous-2021", "180.0", "1e9", "period_s, in all periods, is 2.53e+06 radians of the orbit"),
-        ("rendezvous-2021", "0.15 ", "1e6 ", "acceleration_m_s2: full thrust over a period changes a state by"),
-        ("rendezvous-2021", "control = 1.0", "control = [1, 1, 0]", "bounds.control: must be greater than 0"),
         ("rendezvous-16-periods", "control = 1.0", "control = [1, 1, 0.5]", "in a ball the bounds on controls must"),
         ("approach-cone", "[orbit]", "checks_between_periods = 1\n[orbit]", "checks_between_periods: must be 0 with"),
     ],
@@ -181,28 +158,3 @@ def test_contradictions_are_refused(problem: str, old: str, new: str, line: str)
     with pytest.raises(InputError, match=re.escape(line)) as caught:
         read_text(Rendezvous, problem_text(problem).replace(old, new, 1), "mine.toml")
     assert str(caught.value).startswith("mine.toml: ")
-
-
-def test_a_bound_is_one_number_or_one_for_each_axis() -> None:
-    one, three = (load_rendezvous("approach-cone", [f"bounds.control={value}"]) for value in ("0.5", "[0.5, 0.5, 0.5]"))
-    assert one.bounds.control == (0.5, 0.5, 0.5)
-    assert fingerprint(one) == fingerprint(three)
-
-
-def test_figures_show_sets_members_and_ranges() -> None:
-    report = COMMAND.report(Reach(select="energy,l1,norms"))
-    positions, velocities, planes, controls = draw_all(report)
-    assert positions.axes[0].get_xlabel() == "x (radial), m"
-    assert velocities.axes[0].get_xlabel() == "$v_x$ (radial), m/s"
-    along = ["y (along-track), m"] * 2 + ["$v_y$ (along-track), m/s"] * 2
-    assert [each.get_xlabel() for each in planes.axes] == along
-    across = ["x (radial), m", "z (normal), m", "$v_x$ (radial), m/s", "$v_z$ (normal), m/s"]
-    assert [each.get_ylabel() for each in planes.axes] == across
-    # The minimum sum of norms is the minimum L1 here, and is drawn once.
-    names = [each.get_text() for each in planes.legends[0].get_texts()]
-    members = [f"minimum {name}, {model}" for name in ("energy", "L1") for model in ("nonlinear", "linear")]
-    assert names == [*(f"tube at t = {t}" for t in (1, 2, 3)), *members, "start", "terminal state of minimum norm"]
-    assert len(controls.axes) == 3
-    assert shown_times(4) == [1, 2, 3]
-    assert shown_times(64) == [1, 13, 26, 38, 51, 63]
-    assert shown_times(1) == []
