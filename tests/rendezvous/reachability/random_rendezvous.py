@@ -18,7 +18,7 @@ from rendezvous.reachability import (
 )
 from rendezvous.relative_motion import EllipticOrbit
 
-from .cone_program import Dense, cone_program
+from .high_precision import Dense, cone_program
 
 Floats = NDArray[np.float64]
 
