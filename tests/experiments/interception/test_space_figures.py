@@ -212,3 +212,24 @@ def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
     assert left.get_xlim() == left_impulse.get_xlim()
     assert {"impulse: median", "guaranteed miss Φ", "body radius, 50 m", "times of the schedule"} <= set(legend(figure))
     assert "impulse: 90 %" not in legend(figure)
+
+
+def test_a_long_flight_shows_the_errors_of_its_angles_within_their_bound_over_the_time_to_go() -> None:
+    scenario = load_scenario("dart-2022", ["step_s=120", "angle_sensor.period_s=120"])
+    record = fly_one(scenario)
+    panels = [
+        (axes, line)
+        for axes in draw_process([record]).axes
+        for line in axes.lines
+        if line.get_label() == "error of the measured angle"
+    ]
+    bound = scenario.set_model.angle_sensor.error_bound
+    for name, (axes, line) in zip(("y", "z"), panels, strict=True):
+        steps = [step for step in record.steps if "angle" in step.axes[name].measured]
+        errors = [step.axes[name].measured["angle"] - step.axes[name].true_angle_rad for step in steps]
+        to_go_s = [scenario.nominal_arrival_s - step.time_s for step in steps]
+        assert line.get_xdata() == pytest.approx(np.array(to_go_s))
+        assert line.get_ydata() == pytest.approx(1e6 * np.array(errors), abs=1e-6)
+        distances_m = np.array([step.true_range_m for step in steps])
+        assert (np.abs(line.get_ydata()) <= 1e6 * bound(distances_m) * (1.0 + 1e-9)).all()
+        assert axes.get_ylabel() in ("", "error of α, µrad")
