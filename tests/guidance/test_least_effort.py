@@ -117,7 +117,8 @@ def test_the_reference_is_a_miss_that_no_strategy_prevents(guaranteed: Scenario)
     assert set(found) == {0.0}
 
 
-@pytest.mark.parametrize(("budget", "seeds"), [(800, 1), pytest.param(8000, 5, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize(("budget", "seeds"), [(800, 1), (8000, 5)])
 def test_the_worst_miss_without_a_range_sensor_is_near_the_bound(guaranteed: Scenario, budget: int, seeds: int) -> None:
     """Searches find 74 to 77 m for U_s and at most 30 m for least effort; no strategy guarantees less than 24.4 m."""
     for seed in range(seeds):
@@ -127,6 +128,7 @@ def test_the_worst_miss_without_a_range_sensor_is_near_the_bound(guaranteed: Sce
     assert symmetric.value_m > (60.0 if budget > 1000 else 40.0)
 
 
+@pytest.mark.thorough
 def test_random_errors_cost_no_more_than_with_the_published_strategy(guaranteed: Scenario) -> None:
     """Median miss and impulse of 200 runs with the starts of the experiment, at most 5 % above U_s."""
     narrow = replace(guaranteed.dispersion, x_m=(5701.3e3, 5901.3e3), z_m=(-1e3, 1e3), vx_m_s=(-58.1e3, -57.9e3))

@@ -557,7 +557,7 @@ def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
     return life
 
 
-@pytest.mark.parametrize("fall", [0.999, 0.97])
+@pytest.mark.parametrize("fall", [pytest.param(0.999, marks=pytest.mark.thorough), 0.97])
 @pytest.mark.parametrize(("tau", "size_v", "size_z"), [(1.0, 1.0, 1.0), (500.0, 1e-9, 30.0), (500.0, 2.0, 1e-6)])
 def test_reduction_is_outward_and_life_goes_on(tau: float, size_v: float, size_z: float, fall: float) -> None:
     life = crowded(tau, size_v, size_z, fall)

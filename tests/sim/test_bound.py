@@ -253,6 +253,7 @@ def test_gravity_on_both_motions_is_allowed_for() -> None:
     assert pair.bound_m < pair_at(replace(scenario, sun=None), pair.label_m, pair.vx_m_s).bound_m
 
 
+@pytest.mark.thorough
 def test_lower_bound_of_the_published_scenario(asteroid: Scenario) -> None:
     done: list[float] = []
     found = lower_bound(asteroid, progress=done.append)

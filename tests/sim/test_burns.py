@@ -228,7 +228,9 @@ SCHEDULES: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("fields", SCHEDULES, ids=["one-step", "twelve-steps", "cut-off", "times"])
-@pytest.mark.parametrize("strategy", STRATEGIES)
+@pytest.mark.parametrize(
+    "strategy", [STRATEGIES[0], *(pytest.param(each, marks=pytest.mark.thorough) for each in STRATEGIES[1:])]
+)
 @pytest.mark.parametrize("spatial", [False, True], ids=["plane", "space"])
 def test_the_guarantee_holds_with_errors_of_the_engine_and_a_delay(
     asteroid: Scenario, fields: dict[str, Any], strategy: str, spatial: bool

@@ -95,7 +95,9 @@ def widest_m(measured: Floats, times_s: Floats, pixel: float, centroid_m: float,
 
 
 @pytest.mark.parametrize("constant", [False, True])
-@pytest.mark.parametrize("last_s", [30.0, 300.0, 1200.0, 3000.0])
+@pytest.mark.parametrize(
+    "last_s", [30.0, 1200.0, *(pytest.param(each, marks=pytest.mark.thorough) for each in (300.0, 3000.0))]
+)
 @pytest.mark.parametrize("centroid_m", [0.0, 3.0, 50.0])
 def test_possible_miss_is_that_of_linear_programs(last_s: float, centroid_m: float, constant: bool) -> None:
     """Exact measurements reach the closed form, and no admissible ones exceed it."""

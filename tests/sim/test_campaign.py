@@ -86,6 +86,7 @@ def test_workers_and_chunks_change_no_bit(
     assert (units["miss_m"], units["start_vx_m_s"], units["outcome"]) == ("m", "m/s", "")
 
 
+@pytest.mark.thorough
 def test_any_executor_will_do(brief: Scenario, reference: pd.DataFrame, tmp_path: Path) -> None:
     with ThreadPoolExecutor(3) as pool:
         assert same(mixed(brief, tmp_path / "threads").run(pool).runs(), reference)

@@ -58,7 +58,7 @@ def sound(results: Results) -> bool:
     ("hostile", "batches", "batch"),
     [
         (False, 4, 32),
-        (True, 8, 32),
+        (True, 4, 32),
         *(pytest.param(each, 32, 80, marks=pytest.mark.thorough) for each in (False, True)),
     ],
 )
@@ -85,6 +85,7 @@ def test_nothing_breaks_the_guarantee_of_a_camera(
     assert vars(total) == {"engagements": 16 * batches, "outside": 0, "lost": 0, "above": 0, "unknown": 0, "refused": 0}
 
 
+@pytest.mark.thorough
 def test_the_test_can_fail(soundness: ModuleType, asteroid: Scenario) -> None:
     """A target that manoeuvres harder than its bound, and a truth faster than D, are caught."""
     scenario = guaranteed(asteroid)
@@ -166,7 +167,7 @@ def test_gravity_moves_the_model_motion_within_its_bounds(asteroid: Scenario, sp
     assert (maximum > 0.25).all()  # the bound is not lavish, and what it bounds was there
 
 
-@pytest.mark.parametrize("runs", [16, pytest.param(100, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("runs", [4, pytest.param(100, marks=pytest.mark.thorough)])
 def test_a_rate_sensor_helps_and_stays_sound(asteroid: Scenario, hundred: Results, runs: int) -> None:
     sensor = RateSensor(period_s=1.0, error_rad_s=1e-6)
     scenario = replace(guaranteed(asteroid), rate_sensor=sensor)
@@ -221,7 +222,7 @@ class Faulty:
 
 @pytest.mark.parametrize("model", [Model.PAPER, Model.GUARANTEED])
 @pytest.mark.parametrize("fault", ["none", "outlier", "bias", "stuck", "dropout"])
-@pytest.mark.parametrize("meter", [False, True])
+@pytest.mark.parametrize("meter", [False, pytest.param(True, marks=pytest.mark.thorough)])
 def test_faulty_sensors_are_told_and_survived(
     asteroid: Scenario, ranging: Scenario, model: Model, fault: str, meter: bool
 ) -> None:

@@ -35,10 +35,15 @@ def sound(results: Results) -> bool:
     ("case", "seed", "noise", "tie", "runs"),
     [
         # Phi between labels took the supports to be concave in the label, which a rate's bands do not leave them.
-        ("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [6, 13, 21, 40, 86]),
+        pytest.param(
+            *("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [6, 13, 21, 40, 86]),
+            marks=pytest.mark.thorough,
+        ),
         ("rate-free-space", 4006, NoiseKind.GAME, TieRule.UPPER, [84]),
         # Living labels beyond those found were taken to be refuted.
-        ("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [1, 22, 36, 47]),
+        pytest.param(
+            *("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [1, 22, 36, 47]), marks=pytest.mark.thorough
+        ),
         ("rate-between-labels", 13014, NoiseKind.RANDOM, TieRule.UPPER, [47]),
         ("rate-wide-speeds", 13017, NoiseKind.RANDOM, TieRule.UPPER, [70]),
         # The truth's label was that of a motion without impulses, 8.5 ns off.

@@ -87,7 +87,7 @@ def test_the_runs_of_a_cell_are_those_of_a_longer_sweep(asked: Campaign, flown: 
         assert flown.runs(cell=cell).equals(whole.runs(cell=cell)[:size])
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(each, marks=pytest.mark.thorough) for each in (2, 3))])
 def test_neither_workers_nor_interruptions_change_what_is_stored(
     seed: int, asked: Campaign, flown: CampaignFolder, tmp_path: Path
 ) -> None:
@@ -124,6 +124,7 @@ def test_a_sweep_of_fixed_runs_is_continued_until_it_is_decided(
         assert read_manifest(folder).cell_runs == flown.manifest.cell_runs
 
 
+@pytest.mark.thorough
 def test_more_runs_in_each_cell_change_no_decision(asked: Campaign, flown: CampaignFolder, tmp_path: Path) -> None:
     longer = replace(asked, runs=max(flown.manifest.cell_runs), folder=tmp_path / "longer").run()
     assert set(longer.manifest.cell_runs) == {max(flown.manifest.cell_runs)}

@@ -144,6 +144,7 @@ def test_value_where_range_and_speed_are_known(infoset: Command, short: Scenario
     assert IS_VALUE not in out
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("unrendered")
 def test_bound_in_space(infoset: Command, short: Scenario, planar: LowerBound, tmp_path: Path) -> None:
     spatial = in_space(short)

@@ -142,6 +142,7 @@ def test_a_comparison_draws_only_quantiles_that_the_runs_show(runs: int, marks: 
     assert points(figure.axes[3], "worst run")[0, 0] == results.impulse_m_s.max()
 
 
+@pytest.mark.thorough
 def test_files_are_written_twice_the_same_and_nothing_global_is_touched(curves: list[Curve]) -> None:
     before = dict(mpl.rcParams)
     first, second = (figure_bytes(draw_distributions(curves)) for _ in range(2))

@@ -25,6 +25,7 @@ def test_an_impactor_hits_and_its_guarantee_holds(name: str, noise: NoiseKind) -
     assert results.guaranteed_miss_m.max() < scenario.body.radius_m
 
 
+@pytest.mark.thorough
 def test_three_impulses_meet_the_requirement_of_deep_impact() -> None:
     results = simulate(load_scenario("deep-impact-2005"), runs=1)
     assert results.truth_kept.all()
