@@ -158,7 +158,8 @@ def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Fligh
     try:
         return replan(rendezvous.problem, truth, None if generator is None else observe)
     except ArithmeticError as error:
-        raise InputError(f"--replan: {error}; reduce the navigation errors, or omit --replan") from None
+        remedy = "omit --replan" if generator is None else "reduce the navigation errors, or omit --replan"
+        raise InputError(f"--replan: {error}; {remedy}") from None
 
 
 def _robustness(rendezvous: Rendezvous, disturbance: Floats) -> Robustness:
