@@ -158,8 +158,7 @@ def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Fligh
     try:
         return replan(rendezvous.problem, truth, None if generator is None else observe)
     except ArithmeticError as error:
-        remedy = "omit --replan" if generator is None else "reduce the navigation errors, or omit --replan"
-        raise InputError(f"--replan: {error}; {remedy}") from None
+        raise InputError(f"--replan: {error}; omit --replan, or reduce its navigation errors, if any") from None
 
 
 def _robustness(rendezvous: Rendezvous, disturbance: Floats) -> Robustness:
