@@ -69,7 +69,7 @@ def test_rate(benchmark: BenchmarkFixture, curve: Scenario, at_least: Check) -> 
     at_least(f"engagements, {curve.noise.value}, 29 sections", rate, RATE_TARGET[curve.noise], "a second")
 
 
-def test_phi_costs_at_max_three_times(curve: Scenario, under: Check) -> None:
+def test_phi_costs_at_most_three_times(curve: Scenario, under: Check) -> None:
     model = replace(curve.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
     scenario = replace(curve, **of_model(model))
 

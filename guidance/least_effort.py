@@ -99,7 +99,7 @@ def _between(values: Floats) -> Floats:
 
 
 def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tuple[Floats, Floats]:
-    """Return the u, |u| <= most, where the maximum of falling - slopes u and rising + slopes u is minimum, and it."""
+    """Return the u, |u| <= most, where the maximum of falling - slopes u and rising + slopes u is smallest, and it."""
     at, value = np.zeros((2, len(falling)))
     balance_all(falling, rising, slopes, float(most), at, value)
     return at, value
@@ -109,7 +109,7 @@ def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tu
 def balance_all(falling: Floats, rising: Floats, slopes: Floats, most: float, at: Floats, value: Floats) -> None:
     """Write the results of `balanced`: at the minimum the maximum falling and rising lines are equal, or it is an end.
 
-    The next trial is where the two lines that are maximum now intersect, or the middle of the interval that is left.
+    The next trial is where the two lines that are largest now intersect, or the middle of the interval that is left.
     """
     for b in range(len(at)):
         low, high, u = -most, most, 0.0

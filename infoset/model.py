@@ -127,7 +127,7 @@ class StateBox:
     def farthest_m(self) -> float:
         """Maximum distance until x = 0, m.
 
-        Without impulses the distance is a convex function of time: it is maximum at the start or at the end.
+        Without impulses the distance is a convex function of time: it is largest at the start or at the end.
         """
         offset, maximum = self.offset_m, self.x_m[1]
         return max(math.hypot(maximum, offset), offset + self.lateral_speed_m_s * (maximum / -self.vx_m_s[1]))

@@ -87,7 +87,7 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
     `alpha` and `across` are the measured angles of this axis and of the other one. The distance is at most x/(cos(own)
     cos(other)). If one of the angles is unbounded, the first is pi/2 and the second zero.
 
-    The bound of a camera is maximum at the minimum distance, that of the nearest label. Another error bound that grows
+    The bound of a camera is largest at the minimum distance, that of the nearest label. Another error bound that grows
     with the distance r grows with the angles: in a plane r = x/cos(alpha), in space r is at most x/(cos(alpha_y)
     cos(alpha_z)). The maximum angles are the minimum solution of s = |alpha_m| + a + h(r(s)). Three fixed-point
     iterations approach it from below; a fourth step of the length of the third passes it if the right-hand side does

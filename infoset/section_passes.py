@@ -129,7 +129,7 @@ def start_all(sections: Sections, laws: Laws) -> None:
 def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool:
     """Whether a section is cut at an event: if the label lives, or another axis has just made it empty.
 
-    The overlap of a label that an event makes empty is the minimum one of its axes, whatever their order.
+    The overlap of a label that an event makes empty is the smallest one of its axes, whatever their order.
     """
     slot = sections.slots[b, s]
     return bool(slot.living or (channel > 0 and slot.died == event))

@@ -115,7 +115,7 @@ def flight_bounds(
     start = np.array([[*(box.z_m for box in boxes), bounds.x_m], [*(box.vz_m_s for box in boxes), bounds.vx_m_s]])
     middle, half = start.mean(axis=2), 0.5 * np.ptp(start, axis=2)
     half = np.concatenate([np.linalg.norm(half, axis=1, keepdims=True), half], axis=1)
-    # All impulses at once, along each axis: the deviations are maximum then.
+    # All impulses at once, along each axis: the deviations are largest then.
     impulses = np.array([impulses_m_s, *(impulses_m_s for _ in boxes), 0.0])
     first = np.array([[np.zeros_like(half[0]), half[0]], [impulses, half[1]]])
     disturbance = np.array([np.zeros_like(half[0]), [np.linalg.norm(disturbances_m_s2), *disturbances_m_s2, 0.0]])

@@ -30,7 +30,7 @@ class ValueReserve:
     tangent_m : float
         Angles that are not small.
     dead_zone_m : float
-        Impulses below the minimum one.
+        Impulses below the minimum impulse.
     range_threshold_m : float
         Impulses below the range threshold.
     """

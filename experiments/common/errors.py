@@ -24,11 +24,11 @@ class InputError(Exception):
 
 
 @contextlib.contextmanager
-def input_errors(source: str, remedy: str = "") -> Iterator[None]:
-    """Turn a `ValueError` into an `InputError` with the name of the file or the option, and a remedy at its end."""
+def input_errors(source: str, remedy: str = "", kind: type[Exception] = ValueError) -> Iterator[None]:
+    """Turn an error into an `InputError` with the name of the file, option or problem, and a remedy at its end."""
     try:
         yield
-    except ValueError as error:
+    except kind as error:
         raise InputError(f"{source}: {error}{remedy}") from None
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from experiments.common.errors import InputError
+from experiments.common.errors import input_errors
 from experiments.common.input_file import read_file, to_toml
 from experiments.common.output import output_of, to_csv, to_json
 from experiments.common.screen import BeginProgress, Part, figure_files, progress_bar, show
@@ -21,6 +20,7 @@ from sim.versions import versions
 
 Problem = TypeVar("Problem")
 Report = TypeVar("Report")
+_REMEDY = "; check the units and the limits of the problem"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +60,13 @@ class ProblemCommand(Generic[Problem, Report]):
         with (
             output_of(options, files) as written,
             progress_bar(options.quiet) as begin,
-            _errors_of_input(problem, ArithmeticError),  # also of sets that are computed when they are drawn
+            input_errors(problem.name, _REMEDY, ArithmeticError),  # also of sets that are computed when they are drawn
         ):
-            with _errors_of_input(problem, ValueError):
+            with input_errors(problem.name):
                 report = self.solve(problem, options, begin)
-                head = {"versions": versions(), "problem": problem.name, "problem_hash": fingerprint(problem)}
-                results = to_json(head | self.to_json(report))  # a number that is not finite is a ValueError
+            head = {"versions": versions(), "problem": problem.name, "problem_hash": fingerprint(problem)}
+            with input_errors(problem.name, _REMEDY):  # a number that is not finite is a ValueError
+                results = to_json(head | self.to_json(report))
             page = self.to_html(report) if self.to_html and options.html is not None else ""
             written.save("problem.toml", to_toml(problem))
             written.save("results.json", results, "--json")
@@ -103,12 +104,3 @@ def trajectories_csv(
         for row in np.column_stack(arrays).tolist()
     ]
     return to_csv([*names, "time_s", *_STATE_COLUMNS, *columns], rows)
-
-
-@contextlib.contextmanager
-def _errors_of_input(problem: Any, kind: type[Exception]) -> Iterator[None]:
-    """Turn an error of a solver into an `InputError`."""
-    try:
-        yield
-    except kind as error:
-        raise InputError(f"{problem.name}: {error}; check the units and the limits of the problem") from None

@@ -29,7 +29,7 @@ from experiments.common.figure_style import (
 )
 from experiments.common.hill_axes import AXIS_TITLES, component_titles
 from experiments.common.units import length_unit
-from experiments.pareto.report import Report
+from experiments.pareto.report import CHOICES, Report
 from infoset.arrays import Floats
 from rendezvous.pareto import DurationSweep, EncounterSolution, pareto_set, simplex_weights
 
@@ -38,12 +38,7 @@ _VIEWS: tuple[tuple[int, ...], ...] = ((1, 0), (0, 1, 2), (1, 2), (0, 2))
 _POINTS = 241
 _MARKS = 4
 _SET_POINTS = 1200
-_CHOICES = {
-    "min_group_loss": ("*", "minimum group loss"),
-    "min_sum_of_costs": ("P", "minimum sum of costs"),
-    "minimax_excess": ("X", "minimax excess"),
-    "preferred": ("h", "nearest to the preferred meeting"),
-}
+_MARKERS = {"min_group_loss": "*", "min_sum_of_costs": "P", "minimax_excess": "X", "preferred": "h"}
 _MEETING: dict[str, Any] = {"label": "meeting", "marker": "*", "markersize": 9.0, "color": INK, "linestyle": "none"}
 _HOLLOW: dict[str, Any] = {"linestyle": "none", "color": "white", "markeredgecolor": INK, "zorder": 5}
 _COST = "m$^2$/s$^3$"
@@ -144,7 +139,7 @@ def _draw_set(axes: Axes, solution: EncounterSolution, points: Floats, selection
         ideal = _look(index, linestyle="none", markersize=4.5, label=f"ideal meeting of {cost.craft.name}")
         axes.plot(*position(cost.ideal), **ideal)
     for choice, point in selections.items():
-        marker, label = _CHOICES[choice]
+        marker, label = _MARKERS[choice], CHOICES[choice]
         axes.plot(*position(point), marker=marker, markersize=7.0, label=label, **_HOLLOW)
     label_axes(axes, [labels[0], "" if flat else labels[1]])
     if flat:
@@ -170,7 +165,7 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
         columns = np.arange(len(names))
         axes.vlines(columns, excess.min(axis=0), excess.max(axis=0), color=SET_FILL, linewidth=4.0)
         for choice, values in chosen.items():
-            axes.plot(columns, values, marker=_CHOICES[choice][0], markersize=6.0, **_HOLLOW)
+            axes.plot(columns, values, marker=_MARKERS[choice], markersize=6.0, **_HOLLOW)
         axes.set_xticks(columns, names, rotation=90)
         axes.set_ylabel(f"excess, {_COST}")
         return
@@ -182,7 +177,7 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
     else:
         axes.plot(excess[:, 0], excess[:, 1], color=SET_EDGE)
     for choice, values in chosen.items():
-        axes.plot(*values[list(shown)], marker=_CHOICES[choice][0], markersize=7.0, **_HOLLOW)
+        axes.plot(*values[list(shown)], marker=_MARKERS[choice], markersize=7.0, **_HOLLOW)
     label_axes(axes, [f"excess $e$ of {name}, {_COST}" for name in (names[index] for index in shown)])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from experiments.common.hill_axes import AXES, AXIS_TITLES
 from experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
 from experiments.common.units import length_unit
-from experiments.pareto.report import Report
+from experiments.pareto.report import CHOICES, Report
 from infoset.arrays import Floats
 from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
@@ -57,7 +57,7 @@ def pareto_page(report: Report) -> str:
         ],
         "meeting_base_m": encounter.base[:3],
         "opening": encounter.opening[:3],
-        "selections": [{"name": rule.replace("_", " "), "point": point} for rule, point in report.selections.items()],
+        "selections": [{"name": CHOICES[rule], "point": point} for rule, point in report.selections.items()],
         # If all craft have the same M, the Pareto set is the convex hull of the ideals; else it is shown as points.
         "pareto_hull": faces_of(solution.ideals)[0] if hull else None,
         "pareto_points": [] if hull else pareto_set(solution, simplex_weights(len(tracks), _SET_POINTS)).points,

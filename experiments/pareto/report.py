@@ -14,6 +14,13 @@ from rendezvous.pareto import BoundCheck, Coalitions, DurationSweep, EncounterSo
 
 SAMPLES = 31
 """Number of times in a trajectory of the CSV file."""
+CHOICES = {
+    "min_group_loss": "minimum group loss",
+    "min_sum_of_costs": "minimum sum of costs",
+    "minimax_excess": "minimax excess",
+    "preferred": "nearest to the preferred meeting",
+}
+"""Names in print of the rules of `Report.selections`."""
 _ZERO = 1e-9
 """Components of a meeting smaller than this part of the largest one are printed as zero."""
 
@@ -154,7 +161,7 @@ def report_lines(report: Report) -> Iterator[Part]:
     scale = max(float(abs(point).max()) for point in report.selections.values())
     for rule, point in report.selections.items():
         values = (f"{value if abs(value) > _ZERO * scale else 0.0:.6g}" for value in point)
-        chosen.add_row(rule.replace("_", " "), *values, number(float(solution.group_loss(point))))
+        chosen.add_row(CHOICES[rule], *values, number(float(solution.group_loss(point))))
     yield from ("", chosen)
     if report.coalitions is None:
         yield "the coalitions are not computed: there are too many craft"

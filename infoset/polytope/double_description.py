@@ -26,7 +26,7 @@ _ENTRIES = 20_000_000
 _PARALLEL = 1e-14
 _INCIDENT = 1e-8
 _SINGULAR = 1e-6
-"""Minimum singular value of a matrix, relative to the maximum one, with which facets are mapped."""
+"""Minimum singular value of a matrix, relative to the largest one, with which facets are mapped."""
 _HULL = 1e-8
 """Enlargement of a hull, relative to the size of the set along each axis: it may have merged points."""
 _ROUNDED = 1e-13

@@ -250,7 +250,7 @@ def optimise_times(
 def _unsettled(trials: _Trials, best: _Trial) -> float:
     """Return the residual of the conditions of a minimum, relative to the objective.
 
-    To first order, the share of the objective by which a change of one gap by its length, or down to the minimum one,
+    To first order, the share of the objective by which a change of one gap by its length, or down to the minimum gap,
     would lower it, as far as the limits let it change; at the latest time, at the cost of the other gaps.
     """
     gaps, excess = best.gaps, np.maximum(best.gaps - trials.minimum, 0.0)
@@ -357,7 +357,7 @@ def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: f
 
 
 def _polish(trials: _Trials, best: _Trial) -> _Trial:
-    """Newton's method on the gaps above the minimum one; at the latest time their sum is fixed."""
+    """Newton's method on the gaps above the minimum gap; at the latest time their sum is fixed."""
     minimum, total, near = trials.minimum, trials.total, 1e-5 * trials.scale
     gaps = best.gaps
     full = total - gaps.sum() <= near

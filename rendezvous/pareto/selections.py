@@ -183,7 +183,7 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
 
 
 def _min_share(distance: Callable[[Floats], tuple[float, Floats]], initial: Floats) -> Floats:
-    """Shares of sum one, from initial ones, at which a squared distance is minimum."""
+    """Shares of sum one, from initial ones, at which a squared distance is smallest."""
     scale = np.maximum(initial / initial.sum(), 1e-6)
 
     def scaled(x: Floats) -> tuple[float, Floats]:

@@ -219,7 +219,7 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
 class DurationSweep:
     """An encounter at k meeting times.
 
-    `group_loss`, shape (k,), is the minimum one; `cost_squared` and `ideal_cost_squared`, shape (k, n), are J_i^2 and
+    `group_loss`, shape (k,), is the smallest one; `cost_squared` and `ideal_cost_squared`, shape (k, n), are J_i^2 and
     J_i*^2 there. Costs are in m^2/s^3.
     """
 

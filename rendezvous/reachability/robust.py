@@ -92,7 +92,7 @@ def tightened(problem: ReachabilityProblem, disturbance: Floats) -> Reachability
 
 
 def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> FeedbackPlan:
-    """Return the plan with affine feedback from past disturbances whose worst terminal state is minimum.
+    """Return the plan with affine feedback from past disturbances whose worst terminal state is smallest.
 
     The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; w(t) is known from t + 1 on, by
     the state.

@@ -132,7 +132,7 @@ def test_live_numbers_of_a_meeting(open_page: Open, pages: dict[str, str], repor
     inputs.nth(1).fill("-3.25")
     assert page.evaluate("point") == [12.5, -3.25]
     check()
-    page.get_by_label("Go to").select_option("min sum of costs")
+    page.get_by_label("Go to").select_option("minimum sum of costs")
     assert page.evaluate("point") == pytest.approx(min_sum_of_costs(solution).tolist(), rel=1e-12)
     check()
 

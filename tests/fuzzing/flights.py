@@ -52,7 +52,7 @@ def engagement(
 ) -> Scenario:
     """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step.
 
-    The centroid error of a camera is the maximum one.
+    The centroid error of a camera is the largest one.
     """
     slope = math.tan(angle_rad)
     z, v = range_m * slope, 0.2 * speed_m_s * slope

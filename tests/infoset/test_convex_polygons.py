@@ -138,7 +138,7 @@ def test_the_empty_set_has_no_points_to_give(measure: Callable[[ConvexPolygons],
 
 
 def around(vertices: np.ndarray) -> list[tuple[float, float]]:
-    """Vertices from the minimum one on, to compare cycles."""
+    """Vertices from the smallest one on, to compare cycles."""
     corners = [(float(x), float(y)) for x, y in vertices]
     start = corners.index(min(corners))
     return corners[start:] + corners[:start]

@@ -16,7 +16,7 @@ def published() -> Scenario:
     return load_scenario("asteroid-1997")
 
 
-def test_hits_are_the_misses_of_at_max_the_radius(brief: Scenario) -> None:
+def test_hits_are_the_misses_of_at_most_the_radius(brief: Scenario) -> None:
     misses = simulate(brief, 6).miss_m
     results = simulate(replace(brief, body=Body(float(np.sort(misses)[3]))), 6)
     np.testing.assert_array_equal(results.miss_m, misses)

@@ -71,7 +71,7 @@ def test_watched_p_values_are_inverse_likelihood_ratios(runs: int, count: int) -
 
 
 @pytest.mark.parametrize("share", [0.5, 0.95, 0.99])
-def test_looks_after_every_run_are_wrong_in_at_max_5_percent(share: float) -> None:
+def test_looks_after_every_run_are_wrong_in_at_most_5_percent(share: float) -> None:
     """The fixed-size interval, looked at after every run, is wrong in far more than 5 % of the samples."""
     size, repeats = 1500, 1000
     counts = np.cumsum(np.random.default_rng(3).random((repeats, size)) < share, axis=1)

@@ -124,7 +124,7 @@ def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -
 
 
 def _draw_equal_measurements(axes: Axes, scenario: Scenario, pair: TruthPair, shown: float) -> float:
-    """Draw the limits of the offset of each state with equal measurements; return the maximum one, m."""
+    """Draw the limits of the offset of each state with equal measurements; return the largest one, m."""
     model = scenario.set_model
     fine = np.linspace(0.0, shown, 200)
     ranges = -pair.vx_m_s * fine

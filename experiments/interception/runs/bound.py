@@ -200,7 +200,7 @@ class GameValue:
     """The minimum miss that a strategy can guarantee: its lower end, and how much greater it can be.
 
     `reserve` is None for `reasons`: assumptions of the proof that the scenario does not meet. `best` is the strategy
-    whose maximum miss found is minimum; None without a search.
+    whose maximum miss found is smallest; None without a search.
     """
 
     lower_m: float

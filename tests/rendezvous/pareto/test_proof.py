@@ -134,6 +134,6 @@ def test_craft_with_their_own_starts_and_orbits_meet() -> None:
     assert not solution.same_matrix
     for index in range(2):
         np.testing.assert_allclose(solution.plan(index).state(1500.0), solution.meeting_state(), atol=1e-8)
-    # The weighted sum of excesses is minimum: its gradient vanishes.
+    # The weighted sum of excesses is smallest: its gradient vanishes.
     gradient = sum(each.craft.weight * each.matrix @ (solution.point - each.ideal) for each in solution.costs)
     assert np.abs(gradient).max() < 1e-12 * np.abs(solution.costs[0].matrix @ solution.costs[0].ideal).max()
