@@ -710,3 +710,11 @@ def test_ten_thousand_moves_do_not_wear_a_section() -> None:
     assert_contains(wanted, outline, few)
     assert_contains(outline, wanted, few)
     assert math.isclose(section.reach, 5e6, rel_tol=0.2)
+
+
+def test_vertices_that_repeat_one_another_do_not_stop_the_search_for_a_peak() -> None:
+    """Both have the same miss, so that to look for a greater one next to the first is to look no further."""
+    section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
+    (v, m), (v_top, m_top) = section.local(RIGHT)
+    section.replace(RIGHT, [(v, m), (math.nextafter(v, 2.0), m), (v, m), (v_top, m_top)])
+    assert section.peak(RIGHT) == 3

@@ -347,3 +347,20 @@ def test_with_a_schedule_the_best_last_common_step_is_found(asteroid: Scenario, 
     assert found.bound_m >= max(every) * (1.0 - 1e-6)
     assert found.bound_m > pair_at(asteroid, NOMINAL_LABEL_M, -58e3).bound_m
     assert found.last_common_step <= 190
+
+
+def test_two_measurements_in_space_by_hand() -> None:
+    """As in the plane, with V_z within 2 m/s and V_y within 1 m/s, both measurements the same and no impulse left.
+
+    |dv_y| <= 2 m/s: dy(2) = dy(1) + dv_y is at most 2 + 2 = 4 m, with dy(0) = 0; dz(2) is at most 6 m. One of the two
+    is half of |(4, 6)| m from the target at x = 0. The velocity across x is at most |(1, 2)| m/s, and 1.5 m/s by
+    impulses.
+    """
+    scenario = in_space(toy(vz_m_s=2.0))
+    bounds = replace(scenario.set_model.bounds, vy_m_s=(-1.0, 1.0))
+    scenario = replace(scenario, **of_model(replace(scenario.set_model, bounds=bounds)), dispersion=bounds)
+    pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
+    bound_m = 0.5 * np.hypot(4.0, 6.0) * cosine(1.5 + np.hypot(1.0, 2.0))
+    assert pair.bound_m == pytest.approx(bound_m, rel=3e-6)
+    assert pair.times_s.tolist() == [0.0, 1.0, 2.0]
+    assert pair.difference_m[:, -1] == pytest.approx([4.0, 6.0], rel=3e-6)

@@ -159,3 +159,14 @@ def test_a_miss_beyond_the_nominal_range_is_divergence(asteroid: Scenario) -> No
     away = StateBox((0.0, 0.0), (5801.3e3, 5801.3e3), (90e3, 90e3), (-58e3, -58e3))
     scenario = replace(asteroid, dispersion=away, nominal_range_m=1e6)
     assert simulate(scenario, 1).outcomes == (Outcome.DIVERGED,)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
+def test_the_truth_stays_in_its_section_in_ten_thousand_engagements(asteroid: Scenario, noise: NoiseKind) -> None:
+    rules = list(TieRule)
+    for part in range(50):
+        scenario = replace(asteroid, noise=noise, tie=rules[part % len(rules)])
+        results = fly_in_the_model(scenario, 200, 100 + part)
+        assert results.truth_margin_m.min() >= 0.0
+        assert Outcome.SET_EMPTY not in results.outcomes

@@ -254,3 +254,18 @@ def test_faulty_sensors_are_told_and_survived(
         assert (results.miss_m < 5e3).all()
     else:
         assert np.median(results.miss_m) < 5.0
+
+
+def test_phi_follows_impulses_fired_after_labels_have_left(asteroid: Scenario) -> None:
+    """A threshold far out: labels leave eighty steps before they arrive, and what is fired meanwhile still counts."""
+    early = guaranteed(replace(asteroid, noise=NoiseKind.GAME))
+    early = replace(early, **of_model(replace(early.set_model, range_threshold_m=2.4e6)))
+    assert sound(simulate(early, 100))
+
+
+def test_the_rectangle_has_no_phi(asteroid: Scenario) -> None:
+    """Its sections are not convex over labels, and the proof needs that: nothing is claimed."""
+    rectangle = replace(guaranteed(asteroid).set_model, initial_set=InitialSet.RECTANGLE)
+    results = simulate(replace(guaranteed(asteroid), **of_model(rectangle)), 20)
+    assert results.guaranteed_miss_m.count() == 0
+    assert results.truth_kept.all()

@@ -13,12 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind, Thruster, TieRule
-from infoset import AngleSensor, InformationSet, InitialSet, Model, SetModel, StateBox
+from guidance import NoiseKind, RandomNoise, Thruster, TieRule
+from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
+from infoset.arrays import Floats
 from infoset.history import LastSight
 from infoset.section_law import BOUND_SLACK, SectionLaw, section_laws
 from infoset.section_life import rate_band
 from sim import Outcome, Results, Scenario, simulate
+from sim.draws import draw
+from sim.engagement import Engagements, Step
 from sim.scenario import of_model
 
 CASES = Path(__file__).parent / "cases"
@@ -277,3 +280,113 @@ def test_phi_of_an_exactly_known_range_and_speed(max_z_m: float) -> None:
     assert exists.all()
     rounding_m = 4.0 * 2.0**-52 * 2e4
     assert phi_m[0] == pytest.approx(min(max_z_m, 1100.0 * math.tan(1e-3)) + rounding_m, rel=1e-6, abs=0.0)
+
+
+def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_speed() -> None:
+    """An impulse of 10 m/s along y, turned by 0.1 rad at most, changes V_z by up to 10 sin(0.1) m/s."""
+    box = StateBox((-1.0, 1.0), (1e4, 2e4), (0.0, 0.0), (-1e3, -1e3), (-1.0, 1.0), (0.0, 0.0))
+    sensor = AngleSensor(1.0, 1e-3, 1e-3, 1e4)
+    model = SetModel(1e3, 1.0, box, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED, pointing_error_rad=0.1)
+    information = InformationSet(model)
+    information.shift([10.0, 0.0])
+    for section in information.sections():
+        changes_m_s = section.polygon.polygon()[:, 0]
+        assert changes_m_s.max() >= 10.0 * math.sin(0.1)
+        assert changes_m_s.min() <= -10.0 * math.sin(0.1)
+
+
+def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
+    """Model, measured angles and last set of a flight with a bound that rises with range and the rectangle."""
+    e, range_m = 20e3, 2.5e6
+    generator = np.random.default_rng(170)
+    step_s = float(generator.choice([1.0, 2.0, 5.0]))
+    z_m, vz_m_s = range_m * 10.0 ** generator.uniform(-3.0, -1.0), e * 10.0 ** generator.uniform(-4.0, -2.0)
+    error_rad = 10.0 ** generator.uniform(-4.0, -2.0)
+    at_zero_rad = error_rad * generator.uniform(0.0, 0.3)
+    box = StateBox((-z_m, z_m), (0.95 * range_m, 1.05 * range_m), (-vz_m_s, vz_m_s), (-1.01 * e, -0.99 * e))
+    model = SetModel(
+        e,
+        step_s,
+        box,
+        AngleSensor(step_s, error_rad, at_zero_rad, range_m),
+        disturbance_m_s2=0.0,
+        range_threshold_m=1e4,
+        sections=29,
+        fewest_sections=3,
+        initial_set=InitialSet.RECTANGLE,
+        model=Model.PAPER,
+    )
+    scenario = Scenario(
+        name="",
+        description="",
+        sun=None,
+        nominal_range_m=range_m,
+        dispersion=box,
+        **of_model(model),
+        range_sensor=None,
+        thruster=Thruster(0.0, 0.1, 1.0),
+    )
+    draws = draw(scenario, range(6), 170)
+    signs = np.where(draws.errors["angle"] >= 0.0, 1.0, -1.0)
+    flight = Engagements(scenario, draws, noise=RandomNoise({**draws.errors, "angle": signs}))
+    views: list[InformationSetView] = []
+    measured = []
+
+    def look(step: Step) -> None:
+        views.append(step.information)
+        measured.append(step.measured["angle"])
+
+    while flight.step < steps:
+        flight.advance(look)
+    return model, np.array(measured), views[-1]
+
+
+@pytest.mark.parametrize("y", [None, "mirror of z", "bound that falls with range"])
+def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limits(y: str | None) -> None:
+    """Two intervals of living labels, at 2400 km and above 2560 km; the measurement of step 16 empties the latter."""
+    model, measured, _ = two_intervals(17)
+    angles = measured[:, 2]
+    if y is not None:
+        box, sensor = model.bounds, model.angle_sensor
+        if y == "bound that falls with range":
+            sensor = replace(sensor, error_at_nominal_range_y_rad=0.01, error_at_zero_range_y_rad=0.02)
+        model = replace(model, bounds=replace(box, y_m=box.z_m, vy_m_s=box.vz_m_s), angle_sensor=sensor)
+        angles = np.stack([-angles if y == "mirror of z" else 0.0 * angles, angles])
+
+    def after(steps: int, sections: int) -> InformationSet:
+        information = InformationSet(replace(model, sections=sections))
+        for step in range(steps):
+            if step > 0:
+                information.predict()
+            information.measure_angle(angles[..., step, None])
+        for section in information.sections():
+            replayed = information.section_at(section.label_m)
+            np.testing.assert_array_equal(section.polygon.polygon(), replayed.polygon.polygon())
+            if section.polygon_y is not None and replayed.polygon_y is not None:
+                np.testing.assert_array_equal(section.polygon_y.polygon(), replayed.polygon_y.polygon())
+        return information
+
+    def lives(information: InformationSet, label_m: float) -> bool:
+        section = information.section_at(label_m)
+        return all(polygon is None or len(polygon.polygon()) > 0 for polygon in (section.polygon, section.polygon_y))
+
+    def stored(information: InformationSet) -> Floats:
+        return information.labels_m[information.living]
+
+    # Many sections: both intervals are stored, and the set goes on with the one that lives longer.
+    many = after(16, 29)
+    assert [lives(many, label) for label in (2.4e6, 2.48e6, 2.59e6)] == [True, False, True]
+    assert stored(many).min() < 2.41e6
+    assert stored(many).max() > 2.55e6
+    many = after(17, 29)
+    assert not many.inconsistent.any()
+    assert len(stored(many)) == 7
+    assert ((stored(many) > 2.39e6) & (stored(many) < 2.41e6)).all()
+    # Three sections: the new grid of step 12 takes the interval in which one is stored. The limits still contain the
+    # other one, in which no section is stored. The set is empty, to the search, when the first one is.
+    few = after(16, 3)
+    assert len(stored(few)) == 7
+    assert stored(few).min() > 2.55e6
+    assert lives(few, 2.4e6)
+    assert (few._state.lower_label[0], few._state.upper_label[0]) == model.label_limits_m
+    assert after(17, 3).inconsistent.all()

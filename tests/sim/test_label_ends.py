@@ -140,3 +140,9 @@ def test_where_the_set_is_lost_the_truth_counts(asteroid: Scenario) -> None:
     results, any_state_m = fly(wrong, 3)
     assert set(results.outcomes) == {Outcome.SET_EMPTY}
     assert any_state_m.tolist() == results.miss_m.tolist()
+
+
+def test_the_farthest_range_has_the_max_miss(asteroid: Scenario) -> None:
+    """A range of 1200 km takes 120 s: -3 km - 2.4 km."""
+    _, any_state_m = fly(without_control(asteroid, Model.GUARANTEED, (0.8e6, 1.2e6)), 3, noise=EXACT)
+    assert any_state_m == pytest.approx([5.4e3] * 3, rel=1e-6)

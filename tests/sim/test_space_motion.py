@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from infoset import SetModel
+from infoset import Model, SetModel
 from infoset.arrays import Floats
 from sim import Manoeuvre, Scenario, Sun, Target
 from sim.draws import Draws, corners, draw
@@ -198,3 +198,31 @@ def test_a_target_manoeuvres_along_each_axis_as_in_a_plane() -> None:
                 np.testing.assert_array_equal(both[axis], planar)
     same = acceleration_m_s2(Target(Manoeuvre.CONSTANT, 0.3), draws, 0, 0.5, miss)
     assert (np.abs(same) == 0.3).all()
+
+
+@pytest.mark.parametrize("wide", [1.0, 100.0])
+def test_the_acceleration_of_the_scaled_motion_is_within_its_bound(wide: float, spatial: Scenario) -> None:
+    """Gravity and the change of scale that it causes, for any direction of the Sun and a y axis of any width."""
+    start = spatial.set_model.bounds
+    box = replace(start, y_m=(-1e4 * wide, 1e4 * wide), vy_m_s=(-100.0 * wide, 100.0 * wide))
+    quiet = replace(spatial.set_model, bounds=box, model=Model.GUARANTEED, disturbance_m_s2=0.0)
+    minimum, maximum = corners(box)
+    random, worst, speed = np.random.default_rng(12), np.zeros(2), quiet.closing_speed_m_s
+    for number in range(12):
+        diagonal = (0.25 * np.pi * random.choice([-3, -1, 1, 3]), 0.0)
+        anywhere = (random.uniform(-np.pi, np.pi), np.arcsin(random.uniform(-1.0, 1.0)))
+        direction, elevation = anywhere if number % 3 else diagonal
+        sun = replace(SUN, direction_rad=direction, elevation_rad=elevation)
+        share = random.uniform(size=(40, 6))
+        states = minimum + (maximum - minimum) * np.where(random.uniform(size=(40, 6)) < 0.5, share.round(), share)
+        motion = KeplerMotion(states[:, :3], states[:, 3:], sun)
+        arrival_s, scaled = motion.arrival_s(), []
+        for second in range(80):
+            scaled.append(motion.sight().slope * speed * (arrival_s - second))
+            motion.advance(1.0)
+        model = with_gravity(quiet, sun, 0.0)
+        bounds = np.array([model.axis(name).acceleration_m_s2 for name in model.axes])
+        worst = np.maximum(worst, np.abs(np.diff(scaled, 2, axis=0)).max(axis=(0, 2)) / bounds)
+        assert np.abs(motion.velocity_m_s[:, 2] - states[:, 5]).max() < model.gravity_speed_change * speed
+    assert (worst <= 1.0).all()
+    assert worst[1] > 0.7

@@ -350,3 +350,44 @@ def test_a_simplex_is_one_simplex(states: int) -> None:
         simplex = Polytope.from_vertices(points)
         assert simplex.centroid() == pytest.approx(points.mean(axis=0), rel=1e-14)
         assert simplex.contains(simplex.sample(50), 1e-12).all()
+
+
+def test_other_published_cases() -> None:
+    # polytope issue 93: the constraints leave the direction (0, 0, 1, 1) free; vertices of 3e13 were returned.
+    rows = np.array(
+        [
+            [-1, 0, 0, 0],
+            [0, 1, 0, 0],
+            [0.5, -0.5, 0.5, -0.5],
+            [0.5, -0.5, -0.5, 0.5],
+            [0.5, 0.5, 0.5, -0.5],
+            [0, 0, -1, 0],
+        ]
+    )
+    with pytest.raises(UnboundedPolytopeError, match=r"along \(0, 0, 0.707, 0.707\)"):
+        Polytope.from_constraints(rows, [-0.33333, 0.3125, 0.05724, -0.01478, 0.3566, -0.16667])
+    # pycvxset issue 4: points on a segment, and its intersection with lines.
+    segment = Polytope.from_vertices([[3.0, 2.4], [6.0, 4.8]])
+    inside = segment.contains([[3.0, 2.4], [6.0, 4.8], [2.97, 2.376], [3.97, 3.176]])
+    assert inside.tolist() == [
+        True,
+        True,
+        False,
+        True,
+    ]
+    assert segment.cut([1.0, 0.0], 2.97, 2.97).is_empty
+    np.testing.assert_allclose(segment.cut([1.0, 0.0], 3.97, 3.97).vertices, [[3.97, 3.176]], rtol=1e-12)
+    # pycvxset, test_polytope_binary.py: a flat square less a cube is empty; less itself it is a point.
+    flat = Polytope.from_box([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0])
+    assert flat.minkowski_difference(Polytope.from_box([-1.0] * 3, [1.0] * 3)).is_empty
+    np.testing.assert_allclose(flat.minkowski_difference(flat).vertices, [[0.0, 0.0, 0.0]], atol=1e-12)
+    # pycvxset, test_polytope_unary.py: the projection of a cylinder.
+    cylinder = [[-1, 0, 0], [0, -1, 0], [1, 1, 0], [0, 0, 1], [0, 0, -1]]
+    shade = Polytope.from_constraints(cylinder, [0, 0, 1, 1, 1]).project([0, 1])
+    assert shade.equals(Polytope.from_vertices([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]), 1e-12)
+
+
+def test_cuts_that_leave_a_billionth_of_a_set() -> None:
+    box = Polytope.from_box([0, 0, 0], [1e9, 1, 1])
+    np.testing.assert_allclose(box.cut([1, 0, 0], upper=1.0).volume(), 1.0, rtol=1e-9)
+    np.testing.assert_allclose(box.cut([1, 1, 1], upper=1.0).volume(), 1.0 / 6.0, rtol=1e-9)

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from infoset.arrays import Floats
 from infoset.polytope import (
+    EmptyPolytopeError,
     Polytope,
+    UnboundedPolytopeError,
     _qhull,
     polytope_from_support,
     product,
@@ -315,3 +317,27 @@ def test_equations_in_mixed_units() -> None:
     rows, levels = [[0.0, 1e-7, 0.0], [0.0, 0.0, 1e6]], [1e-7, 1e6]
     segment = Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [1.0, 1.0], rows, levels)
     np.testing.assert_allclose(np.sort(segment.vertices, axis=0), [[-1.0, 1.0, 1.0], [1.0, 1.0, 1.0]], rtol=1e-9)
+
+
+def test_empty_says_by_how_much() -> None:
+    with pytest.raises(EmptyPolytopeError, match=r"relaxed by 0\.25") as caught:
+        Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-0.5, 0.0, 1.0, 1.0]).needed()
+    assert caught.value.relaxation == pytest.approx(0.25)
+    with pytest.raises(EmptyPolytopeError):
+        Polytope.from_constraints(
+            [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-1.0, 1, 1, 1, 1]
+        ).needed()
+    with pytest.raises(EmptyPolytopeError):
+        Polytope.from_constraints(
+            np.vstack([np.eye(2), -np.eye(2)]), np.ones(4), [[1.0, 0.0], [1.0, 0.0]], [0.0, 0.5]
+        ).needed()
+
+
+def test_unbounded_says_along_what() -> None:
+    with pytest.raises(UnboundedPolytopeError, match="along") as caught:
+        Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0, 1.0, 1.0])
+    assert caught.value.direction @ [1.0, 0.0] < -0.9
+    with pytest.raises(UnboundedPolytopeError):
+        Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0]], [1.0, 1.0])
+    with pytest.raises(UnboundedPolytopeError):
+        Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [0.0, 0.0], [[0.0, 1.0, 0.0]], [0.0])

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from rendezvous.reachability import (
     EmptyTubeError,
@@ -15,6 +17,7 @@ from rendezvous.reachability import (
     solve,
     tightened,
 )
+from rendezvous.reachability.conic import NoSolutionError
 
 Floats = NDArray[np.float64]
 Paper = Callable[..., ReachabilityProblem]
@@ -79,3 +82,14 @@ def test_the_terminal_spread_is_what_the_last_disturbance_does(paper: Paper) -> 
     assert open_loop.offsets is not None
     fixed = problem.state_bounds - open_loop.offsets[4, :6]
     assert (spread / problem.state_bounds).sum() < 0.6 * (fixed / problem.state_bounds).sum()
+
+
+def test_a_plan_that_is_not_optimal_is_refused(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    def shifted(*arguments: Any, **options: Any) -> Any:
+        result = linprog(*arguments, **options)
+        result.x = result.x + 1e-6
+        return result
+
+    monkeypatch.setattr("rendezvous.reachability.robust.linprog", shifted)
+    with pytest.raises(NoSolutionError, match="constraints violated by"):
+        feedback_plan(paper(), pushes(paper(), 1e-3))
