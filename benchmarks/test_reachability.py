@@ -17,7 +17,7 @@ from scipy.optimize import linprog
 from benchmarks.conftest import LINES
 from experiments.reachability.command import Reach
 from experiments.reachability.run import COMMAND
-from infoset.polytope import Polytope
+from infoset.geometry.polytope import Polytope
 from rendezvous.reachability import (
     MotionModel,
     ReachabilityProblem,

@@ -21,7 +21,7 @@ import numpy as np
 
 from experiments import load_scenario
 from guidance import NoiseKind
-from infoset import replays, section_passes, set_state
+from infoset.engine import replays, section_passes, set_state
 from sim import Scenario
 from sim.draws import draw
 from sim.engagement import Engagements

@@ -15,7 +15,7 @@ from sphinx.application import Sphinx
 import guidance
 import infoset
 import sim
-from infoset import polytope
+from infoset.geometry import polytope
 from rendezvous import multipoint, pareto, pursuit_evasion, reachability, relative_motion
 
 HERE = Path(__file__).resolve().parent
@@ -63,12 +63,12 @@ nitpick_ignore = [
         "experiments.reachability.file": ("Rendezvous",),
         "guidance.predictive": ("ManoeuvreState",),
         "guidance.proportional_navigation": ("PulseState",),
-        "infoset.observer_sets": ("Polygons", "Polytopes"),
+        "infoset.observer.sets": ("Polygons", "Polytopes"),
         "infoset.limits": ("Line",),
         "infoset.sensor": ("Measurements", "Geometry", "Apart", "Cuttable"),
         "infoset.sensors": ("RangeOrRanges",),
         "infoset.set_queries": ("SetQueries",),
-        "infoset.set_state": ("SetState",),
+        "infoset.engine.set_state": ("SetState",),
         "rendezvous.multipoint._shooting": ("ShotPath",),
         "sim.engagement": ("Step",),
         "sim.target": ("GivenTarget", "TargetMotion"),

@@ -8,23 +8,23 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from infoset.convex_polygons import ConvexPolygons
+from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
+from infoset.engine.set_state import SetStatus
+from infoset.geometry.convex_polygons import ConvexPolygons
+from infoset.geometry.zonotope import Zonotope
 from infoset.information_set import InformationSet, InformationSetView
 from infoset.model import InitialSet, Model, Recovery, SetModel, SetSettings, StateBox
-from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.sensor import Sensor
 from infoset.sensors import AngleSensor, Bias, RangeSensor, RateSensor
 from infoset.set_queries import Section, to_omega_alpha
-from infoset.set_state import SetStatus
-from infoset.zonotope import Zonotope
 
 if TYPE_CHECKING:
-    from infoset.linear_observer import Estimate, Inconsistency, LinearObserver
-    from infoset.polytope import Polytope
+    from infoset.geometry.polytope import Polytope
+    from infoset.observer.linear_observer import Estimate, Inconsistency, LinearObserver
 
 _LATE = {
-    **dict.fromkeys(("Estimate", "Inconsistency", "LinearObserver"), "infoset.linear_observer"),
-    "Polytope": "infoset.polytope",
+    **dict.fromkeys(("Estimate", "Inconsistency", "LinearObserver"), "infoset.observer.linear_observer"),
+    "Polytope": "infoset.geometry.polytope",
 }
 """Modules that import scipy, which takes longer than all others: imported when their names are used."""
 

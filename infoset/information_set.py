@@ -7,16 +7,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset import section_life, section_passes
 from infoset.arrays import Flags, Floats
-from infoset.guaranteed_miss import GuaranteedMiss
-from infoset.history import ANGLE, IMPULSE, PREDICTION, RATE, WIDENING, History
+from infoset.engine import section_life, section_passes
+from infoset.engine.guaranteed_miss import GuaranteedMiss
+from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, RATE, WIDENING, History
+from infoset.engine.section_law import BOUND_SLACK, section_laws
+from infoset.engine.section_stack import SectionStack
+from infoset.engine.set_state import SetState, SetStatus
 from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, real_values, shown
 from infoset.model import Recovery, SetModel
-from infoset.section_law import BOUND_SLACK, section_laws
-from infoset.section_stack import SectionStack
 from infoset.set_queries import SetQueries
-from infoset.set_state import SetState, SetStatus
 
 
 class InformationSetView(SetQueries):

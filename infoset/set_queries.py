@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import section_life
 from infoset.arrays import Flags, Floats
-from infoset.chain_storage import Chains
-from infoset.convex_polygons import ConvexPolygons
+from infoset.engine import section_life
+from infoset.engine.chain_storage import Chains
+from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
+from infoset.engine.replays import PROBE, ROWS, replay_label, replay_room
+from infoset.engine.section_stack import outline
+from infoset.engine.set_state import SetState, SetStatus
+from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, POSITIVE, WHOLE, Limits
-from infoset.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.replays import PROBE, ROWS, replay_label, replay_room
-from infoset.section_stack import outline
-from infoset.set_state import SetState, SetStatus
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

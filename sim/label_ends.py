@@ -11,8 +11,8 @@ import numpy as np
 
 from infoset import SetModel
 from infoset.arrays import Flags, Floats
-from infoset.section_law import section_laws
-from infoset.section_stack import impulse_doubts
+from infoset.engine.section_law import section_laws
+from infoset.engine.section_stack import impulse_doubts
 from sim.results import Results
 
 

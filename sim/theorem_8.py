@@ -9,7 +9,7 @@ from guidance.least_effort import unavoidable_m
 from guidance.situation import Situation
 from infoset import AngleSensor, SetModel
 from infoset.arrays import Flags, Floats
-from infoset.section_law import BOUND_SLACK, section_laws
+from infoset.engine.section_law import BOUND_SLACK, section_laws
 
 ONE_LABEL = 1e-7
 """Maximum width of the interval of labels, in labels: the misses of all its labels are the same."""

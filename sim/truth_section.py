@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from infoset import SetModel
 from infoset.arrays import Flags, Floats
-from infoset.history import ANGLE, IMPULSE, PREDICTION, RATE, History
-from infoset.replays import margins_along
-from infoset.section_law import BOUND_SLACK, law_table, section_laws
+from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, RATE, History
+from infoset.engine.replays import margins_along
+from infoset.engine.section_law import BOUND_SLACK, law_table, section_laws
 from infoset.set_queries import MaskedFloats
 from sim.kepler import Sight
 

@@ -16,7 +16,7 @@ from experiments.observer.file import ObserverProblem
 from infoset import Zonotope
 from infoset.arrays import Floats
 from infoset.limits import MAXIMUM
-from infoset.observer_sets import Set, polytope_of
+from infoset.observer.sets import Set, polytope_of
 
 MAX_CSV_BYTES = 10_000_000
 MAX_STATE = 1e40

@@ -15,9 +15,9 @@ from experiments.common.input_file import read_file
 from experiments.observer.command import MAX_STEPS
 from infoset import ConvexPolygons, LinearObserver, Zonotope
 from infoset.arrays import Floats
+from infoset.geometry.polytope import Polytope
 from infoset.limits import NOT_NEGATIVE, NUMBER, WHOLE, Description, Limits, Line, Name, Positive, real_values
-from infoset.observer_sets import Set
-from infoset.polytope import Polytope
+from infoset.observer.sets import Set
 
 Row = Annotated[tuple[float, ...], NUMBER]
 Rows = tuple[Row, ...]

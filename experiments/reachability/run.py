@@ -16,7 +16,7 @@ from experiments.reachability.file import Rendezvous
 from experiments.reachability.page import reachability_page
 from experiments.reachability.report import Member, Report, Robustness, report_json, report_lines, trajectories
 from infoset.arrays import Floats
-from infoset.polytope import UncertainHullError
+from infoset.geometry.polytope import UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
     Flight,

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csc_matrix, issparse, vstack
 
-from infoset.polytope import HIGHS
+from infoset.geometry.polytope import HIGHS
 from rendezvous._arrays import Floats
 
 MAX_VIOLATION, MAX_GAP, CONE_TOLERANCE = 1e-9, 1e-8, 1e-7

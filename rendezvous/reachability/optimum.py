@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from infoset.polytope import null_space_basis, relative_interior
+from infoset.geometry.polytope import null_space_basis, relative_interior
 from rendezvous._arrays import Flags, Floats, Places
 from rendezvous.reachability.admissible import Lifted, deep_point, lift, min_relaxation
 from rendezvous.reachability.conic import MAX_GAP, MAX_VIOLATION, ConeProgram, NoSolutionError

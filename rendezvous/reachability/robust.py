@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
-from infoset.polytope import HIGHS
+from infoset.geometry.polytope import HIGHS
 from rendezvous._arrays import Floats
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape

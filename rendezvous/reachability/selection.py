@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from infoset.polytope import EmptyPolytopeError, Polytope, UncertainHullError, relative_interior
+from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UncertainHullError, relative_interior
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, min_l1, min_peak, min_sum_of_norms, quadratic
 from rendezvous.reachability.conic import NoSolutionError

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from infoset.polytope import Polytope, polytope_from_support
+from infoset.geometry.polytope import Polytope, polytope_from_support
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
 from rendezvous.reachability.conic import MAX_GAP

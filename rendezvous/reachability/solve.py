@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.polytope import EmptyPolytopeError, UncertainHullError
+from infoset.geometry.polytope import EmptyPolytopeError, UncertainHullError
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, joined
 from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero

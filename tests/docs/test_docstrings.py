@@ -15,7 +15,7 @@ import pytest
 
 PACKAGES = (
     *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
-    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.polytope"),
+    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.geometry.polytope"),
     "experiments",
 )
 
@@ -23,7 +23,7 @@ RAISES_CHECKED = ("infoset", "guidance", "sim", "rendezvous")
 """Packages in which public functions document the exceptions that they raise."""
 
 WITHOUT_UNITS = (
-    *("infoset.ConvexPolygons", "infoset.polytope.", "infoset.Polytope.", "infoset.Zonotope"),
+    *("infoset.ConvexPolygons", "infoset.geometry.polytope.", "infoset.Polytope.", "infoset.Zonotope"),
     "infoset.LinearObserver",  # geometry and systems in any unit
     *(
         "sim.Distribution",

@@ -12,7 +12,7 @@ import experiments
 
 REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
 PACKAGES = (
-    *("infoset", "infoset.polytope", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto"),
+    *("infoset", "infoset.geometry.polytope", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto"),
     *("rendezvous.multipoint", "rendezvous.reachability", "rendezvous.pursuit_evasion"),
 )
 

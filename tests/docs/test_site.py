@@ -20,7 +20,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = (
     *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
-    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.polytope"),
+    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.geometry.polytope"),
 )
 LOADED = {"script": "src", "img": "src", "source": "src", "iframe": "src"}
 

@@ -1,8 +1,8 @@
 """Laws that the sets of `rendezvous` obey: polytopes in R^n and reachable sets.
 
 Shown elsewhere: hulls and intersections are those of exact rationals, supports of sums, images and projections,
-members of intersections, flat sets, empty and unbounded ones (`tests/infoset/polytope`); exact and lifted reachable
-sets agree with each other and with rationals, samples and selections are members (`tests/rendezvous/reachability`). The
+members of intersections, flat sets, empty and unbounded ones (`tests/infoset/geometry/polytope`); exact and lifted
+reachable sets agree with each other and with rationals, samples and selections are members (`tests/rendezvous/reachability`). The
 other problems have no set operations: a front of points (`tests/rendezvous/pareto`), paths, or numbers.
 
 Here: every operation is monotone and includes what it must; cuts, sums, hulls and intersections commute with linear
@@ -21,7 +21,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from infoset.arrays import Floats
-from infoset.polytope import (
+from infoset.geometry.polytope import (
     Polytope,
     product,
 )

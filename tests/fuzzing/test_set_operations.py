@@ -2,8 +2,8 @@
 
 Measuring again tells nothing new, more data and narrower bounds give smaller sets, the order of measurements does not
 matter, impulses add, prediction is a shear that keeps areas, sections are concave in the label, mirrors hold, powers of
-two are exact to the last bit. `tests/infoset/test_polygon_oracle.py` and `test_set_library.py` compare the operations
-of `ConvexPolygons` with exact rationals. Sets of the other problems are in `test_polytope_operations.py`.
+two are exact to the last bit. `tests/infoset/geometry/test_polygon_oracle.py` and `test_set_library.py` compare the
+operations of `ConvexPolygons` with exact rationals. Sets of the other problems are in `test_polytope_operations.py`.
 """
 
 from __future__ import annotations

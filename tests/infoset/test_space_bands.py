@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
-from infoset.section_law import section_laws
-from infoset.section_life import slope_band
+from infoset.engine.section_law import section_laws
+from infoset.engine.section_life import slope_band
 
 EPS = float(np.finfo(np.float64).eps)
 WIDE, SLOW = (-1e7, 1e7), (-100.0, 100.0)

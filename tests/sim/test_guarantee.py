@@ -15,7 +15,7 @@ import pytest
 from guidance import LineOfSight, NoiseKind, RandomNoise
 from infoset import InformationSetView, InitialSet, Model, RateSensor, StateBox
 from infoset.arrays import Floats
-from infoset.section_law import section_laws
+from infoset.engine.section_law import section_laws
 from sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
 from sim.draws import draw
 from sim.engagement import Engagements

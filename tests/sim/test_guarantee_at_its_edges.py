@@ -16,9 +16,9 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, RandomNoise, Thruster, TieRule
 from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
-from infoset.history import LastSight
-from infoset.section_law import BOUND_SLACK, SectionLaw, section_laws
-from infoset.section_life import rate_band
+from infoset.engine.history import LastSight
+from infoset.engine.section_law import BOUND_SLACK, SectionLaw, section_laws
+from infoset.engine.section_life import rate_band
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from infoset import InformationSet, InitialSet, Model, guaranteed_miss
-from infoset.history import IMPULSE
+from infoset import InformationSet, InitialSet, Model
+from infoset.engine import guaranteed_miss
+from infoset.engine.history import IMPULSE
 from sim import Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements

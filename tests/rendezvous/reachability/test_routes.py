@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from infoset.polytope import UncertainHullError
+from infoset.geometry.polytope import UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
     ReachabilityProblem,

@@ -1,0 +1,149 @@
+"""Storage of the sections of a batch: records of chains and their rings, and the room that a section needs.
+
+A batch of sections is stored in two arrays, `records` and `rings`; kernels take the address of the records of both
+chains, and the rings. Each ring has the size that its own section needs, so that a step accesses compact memory.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset._compile import ZERO, allocation_free, inlined, record_of
+from infoset.arrays import Floats
+from infoset.engine.chains import CAPACITY, MAX_ADDED, Chain, count_of, number_vertices, read, write
+
+ROOM_AT_START = 64
+"""Initial room of a chain, in vertices, a power of two."""
+ROOM_AHEAD = 8 * MAX_ADDED
+"""Additional room, in vertices, allocated when a section grows."""
+
+TAKEN = 0
+"""Index in the rings of the number of floats in use; rings that were replaced remain in use."""
+FIRST_RING = 8
+LINE = 8
+"""Floats in a cache line."""
+
+Records = NDArray[np.record]
+
+
+class Chains(NamedTuple):
+    """Chains of N sections.
+
+    Parameters
+    ----------
+    records : ndarray of `Chain`, shape (2 N,)
+        The right and the left chain of each section.
+    rings : ndarray, 1-D
+        Vertices of all chains, each (V, m) relative to the origin of its chain.
+    """
+
+    records: Records
+    rings: Floats
+
+
+def empty_sections(number: int, room: int = CAPACITY) -> Chains:
+    """Return empty chains with room for `room` vertices each, a power of two.
+
+    The rings are allocated at their maximum size; the operating system provides memory when it is written.
+    """
+    records = np.zeros(2 * number, dtype=record_of(Chain))
+    records["ring"] = FIRST_RING + (2 * room + LINE) * np.arange(2 * number)
+    records["mask"] = room - 1
+    rings = np.empty(FIRST_RING + 8 * CAPACITY * number)
+    rings[TAKEN] = FIRST_RING + 2 * (2 * room + LINE) * number
+    return Chains(records, rings)
+
+
+def with_room(rings: Floats, floats: int) -> Floats:
+    """Return rings with room for `floats` more floats: the same array if it has the room."""
+    taken = int(rings[TAKEN])
+    if taken + floats <= rings.size:
+        return rings
+    return copy_of_rings(rings, max(taken + floats, 2 * rings.size))
+
+
+def copy_of_rings(rings: Floats, size: int) -> Floats:
+    """Return a copy of the rings with `size` floats."""
+    taken = int(rings[TAKEN])
+    copy = np.empty(size)
+    copy[:taken] = rings[:taken]
+    return copy
+
+
+def working_room() -> Floats:
+    """Return the working array of the operations on whole chains."""
+    return np.empty((3 * CAPACITY + 4, 2))
+
+
+@inlined
+def chains_of(records: Records, n: int) -> tuple[Chain, Chain]:
+    """Return the right and the left chain of a section."""
+    return records[np.uint64(2 * n)], records[np.uint64(2 * n + 1)]
+
+
+@inlined
+def room_of(right: Chain) -> int:
+    """Room of each chain of a section, in vertices."""
+    return right.mask + 1
+
+
+@inlined
+def room_for(vertices: int, room: int) -> int:
+    """Room for `vertices` vertices, a power of two and at least `room`."""
+    while room < vertices:
+        room *= 2
+    return room
+
+
+@inlined
+def floats_of(room: int) -> int:
+    """Floats of a ring. One cache line more than its vertices: rings must not all start in the same cache lines."""
+    return 2 * room + LINE
+
+
+@allocation_free
+def widen_rings(right: Chain, left: Chain, rings: Floats, room: int) -> None:
+    """Move both chains of a section to new rings of `room` vertices, a power of two, at the end of those in use."""
+    for chain in (right, left):
+        first = int(rings[TAKEN])
+        rings[TAKEN] = first + floats_of(room)
+        for i in range(chain.begin, chain.end):
+            v, m = read(chain, rings, i)
+            at = first + 2 * (i & (room - 1))
+            rings[np.uint64(at)] = v
+            rings[np.uint64(at + 1)] = m
+        chain.ring = first
+        chain.mask = room - 1
+
+
+@inlined
+def copy_chain(chain: Chain, rings: Floats, to: Chain, to_rings: Floats) -> None:
+    """Copy a chain to another one, whose ring must have enough room."""
+    to.v = chain.v
+    to.v_rest = chain.v_rest
+    to.m = chain.m
+    to.m_rest = chain.m_rest
+    to.reach = chain.reach
+    to.begin = chain.begin
+    to.end = chain.end
+    to.peak = chain.peak
+    for i in range(chain.begin, chain.end):
+        v, m = read(chain, rings, i)
+        write(to, to_rings, i, v, m)
+
+
+@allocation_free
+def copy_section(records: Records, rings: Floats, n: int, to_records: Records, to_rings: Floats, to: int) -> None:
+    """Copy a section to section `to` of other chains, whose rings must have enough unused room."""
+    right, left = chains_of(records, n)
+    to_right, to_left = chains_of(to_records, to)
+    number_vertices(to_right, ZERO)
+    number_vertices(to_left, ZERO)
+    wanted = room_for(min(count_of(right, left) + ROOM_AHEAD, CAPACITY), room_of(to_right))
+    if wanted > room_of(to_right):
+        widen_rings(to_right, to_left, to_rings, wanted)
+    copy_chain(right, rings, to_right, to_rings)
+    copy_chain(left, rings, to_left, to_rings)

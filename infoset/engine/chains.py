@@ -1,0 +1,500 @@
+"""Compiled operations on a section: a convex polygon, stored as two chains of vertices.
+
+The coordinates are (V, m) with m = z + V tau, where tau is the time to go: m is the predicted miss, which is constant
+in free motion, and z = m - tau V. The height of a vertex is z, and a level is a line of constant z. Cuts and
+disturbances act relative to the levels: a cut removes the highest or the lowest part, and a disturbance moves the two
+sides apart along the level. Therefore the boundary is stored as a RIGHT chain from the lowest vertex to the highest and
+a LEFT chain from the highest vertex to the lowest:
+
+* a disturbance moves each chain as a whole, an impulse moves both: only the origins of the chains change;
+* a cut removes vertices from the ends of the chains and inserts the intersections with its line;
+* as tau decreases, the levels turn in a constant direction, and the last vertices of each chain pass to the other one;
+* the maximum predicted miss is at the peak of the right chain, the minimum at the peak of the left one. A peak changes
+  only when a cut removes it.
+
+A vertex is inserted once, changes chains once or twice and is removed once, so the cost of a step is constant.
+
+The left chain has the structure of the right one rotated by 180 degrees: the sign of its side times the height
+increases along each chain. Each chain is a ring buffer. Edges along the level join its ends to those of the other
+chain; their length is zero where the chains meet. `chain_storage` contains the arrays of a batch of sections.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from infoset._compile import allocation_free, constants, inlined
+from infoset.arrays import Floats
+from infoset.geometry import polygon, polygon_hull
+from infoset.geometry.polygon_exact import two_product, two_sum
+
+EPSILON = float(np.finfo(np.float64).eps)
+CAPACITY = 256
+"""Maximum number of vertices of a section, a power of two."""
+MAX_ADDED = 4
+"""Maximum number of vertices that one step adds: two at each of its two turns."""
+REDUCED = 160
+"""Number of vertices to which a section of CAPACITY vertices is reduced."""
+ZERO, ONE, TWO = constants(3)
+FORWARD, BACKWARD = ONE, -ONE
+"""Directions along a chain."""
+
+
+class Chain(Protocol):
+    """Record of a chain.
+
+    Parameters
+    ----------
+    v, v_rest, m, m_rest : float
+        Origin, m/s and m. Each coordinate is a sum of two floats, since it changes at every step and rounding errors
+        must not accumulate.
+    reach : float
+        Bound of |V| over the section's history, m/s, to which rounding errors are relative; in the right chain only.
+    begin, end, peak : int
+        Number of the first vertex, one past that of the last, and that of the peak.
+    ring, mask : int
+        Offset of the ring in `rings`, and the ring's size minus one. The size is a power of two, and a vertex is stored
+        at its number modulo the size.
+    """
+
+    v: float
+    v_rest: float
+    m: float
+    m_rest: float
+    reach: float
+    begin: int
+    end: int
+    peak: int
+    ring: int
+    mask: int
+
+
+@inlined
+def offset_of(chain: Chain, i: int) -> int:
+    """Offset of a vertex in the rings."""
+    return chain.ring + 2 * (i & chain.mask)
+
+
+@inlined
+def read(chain: Chain, rings: Floats, i: int) -> tuple[float, float]:
+    """Return V and m of a vertex relative to the origin of its chain.
+
+    Offsets are unsigned: the test for negative indices would take longer than the access.
+    """
+    at = offset_of(chain, i)
+    return rings[np.uint64(at)], rings[np.uint64(at + 1)]
+
+
+@inlined
+def write(chain: Chain, rings: Floats, i: int, v: float, m: float) -> None:
+    """Write a vertex relative to the origin of its chain."""
+    at = offset_of(chain, i)
+    rings[np.uint64(at)] = v
+    rings[np.uint64(at + 1)] = m
+
+
+@inlined
+def number_vertices(chain: Chain, count: int) -> None:
+    """Note that a chain consists of `count` vertices, numbered from zero, and that its peak is not known."""
+    chain.begin = 0
+    chain.end = count
+    chain.peak = 0
+
+
+@inlined
+def count_of(right: Chain, left: Chain) -> int:
+    """Number of vertices of both chains."""
+    return (right.end - right.begin) + (left.end - left.begin)
+
+
+@inlined
+def height_in(chain: Chain, rings: Floats, i: int, tau: float) -> float:
+    """Height of a vertex relative to the origin of its chain."""
+    v, m = read(chain, rings, i)
+    return m - tau * v
+
+
+@inlined
+def origin_height(chain: Chain, tau: float) -> float:
+    """Height of the origin of a chain."""
+    return (chain.m - tau * chain.v) + (chain.m_rest - tau * chain.v_rest)
+
+
+@inlined
+def vertex(chain: Chain, rings: Floats, i: int) -> tuple[float, float]:
+    """Return V and m of a vertex."""
+    v, m = read(chain, rings, i)
+    return (v + chain.v_rest) + chain.v, (m + chain.m_rest) + chain.m
+
+
+@inlined
+def move(chain: Chain, v: float, m: float) -> None:
+    """Add to the origin of a chain; the second float of each coordinate takes the rounding error."""
+    chain.v, v_rest = two_sum(chain.v, v)
+    chain.m, m_rest = two_sum(chain.m, m)
+    chain.v_rest += v_rest
+    chain.m_rest += m_rest
+
+
+@inlined
+def move_to_zero(chain: Chain) -> None:
+    """Set the origin of a chain to zero."""
+    chain.v = chain.v_rest = chain.m = chain.m_rest = 0.0
+
+
+@allocation_free
+def start(
+    right: Chain,
+    left: Chain,
+    rings: Floats,
+    tau: float,
+    bottom: tuple[float, float, float],
+    top: tuple[float, float, float],
+) -> None:
+    """Write a trapezium between two levels at time to go `tau`, s.
+
+    `bottom` and `top` are the minimum V, the maximum V, m/s, and z, m, of each level.
+    """
+    for chain in (right, left):
+        move_to_zero(chain)
+        number_vertices(chain, TWO)
+    write(right, rings, ZERO, bottom[1], bottom[2] + tau * bottom[1])
+    write(right, rings, ONE, top[1], top[2] + tau * top[1])
+    write(left, rings, ZERO, top[0], top[2] + tau * top[0])
+    write(left, rings, ONE, bottom[0], bottom[2] + tau * bottom[0])
+    right.reach = max(abs(bottom[0]), abs(bottom[1]), abs(top[0]), abs(top[1]))
+
+
+@inlined
+def hand_over(
+    giver: Chain,
+    taker: Chain,
+    rings: Floats,
+    sign: float,
+    between: tuple[float, float, float],
+    same: tuple[float, float],
+    tau: float,
+) -> None:
+    """Move the vertices of a chain after its highest one to the front of the other chain.
+
+    `sign` is 1 if the giver is the right chain, else -1. `between` has V, m and height of the giver's origin relative
+    to the taker's, `same` the rounding errors of a difference of V, and of the difference of the origins' heights.
+
+    A decreasing time to go raises the right side, so only vertices whose predecessor is on the outer side are moved.
+    Without a turn of the level, heights along it are equal to within rounding, and no vertex may be moved. Where both
+    chains end in the same vertex, their copies differ only by rounding: moving it again would add a vertex at every
+    second step.
+    """
+    first, back, front = giver.begin, giver.end - 1, taker.begin
+    v, m = read(giver, rings, back)
+    rise = sign * (m - tau * v)
+    same_v, same_rise = same[0], same[1] + 4.0 * EPSILON * abs(m)
+    front_v, front_m = read(taker, rings, front)
+    front_rise = sign * (front_m - tau * front_v)
+    while True:
+        if rise + sign * between[2] > front_rise + same_rise:
+            front -= 1
+            front_v, front_m = v + between[0], m + between[1]
+            write(taker, rings, front, front_v, front_m)
+            front_rise = sign * (front_m - tau * front_v)
+        if back == first:
+            break
+        before_v, before_m = read(giver, rings, back - 1)
+        before_rise = sign * (before_m - tau * before_v)
+        if before_rise < rise - same_rise or sign * (v - before_v) > same_v:
+            break
+        # Vertices that coincide to within rounding must not stop the search.
+        if before_rise < rise and abs(v - before_v) > same_v:
+            break
+        back -= 1
+        v, m, rise = before_v, before_m, before_rise
+    giver.end = back + 1
+    taker.begin = front
+
+
+@inlined
+def turn(right: Chain, left: Chain, rings: Floats, tau: float) -> None:
+    """Decrease the time to go to `tau`: the level turns, and the chains get new highest and lowest ends."""
+    same_v = 4.0 * EPSILON * right.reach
+    same_m = 2.0 * EPSILON * (abs(right.m) + abs(left.m))
+    same = (same_v, same_m + tau * same_v)
+    v = (right.v - left.v) + (right.v_rest - left.v_rest)
+    m = (right.m - left.m) + (right.m_rest - left.m_rest)
+    height = origin_height(right, tau) - origin_height(left, tau)
+    hand_over(right, left, rings, 1.0, (v, m, height), same, tau)
+    hand_over(left, right, rings, -1.0, (-v, -m, -height), same, tau)
+
+
+@inlined
+def spread(right: Chain, left: Chain, tau: float, half_v: float) -> None:
+    """Add the segment of V from -half_v to half_v along the level of `tau` (Minkowski sum)."""
+    half_m = half_v * tau
+    move(right, half_v, half_m)
+    move(left, -half_v, -half_m)
+    right.reach += half_v
+
+
+@inlined
+def shift(right: Chain, left: Chain, tau: float, v: float) -> None:
+    """Move a section by `v` along the level of `tau`: z is unchanged, the predicted miss changes by v tau."""
+    m, rest = two_product(v, tau)
+    move(right, v, m)
+    move(left, v, m)
+    right.m_rest += rest
+    left.m_rest += rest
+    right.reach += abs(v)
+
+
+@inlined
+def heights(right: Chain, left: Chain, rings: Floats, tau: float) -> tuple[float, float]:
+    """Minimum and maximum z of a section at time to go `tau`."""
+    right_origin, left_origin = origin_height(right, tau), origin_height(left, tau)
+    minimum = min(
+        right_origin + height_in(right, rings, right.begin, tau),
+        left_origin + height_in(left, rings, left.end - 1, tau),
+    )
+    maximum = max(
+        right_origin + height_in(right, rings, right.end - 1, tau),
+        left_origin + height_in(left, rings, left.begin, tau),
+    )
+    return minimum, maximum
+
+
+@inlined
+def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level: float) -> int:
+    """Remove the part of a chain above a level, and add a vertex at the intersection; return its number, the new end.
+
+    `way` is the direction from the end that is cut: FORWARD from the first vertex, BACKWARD from the last one. With
+    `up` = 1 greater z is removed, with -1 lesser z. `level` is `up` times the height of the level relative to the
+    chain's origin, m.
+    """
+    end, other_end = (chain.begin, chain.end - 1) if way == FORWARD else (chain.end - 1, chain.begin)
+    v, m = read(chain, rings, end)
+    height = up * (m - tau * v)
+    if height <= level:
+        return end
+    while end != other_end:
+        inner_v, inner_m = read(chain, rings, end + way)
+        inner_height = up * (inner_m - tau * inner_v)
+        if inner_height <= level:
+            # Interpolated from the nearer end of the edge, for the minimum rounding error.
+            if level - inner_height <= height - level:
+                v = inner_v + (level - inner_height) / (height - inner_height) * (v - inner_v)
+            else:
+                v += (level - height) / (inner_height - height) * (inner_v - v)
+            break
+        v, height = inner_v, inner_height
+        end += way
+    write(chain, rings, end, v, up * level + tau * v)
+    return end
+
+
+@inlined
+def cut(right: Chain, left: Chain, rings: Floats, tau: float, lower: float, upper: float) -> tuple[bool, float]:
+    """Intersect a section at time to go `tau` with the band lower <= z <= upper.
+
+    Return whether it lives, and the smaller overlap of section and band at the two borders, m: minus their distance if
+    they do not intersect. If the intersection is empty, the section is unchanged. A band with `lower` above `upper` is
+    empty: that of a label behind x = 0, or beyond the range at which the error bound is zero.
+    """
+    minimum, maximum = heights(right, left, rings, tau)
+    overlap = min(maximum - lower, upper - minimum)
+    if overlap < 0.0 or lower > upper:
+        return False, min(overlap, upper - lower)
+    right_height, left_height = origin_height(right, tau), origin_height(left, tau)
+    if maximum > upper:
+        right.end = cut_end(right, rings, BACKWARD, 1.0, tau, upper - right_height) + 1
+        left.begin = cut_end(left, rings, FORWARD, 1.0, tau, upper - left_height)
+    if minimum < lower:
+        left.end = cut_end(left, rings, BACKWARD, -1.0, tau, left_height - lower) + 1
+        right.begin = cut_end(right, rings, FORWARD, -1.0, tau, right_height - lower)
+    return True, overlap
+
+
+@inlined
+def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int:
+    """Return the number of the vertex with the maximum (right chain) or minimum (left chain) predicted miss; store it.
+
+    `sign` is 1 for the right chain, -1 for the left one. `magnitude` is that of the terms of the predicted misses, to
+    which their rounding error is relative, m. The search starts at the previous peak and ends where the miss decreases
+    by more than rounding, so that vertices that nearly coincide do not stop it.
+    """
+    first, last = chain.begin, chain.end - 1
+    peak = min(max(chain.peak, first), last)
+    miss = sign * read(chain, rings, peak)[1]
+    rounding = 16.0 * EPSILON * (abs(miss) + magnitude)
+    start_at = peak
+    for way in (1, -1):
+        i = start_at + way
+        while first <= i <= last:
+            here = sign * read(chain, rings, i)[1]
+            if here > miss:
+                peak, miss = i, here
+            elif here < miss - rounding:
+                break
+            i += way
+    chain.peak = peak
+    return peak
+
+
+@inlined
+def first_near_peak(chain: Chain, rings: Floats, sign: float, tolerance: float) -> int:
+    """First vertex before the peak whose predicted miss equals that of the peak to within a tolerance."""
+    i = chain.peak
+    level = sign * read(chain, rings, i)[1] - tolerance
+    while i > chain.begin and sign * read(chain, rings, i - 1)[1] >= level:
+        i -= 1
+    return i
+
+
+@inlined
+def max_and_min_miss(right: Chain, left: Chain, rings: Floats, tau: float) -> tuple[float, float]:
+    """Return the maximum and the minimum predicted miss of a section; store their vertices as peaks."""
+    # A miss is z + V tau; both terms may be far greater than the sum.
+    reach = tau * right.reach
+    _, upper = vertex(right, rings, find_peak(right, rings, 1.0, abs(right.m) + reach))
+    _, lower = vertex(left, rings, find_peak(left, rings, -1.0, abs(left.m) + reach))
+    return upper, lower
+
+
+@allocation_free
+def extreme_points(
+    right: Chain, left: Chain, rings: Floats, tau: float, relative: float, slack: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return points with the extremes of the predicted miss; `max_and_min_miss` must have stored the peaks.
+
+    They are V and m of the lowest point with the maximum miss, and of the highest point with the minimum. `relative`
+    and `slack` are tolerances for equal misses, relative to the interval and to the magnitudes of the terms.
+    """
+    upper_v, upper = vertex(right, rings, right.peak)
+    lower_v, lower = vertex(left, rings, left.peak)
+    magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
+    tolerance = relative * (upper - lower) + slack * magnitude
+    upper_at = first_near_peak(right, rings, 1.0, tolerance)
+    lower_at = first_near_peak(left, rings, -1.0, tolerance)
+    return vertex(right, rings, upper_at), vertex(left, rings, lower_at)
+
+
+@inlined
+def vertex_from(chain: Chain, rings: Floats, i: int, tau: float, v: float, z: float) -> tuple[float, float]:
+    """Vertex of a chain relative to a state, in the plane of V x/e and z, m."""
+    offset_v, offset_z = tau * (chain.v - v + chain.v_rest), origin_height(chain, tau) - z
+    chain_v, chain_m = read(chain, rings, i)
+    return tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z
+
+
+@allocation_free
+def margin_in(right: Chain, left: Chain, rings: Floats, tau: float, v: float, z: float) -> float:
+    """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
+    last_v, last_m = vertex(left, rings, left.end - 1)
+    rounded = (tau * (last_v - v), (last_m - tau * last_v) - z)
+    end = vertex_from(left, rings, left.end - 1, tau, v, z)
+    last = vertex_from(right, rings, right.begin, tau, v, z)
+    # The edge between the chains: a start rounded to absolute coordinates may be beyond the state in a section that is
+    # thinner than this rounding. It is used for the distance only, which keeps the last digit of published margins.
+    nearest, _ = polygon.pass_edge(np.inf, False, rounded, last, 0.0, 0.0)
+    _, inside = polygon.pass_edge(np.inf, False, end, last, 0.0, 0.0)
+    for chain in (right, left):
+        for i in range(chain.begin, chain.end):
+            end = vertex_from(chain, rings, i, tau, v, z)
+            nearest, inside = polygon.pass_edge(nearest, inside, last, end, 0.0, 0.0)
+            last = end
+    return math.sqrt(nearest) if inside else -math.sqrt(nearest)
+
+
+@allocation_free
+def outline(right: Chain, left: Chain, rings: Floats, tau: float, out: Floats) -> int:
+    """Write the vertices (V, z), counter-clockwise; return their number, at most CAPACITY.
+
+    A point in which the chains meet is stored in both, equal to within rounding. It is written once.
+    """
+    made = ZERO
+    for chain in (right, left):
+        for i in range(chain.begin, chain.end):
+            v, m = vertex(chain, rings, i)
+            z = m - tau * v
+            if i > chain.begin or made == 0 or not meets(out, made - 1, v, z, right.reach, tau):
+                made = polygon.append(out, made, v, z)
+    while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], right.reach, tau):
+        made -= 1
+    return made
+
+
+@allocation_free
+def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) -> bool:
+    """Whether a vertex equals (V, z) to within the rounding error of a change of chains."""
+    close_v = abs(points[i, 0] - v) <= 4.0 * EPSILON * reach
+    return bool(close_v and abs(points[i, 1] - z) <= 4.0 * EPSILON * (abs(z) + 2.0 * tau * reach))
+
+
+@inlined
+def is_crowded(right: Chain, left: Chain) -> bool:
+    """Whether the next step may increase the number of vertices beyond CAPACITY."""
+    return count_of(right, left) > CAPACITY - MAX_ADDED
+
+
+@allocation_free
+def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points: Floats) -> None:
+    """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
+
+    An edge is removed by extending its neighbours to their intersection; the edge that adds the minimum area is removed
+    first. Vertices that are not convex because of rounding are removed before. If no edge can be removed, three sides
+    of a box around the chain replace it. `points`, shape (3 CAPACITY + 4, 2), is a working array.
+    """
+    in_right, in_left = right.end - right.begin, left.end - left.begin
+    longer, sign = (right, 1.0) if in_right > in_left else (left, -1.0)
+    count = ZERO
+    for i in range(longer.begin, longer.end):
+        v, m = read(longer, rings, i)
+        count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
+    most = REDUCED - min(in_right, in_left)
+    count, done = polygon_hull.drop_inner_edges(points, count, most, points[CAPACITY + 2 :])
+    if not done:
+        count = polygon_hull.box_around(points, count, sign, tau)
+    for i in range(count):
+        write(longer, rings, i, points[i, 0], points[i, 1])
+        # |V| of a new vertex may exceed the previous bound.
+        v, _ = vertex(longer, rings, i)
+        right.reach = max(right.reach, abs(v))
+    number_vertices(longer, count)
+
+
+@allocation_free
+def cut_misses(
+    right: Chain, left: Chain, rings: Floats, tau: float, tilt: float, lower: float, upper: float, points: Floats
+) -> tuple[bool, float]:
+    """Intersect a section with the band lower <= m + V tilt <= upper; returns are those of `cut`.
+
+    This band is not parallel to the level, so that it may cut any edge: the chains are computed anew. O(vertices).
+    `points` is a working array of CAPACITY + 2 vertices.
+    """
+    count = ZERO
+    for chain in (right, left):
+        for i in range(chain.begin, chain.end):
+            v, m = vertex(chain, rings, i)
+            count = polygon.append(points, count, v, m)
+    count, overlap = polygon.clip_to_band(points, count, tilt, 1.0, lower, upper)
+    if count == 0:
+        return False, overlap
+    bottom, top = polygon.extremes(points, count, -tau, 1.0)
+    thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
+    if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * right.reach):
+        # All heights are equal to within rounding: the vertices of extreme V are the ends of both chains.
+        bottom, top = polygon.extremes(points, count, -1.0, 0.0)
+    write_chain(right, rings, points, count, bottom, top)
+    write_chain(left, rings, points, count, top, bottom)
+    return True, overlap
+
+
+@allocation_free
+def write_chain(chain: Chain, rings: Floats, points: Floats, count: int, first: int, last: int) -> None:
+    """Write the vertices of a polygon from one to another, counter-clockwise, as a chain."""
+    length = (last - first) % count + 1
+    for i in range(length):
+        at = (first + i) % count
+        write(chain, rings, i, points[at, 0], points[at, 1])
+    move_to_zero(chain)
+    number_vertices(chain, length)

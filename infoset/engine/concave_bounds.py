@@ -1,0 +1,73 @@
+"""Bounds of a concave function of the label between sampled labels: of supports and of overlaps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from infoset._compile import ZERO, allocation_free
+from infoset.arrays import Floats
+from infoset.engine.replays import Records
+
+CERTAIN = 1e-13
+"""Labels count as dead if their overlap is certainly less than minus this number times the label."""
+
+
+@allocation_free
+def line_at(x: float, x0: float, y0: float, x1: float, y1: float) -> float:
+    """Value at x of the line through two points."""
+    return y0 + (y1 - y0) * ((x - x0) / (x1 - x0))
+
+
+@allocation_free
+def bound_between(
+    labels: Floats, values: Floats, number: int, first: int, p: float, q: float, slope: float, centre: float
+) -> float:
+    """Upper bound on [p, q] of a concave function with given values, plus slope (x - centre).
+
+    `labels` are `number` increasing arguments, of which `first` are at most p and the others at least q; `values` are
+    those of the function. Outside of two of its points, a concave function lies below the line through them. The bound
+    is infinite if neither side has two points.
+    """
+    has_left, has_right = first >= 2, number - first >= 2
+    left_p = left_q = right_p = right_q = np.inf
+    if has_left:
+        a, b = first - 2, first - 1
+        left_p = line_at(p, labels[a], values[a], labels[b], values[b])
+        left_q = line_at(q, labels[a], values[a], labels[b], values[b])
+    if has_right:
+        a, b = first, first + 1
+        right_p = line_at(p, labels[a], values[a], labels[b], values[b])
+        right_q = line_at(q, labels[a], values[a], labels[b], values[b])
+    best = max(min(left_p, right_p) + slope * (p - centre), min(left_q, right_q) + slope * (q - centre))
+    if has_left and has_right and (left_p < right_p) != (left_q < right_q):
+        share = (right_p - left_p) / ((right_p - left_p) - (right_q - left_q))
+        x = p + share * (q - p)
+        best = max(best, left_p + share * (left_q - left_p) + slope * (x - centre))
+    return best
+
+
+@allocation_free
+def is_dead_between(dead: Records, latest: Floats) -> bool:
+    """Return whether all labels from the first to the last of some dead labels, in increasing order, are dead.
+
+    The overlap at the latest event at which one of them became empty is a concave function of the label. `latest`,
+    shape (2, len(dead)), is a working array.
+    """
+    last_event = dead[0].died
+    for i in range(1, len(dead)):
+        last_event = max(last_event, dead[i].died)
+    known, values = latest[0], latest[1]
+    count = ZERO
+    for i in range(len(dead)):
+        if dead[i].died == last_event and (count == 0 or dead[i].label > known[count - 1]):
+            known[count], values[count] = dead[i].label, dead[i].overlap
+            count += 1
+    minimum, maximum = dead[0].label, dead[len(dead) - 1].label
+    rounding = -CERTAIN * maximum
+    if minimum < known[0] and bound_between(known, values, count, ZERO, minimum, known[0], 0.0, 0.0) >= rounding:
+        return False
+    for i in range(count - 1):
+        if bound_between(known, values, count, i + 1, known[i], known[i + 1], 0.0, 0.0) >= rounding:
+            return False
+    last = known[count - 1]
+    return bool(last == maximum or bound_between(known, values, count, count, last, maximum, 0.0, 0.0) < rounding)

@@ -1,0 +1,442 @@
+"""Compiled operations on all sections of a batch of engagements; `section_life` contains those on one section."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset._compile import ZERO, allocation_free, entry, inlined, record_of
+from infoset.arrays import Flags, Floats, Integers
+from infoset.engine import chain_storage, chains
+from infoset.engine.chain_storage import chains_of
+from infoset.engine.history import LastSight, Tapes
+from infoset.engine.section_law import Laws, SectionLaw, law_of
+from infoset.engine.section_life import (
+    ALIVE,
+    CUT_SLACK,
+    LOWER_MISS,
+    SUMMARY_COLUMNS,
+    UPPER_MISS,
+    Z_MAX,
+    Z_MIN,
+    across_of,
+    impulse_doubt,
+    measure_rate_section,
+    measure_section,
+    predict_section,
+    range_of,
+    shift_section,
+    sight_after,
+    start_section,
+    steepest_angles,
+    summarise_section,
+    time_to_go,
+)
+
+TIE_TOLERANCE = 1e-9
+
+
+class Slot(Protocol):
+    """Record of a slot.
+
+    Parameters
+    ----------
+    label : float
+        Label, m.
+    living : bool
+        Whether the slot contains sections that are not empty.
+    died : int
+        Number of the event that made a section empty, or ALIVE.
+    overlap : float
+        Overlap of an empty section with the band that made it empty, m: negative. The minimum one if several became
+        empty at that event.
+    emptied : int
+        Axis of the section with that overlap.
+    """
+
+    label: float
+    living: bool
+    died: int
+    overlap: float
+    emptied: int
+
+
+class Sections(NamedTuple):
+    """B engagements x S slots for one section each, in the plane of each of C lateral axes.
+
+    A label lives if it lives in all planes: the set at a label is the product of its sections.
+
+    Parameters
+    ----------
+    slots : ndarray of `Slot`, shape (B, S)
+        The slots in use are first, with increasing labels.
+    used : ndarray of int, shape (B,)
+        Number of slots in use.
+    records, rings : ndarray
+        The polygons, stored as in `chain_storage`: slot s of engagement b is section (c B + b) S + s for axis c.
+    summaries : ndarray, shape (C, B, S, columns)
+        Extremes of the predicted miss and of z, m.
+    rows : ndarray of int, shape (B S, 3)
+        Working array for a list of sections: row, engagement and slot.
+    """
+
+    slots: NDArray[np.record]
+    used: Integers
+    records: chain_storage.Records
+    rings: Floats
+    summaries: Floats
+    rows: Integers
+
+
+def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections:
+    """Allocate the arrays of a batch of sections for a number of axes."""
+    slots = np.zeros(labels.shape, dtype=record_of(Slot))
+    slots["label"], slots["died"] = labels, ALIVE
+    records, rings = chain_storage.empty_sections(channels * labels.size, chain_storage.ROOM_AT_START)
+    return Sections(
+        slots=slots,
+        used=used,
+        records=records,
+        rings=rings,
+        summaries=np.zeros((channels, *labels.shape, SUMMARY_COLUMNS)),
+        rows=np.empty((labels.size, 3), dtype=np.int64),
+    )
+
+
+@inlined
+def row_of(sections: Sections, channel: int, b: int, s: int) -> int:
+    """Row of a section among the polygons."""
+    return int((channel * sections.slots.shape[0] + b) * sections.slots.shape[1] + s)
+
+
+@entry
+def start_all(sections: Sections, laws: Laws) -> None:
+    """Write the initial sections of a batch, without their summaries."""
+    slots, used = sections.slots, sections.used
+    records, rings = sections.records, sections.rings
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        for b in range(len(used)):
+            for s in range(used[b]):
+                right, left = chains_of(records, row_of(sections, channel, b, s))
+                start_section(right, left, rings, slots[b, s].label, law)
+                slots[b, s].living = True
+
+
+@inlined
+def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool:
+    """Whether a section is cut at an event: if the label lives, or another axis has just made it empty.
+
+    The overlap of a label that an event makes empty is the smallest one of its axes, whatever their order.
+    """
+    slot = sections.slots[b, s]
+    return bool(slot.living or (channel > 0 and slot.died == event))
+
+
+@inlined
+def bury(slot: Slot, channel: int, event: int, overlap: float) -> int:
+    """Note that an event has made a section empty; return 1 if the label lived until now, else 0."""
+    lived = slot.living
+    if lived or overlap < slot.overlap:
+        slot.overlap = overlap
+        slot.emptied = channel
+    slot.living = False
+    slot.died = event
+    return 1 if lived else 0
+
+
+@allocation_free
+def list_rows(
+    channel: int, event: int, first: Flags, second: Flags, third: Flags, every: bool, sections: Sections
+) -> int:
+    """List the sections of an axis in any of three groups of engagements, or in all; return their number."""
+    used, rows = sections.used, sections.rows
+    count = 0
+    for b in range(len(used)):
+        if first[b] or second[b] or third[b] or every:
+            for s in range(used[b]):
+                if is_cut(sections, channel, event, b, s):
+                    rows[count, 0], rows[count, 1], rows[count, 2] = row_of(sections, channel, b, s), b, s
+                    count += 1
+    return count
+
+
+@entry
+def step_all(
+    behind: Flags,
+    measured: Flags,
+    stale: Flags,
+    heights_wanted: bool,
+    alpha: Floats,
+    elapsed: int,
+    event: int,
+    sections: Sections,
+    laws: Laws,
+) -> int:
+    """Predict, cut and summarise the living sections in one pass; return the number of labels that became empty.
+
+    Sections of engagements that are `behind` are at step `elapsed` - 1 and are moved to step `elapsed`. Those that are
+    `measured` are cut by an angle, `alpha` of shape (C, B), rad, and summarised; those that are `stale` are summarised.
+    `event` is the number of the measurement, -1 without one. `heights_wanted` writes the minimum and the maximum z of
+    all sections.
+    """
+    deaths = 0
+    slots, summaries, rows = sections.slots, sections.summaries, sections.rows
+    records, rings = sections.records, sections.rings
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        count = list_rows(channel, event, behind, measured, stale, heights_wanted, sections)
+        for k in range(count):
+            b, s = rows[k, 1], rows[k, 2]
+            slot = slots[b, s]
+            right, left = chains_of(records, rows[k, 0])
+            if behind[b]:
+                predict_section(right, left, rings, slot.label, elapsed, law)
+            if measured[b]:
+                survives, overlap = measure_section(
+                    right, left, rings, slot.label, elapsed, alpha[channel, b], across_of(alpha, b, law), law
+                )
+                if not survives:
+                    deaths += bury(slot, channel, event, overlap)
+                if not slot.living:
+                    continue
+            if measured[b] or stale[b]:
+                summarise_section(right, left, rings, slot.label, elapsed, law, summaries, b, s)
+            if heights_wanted:
+                tau = time_to_go(slot.label, elapsed, law)
+                minimum, maximum = chains.heights(right, left, rings, tau)
+                summaries[channel, b, s, Z_MIN] = minimum
+                summaries[channel, b, s, Z_MAX] = maximum
+    return deaths
+
+
+@allocation_free
+def follow_sight(tapes: Tapes, done: int, b: int, sights: Floats, law: SectionLaw) -> LastSight:
+    """Return the last sight of an engagement along an axis.
+
+    `sights` contains the last sights after `done` events, shape (C, B, columns), and is updated.
+    """
+    c = law.channel
+    sight = LastSight(
+        sights[c, b, 0] != 0.0,
+        sights[c, b, 1],
+        sights[c, b, 2],
+        int(sights[c, b, 3]),
+        sights[c, b, 4],
+        sights[c, b, 5],
+        sights[c, b, 6],
+    )
+    for event in range(done, tapes.events):
+        values = tapes.values[event]
+        across, applies = across_of(values, b, law), tapes.applies[event, b]
+        sight = sight_after(sight, tapes.kinds[event], values[c, b], across, applies, law)
+    sights[c, b, 0] = 1.0 if sight.known else 0.0
+    sights[c, b, 1], sights[c, b, 2], sights[c, b, 3] = sight.alpha, sight.across, sight.steps
+    sights[c, b, 4], sights[c, b, 5], sights[c, b, 6] = sight.moved, sight.doubt, sight.fired
+    return sight
+
+
+@entry
+def measure_rate_all(
+    active: Flags,
+    omega: Floats,
+    error: float,
+    elapsed: int,
+    event: int,
+    tapes: Tapes,
+    done: int,
+    sights: Floats,
+    sections: Sections,
+    laws: Laws,
+    points: Floats,
+) -> int:
+    """Cut the living sections of the active engagements by rates and summarise them; return how many became empty.
+
+    `omega` has the shape (C, B); `sights` contains the last sights after `done` events and is updated.
+    """
+    deaths = 0
+    slots, used = sections.slots, sections.used
+    records, rings = sections.records, sections.rings
+    for b in range(len(used)):
+        for channel in range(laws.shape[0]):
+            law = law_of(laws, channel)
+            sight = follow_sight(tapes, done, b, sights, law)
+            for s in range(used[b]):
+                if not (active[b] and is_cut(sections, channel, event, b, s)):
+                    continue
+                slot = slots[b, s]
+                label = slot.label
+                right, left = chains_of(records, row_of(sections, channel, b, s))
+                survives, overlap = measure_rate_section(
+                    right,
+                    left,
+                    rings,
+                    label,
+                    elapsed,
+                    omega[channel, b],
+                    error,
+                    sight,
+                    (label, label),
+                    law,
+                    points,
+                )
+                if not survives:
+                    deaths += bury(slot, channel, event, overlap)
+                if slot.living:
+                    summarise_section(right, left, rings, label, elapsed, law, sections.summaries, b, s)
+    return deaths
+
+
+@entry
+def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Laws) -> None:
+    """Shift the living sections of the active engagements and their summaries by impulses of shape (C, B)."""
+    slots, used = sections.slots, sections.used
+    records, summaries = sections.records, sections.summaries
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        for b in range(len(used)):
+            if not active[b]:
+                continue
+            along, across = impulse[channel, b], across_of(impulse, b, law)
+            if along == 0.0 and across == 0.0:
+                continue
+            for s in range(used[b]):
+                slot = slots[b, s]
+                if not slot.living:
+                    continue
+                right, left = chains_of(records, row_of(sections, channel, b, s))
+                shift_section(right, left, slot.label, elapsed, along, across, law)
+                tau, error = time_to_go(slot.label, elapsed, law), impulse_doubt(along, across, law)
+                summaries[channel, b, s, UPPER_MISS] += (error - along) * tau
+                summaries[channel, b, s, LOWER_MISS] -= (error + along) * tau
+
+
+@entry
+def make_room_all(
+    active: Flags, added: int, elapsed: int, sections: Sections, laws: Laws, points: Floats, widen: bool
+) -> tuple[int, int]:
+    """Compute the room that the living sections need; with `widen`, enlarge their rings.
+
+    Every section must be able to gain `added` vertices. Return the number of floats by which the rings are too small,
+    for which memory must be allocated, and the number of vertices that every section may gain. It is less than
+    `MAX_ADDED` if a section must be reduced first; `widen` reduces those of the active engagements.
+    """
+    slots, used = sections.slots, sections.used
+    records, rings = sections.records, sections.rings
+    floats = ZERO
+    spare = chains.CAPACITY
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        for b in range(len(used)):
+            for s in range(used[b]):
+                slot = slots[b, s]
+                if not slot.living:
+                    continue
+                right, left = chains_of(records, row_of(sections, channel, b, s))
+                if widen and active[b] and chains.is_crowded(right, left):
+                    tau = time_to_go(slot.label, elapsed, law)
+                    chains.reduce_outward(right, left, rings, tau, points)
+                count, room = chains.count_of(right, left), chain_storage.room_of(right)
+                wanted = chain_storage.room_for(min(count + added, chains.CAPACITY), room)
+                if wanted > room and widen:
+                    chain_storage.widen_rings(right, left, rings, wanted)
+                elif wanted > room:
+                    floats += 2 * chain_storage.floats_of(wanted)
+                spare = min(spare, chain_storage.room_of(right) - count)
+    return floats, spare
+
+
+@entry
+def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends: Floats) -> None:
+    """Write the predicted-miss interval of each engagement along each axis, and whether it has a living section.
+
+    `ends`, shape (C, B, 2, 4), has for the lower and the upper end the predicted miss, m, and alpha, rad, omega, rad/s,
+    and range, m, of a state that reaches it; it is not written for engagements without a living section. An extreme is
+    usually reached on a whole edge. The lowest point is taken for the upper end and the highest for the lower end, so
+    that a mirrored engagement gives exactly mirrored results.
+    """
+    slots, used = sections.slots, sections.used
+    records, rings = sections.records, sections.rings
+    for channel in range(laws.shape[0]):
+        law, summaries = law_of(laws, channel), sections.summaries
+        for b in range(len(used)):
+            lowest = highest = -1
+            for s in range(used[b]):
+                # Only sections of stopped engagements can be at range zero.
+                if not slots[b, s].living or range_of(slots[b, s].label, elapsed, law) == 0.0:
+                    continue
+                if lowest < 0 or summaries[channel, b, s, LOWER_MISS] < summaries[channel, b, lowest, LOWER_MISS]:
+                    lowest = s
+                if highest < 0 or summaries[channel, b, s, UPPER_MISS] > summaries[channel, b, highest, UPPER_MISS]:
+                    highest = s
+            if lowest < 0:
+                continue
+            exists[b] = True
+            for end, s in ((0, lowest), (1, highest)):
+                tau, x = time_to_go(slots[b, s].label, elapsed, law), range_of(slots[b, s].label, elapsed, law)
+                right, left = chains_of(records, row_of(sections, channel, b, s))
+                points = chains.extreme_points(right, left, rings, tau, TIE_TOLERANCE, CUT_SLACK)
+                v, m = points[1 - end]
+                alpha = (m - tau * v) / x
+                ends[channel, b, end, 0] = summaries[channel, b, s, LOWER_MISS + end]
+                ends[channel, b, end, 1] = alpha
+                ends[channel, b, end, 2] = (v + law.closing_speed * alpha) / x
+                ends[channel, b, end, 3] = x
+
+
+@entry
+def extreme_angles_all(elapsed: int, sections: Sections, laws: Laws, extremes: Floats) -> None:
+    """Write the minimum and the maximum alpha of the living sections along each axis, rad, and their ranges, m.
+
+    `extremes`, shape (4, C, B), is not written for engagements without a living section.
+    """
+    slots, used, summaries = sections.slots, sections.used, sections.summaries
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        for b in range(len(used)):
+            none = True
+            for s in range(used[b]):
+                x = range_of(slots[b, s].label, elapsed, law)
+                # Only sections of stopped engagements can be at range zero.
+                if not slots[b, s].living or x == 0.0:
+                    continue
+                minimum, maximum = summaries[channel, b, s, Z_MIN] / x, summaries[channel, b, s, Z_MAX] / x
+                if none or minimum < extremes[0, channel, b]:
+                    extremes[0, channel, b], extremes[2, channel, b] = minimum, x
+                if none or maximum > extremes[1, channel, b]:
+                    extremes[1, channel, b], extremes[3, channel, b] = maximum, x
+                none = False
+
+
+@entry
+def keep_labels_all(active: Flags, minimum: Floats, maximum: Floats, sections: Sections, removed: Flags) -> int:
+    """Remove the living sections with labels outside limits of shape (B,), m; return their number.
+
+    `removed`, shape (B, S), receives the mask of the removed ones.
+    """
+    number = 0
+    for b in range(len(sections.used)):
+        for s in range(sections.used[b]):
+            slot = sections.slots[b, s]
+            if active[b] and slot.living and not minimum[b] <= slot.label <= maximum[b]:
+                slot.living = False
+                removed[b, s] = True
+                number += 1
+    return number
+
+
+@entry
+def write_outline(records: chain_storage.Records, rings: Floats, n: int, tau: float, out: Floats) -> int:
+    """Call `chains.outline` from Python."""
+    right, left = chains_of(records, n)
+    return chains.outline(right, left, rings, tau, out)
+
+
+@entry
+def steepest_all(alpha: Floats, farthest: float, laws: Laws, steepest: Floats) -> None:
+    """Write the maximum sizes of angles of shape (C, B) up to a range: those of `steepest_angles`, shape (2, B)."""
+    law = law_of(laws, ZERO)
+    for b in range(alpha.shape[1]):
+        steepest[0, b], steepest[1, b] = steepest_angles(alpha[0, b], across_of(alpha, b, law), farthest, law)

@@ -1,0 +1,1 @@
+"""Convex polygons, zonotopes and polytopes."""

@@ -1,0 +1,363 @@
+"""Construction and storage of batches of polygons, and application of the compiled loops to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from infoset.arrays import Flags, Floats, Integers
+from infoset.geometry import polygon_batches as kernels
+from infoset.geometry._set_arguments import (
+    bound_values,
+    box_ends,
+    constraint_values,
+    finite_values,
+    need_finite,
+    need_set,
+    radius_values,
+)
+from infoset.limits import Limits, real_values, shown
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+
+_ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
+"""Depth of a reflex vertex, relative to the coordinates, that rounding explains."""
+
+
+class PolygonArrays:
+    """Vertices, shape (..., V, 2), and their numbers, shape (...), of a batch of polygons; see `ConvexPolygons`."""
+
+    vertices: Floats
+    counts: Integers
+
+    def __init__(self, vertices: ArrayLike, counts: ArrayLike) -> None:
+        checked = self._checked(vertices, counts)._turned(_ROUNDING)
+        self.vertices, self.counts = checked.vertices, checked.counts
+
+    @classmethod
+    def _checked(cls, vertices: ArrayLike, counts: ArrayLike) -> Self:
+        """Return copies of the arrays after checks of shapes and numbers."""
+        numbers = real_values("counts", counts)
+        if not np.isfinite(numbers).all() or (numbers != np.floor(numbers)).any():
+            raise ValueError(f"counts must be whole numbers: got {shown(counts)}")
+        polygons = cls.unchecked(real_values("vertices", vertices).copy(), numbers.astype(np.int64))
+        room = polygons.vertices.shape[-2] if polygons.vertices.ndim > 1 else 0
+        if polygons.vertices.shape != (*polygons.counts.shape, room, 2):
+            raise ValueError(
+                f"vertices of shape (..., V, 2) and counts of shape (...) are needed: "
+                f"got {polygons.vertices.shape} and {polygons.counts.shape}"
+            )
+        if (polygons.counts < 0).any() or (polygons.counts > room).any():
+            raise ValueError(f"counts must lie between 0 and {room}, the room for vertices")
+        need_finite("vertices", polygons.vertices[polygons._used()])
+        return polygons
+
+    def _turned(self, depth: float) -> Self:
+        """Reverse clockwise rings, in place; refuse a ring with a reflex vertex deeper than `depth`, relative to it."""
+        vertices, counts = self._flat()
+        values = np.zeros((counts.size, 3))
+        kernels.check_rings(vertices, counts, values)
+        refused = np.flatnonzero((values[:, 0] >= 0) & (values[:, 1] > depth))
+        if refused.size:
+            member = refused[0]
+            vertex, turned = int(values[member, 0]), values[member, 2] < 0.0
+            x, y = vertices[member, -vertex % counts[member] if turned else vertex]
+            of = f" of polygon {tuple(map(int, np.unravel_index(member, self.shape)))}" if self.shape else ""
+            raise ValueError(f"the ring is not convex: vertex {vertex}{of}, ({x:.17g}, {y:.17g}), is reflex")
+        return self
+
+    @classmethod
+    def unchecked(cls, vertices: Floats, counts: Integers) -> Self:
+        """Return polygons of arrays `vertices` and `counts`, counter-clockwise, without checks and without a copy."""
+        self = cls.__new__(cls)
+        self.vertices, self.counts = vertices, counts
+        return self
+
+    @classmethod
+    def from_vertices(cls, rings: ArrayLike, counts: ArrayLike | None = None) -> Self:
+        """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the polygon. O(n).
+
+        Rings of different lengths are a list of arrays of shape (n, 2), or have `counts` vertices, shape (...). A ring
+        may repeat vertices, also its first at the end, and have vertices along a side.
+
+        Raises
+        ------
+        ValueError
+            If a ring is not convex; the message has the first reflex vertex. This is decided exactly. `from_points`
+            takes the convex hull of any points instead.
+        """
+        if isinstance(rings, list | tuple) and counts is None and len({np.shape(ring) for ring in rings}) > 1:
+            return cls.stack([cls.from_vertices(ring) for ring in rings])
+        vertices = finite_values("rings", rings, "...", "k", 2) if counts is None else real_values("rings", rings)
+        sizes = np.full(vertices.shape[:-2], vertices.shape[-2]) if counts is None else counts
+        polygons = cls._checked(vertices, sizes)
+        kernels.drop_repeats(*polygons._flat())
+        return polygons._turned(0.0)._make(0, kernels.exact_hull)
+
+    @classmethod
+    def from_points(cls, points: ArrayLike) -> Self:
+        """Return the convex hull of points, shape (n, 2) or (..., n, 2); no points give the empty set.
+
+        Different numbers of points are a list of arrays of shape (n, 2), as in `from_vertices`. O(n) for sorted points,
+        O(n^2) at worst. Vertices are points; points that protrude by less than rounding are dropped.
+        """
+        if isinstance(points, list | tuple) and len({np.shape(one) for one in points}) > 1:
+            return cls.stack([cls.from_points(one) for one in points])
+        array = finite_values("points", points, "...", "k", 2)
+        return cls.unchecked(array, np.full(array.shape[:-2], array.shape[-2]))._make(0, kernels.hull)
+
+    @classmethod
+    def from_constraints(cls, normals: ArrayLike, offsets: ArrayLike) -> Self:
+        """Return {p: normals p <= offsets}, with normals of shape (..., k, 2), of any length, and offsets (..., k).
+
+        Infinite offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether the set is empty, is
+        decided without rounding, and each coordinate is within a few ulp of itself.
+
+        Raises
+        ------
+        ValueError
+            If a set is unbounded.
+        """
+        rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "...", "k", 2)
+        shape = np.broadcast_shapes(rows.shape[:-1], limits.shape)
+        if not shape[-1]:
+            raise ValueError("a set without constraints is unbounded")
+        table = np.empty((*shape, 3))
+        table[..., :2], table[..., 2] = rows, limits
+        table = table.reshape(-1, shape[-1], 3)
+        out = np.zeros((len(table), shape[-1] + 4, 2))
+        made = np.zeros(len(table), dtype=np.int64)
+        kernels.intersect_rows(table, out, made)
+        if (made < 0).any():
+            index = tuple(map(int, np.unravel_index(int((made < 0).argmax()), shape[:-1])))
+            raise ValueError(f"the set{f' {index}' if index else ''} is unbounded")
+        room = int(made.max(initial=0))
+        return cls.unchecked(out[:, :room].reshape(*shape[:-1], room, 2), made.reshape(shape[:-1]))
+
+    @classmethod
+    def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
+        """Return {p: lower <= p <= upper}, of shapes (2,) or (..., 2). Exact; equal ends give a segment or a point."""
+        minimum, most = box_ends(lower, upper, "...", 2)
+        corners = np.stack([minimum, minimum, most, most], axis=-2)
+        corners[..., 1, 0], corners[..., 3, 0] = most[..., 0], minimum[..., 0]
+        counts = np.full(corners.shape[:-2], 4)
+        kernels.drop_repeats(corners.reshape(-1, 4, 2), counts.reshape(-1))
+        return cls.unchecked(corners, counts)
+
+    @classmethod
+    def from_ball(cls, centre: ArrayLike, radius: ArrayLike, sides: int = 16, *, outer: bool = True) -> Self:
+        """Return regular polygons around discs with `centre`, shape (..., 2), and `radius`, shape (...), or in them.
+
+        An `outer` polygon contains the disc and exceeds it by the factor 1 / cos(pi / sides); an inner one is
+        contained in it. Both to rounding: a few ulp. O(sides), at least three.
+        """
+        Limits(minimum=3, whole=True).need("sides", sides)
+        middle, r = finite_values("centre", centre, "...", 2), radius_values(radius, "...")
+        angles = (np.arange(sides) + (0.5 if outer else 0.0)) * (2.0 * math.pi / sides)
+        unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1) / (math.cos(math.pi / sides) if outer else 1.0)
+        return cls.from_points(middle[..., None, :] + r[..., None, None] * unit)
+
+    @classmethod
+    def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Self:
+        """Return {centre + sum of z_i generators[i]: -1 <= z_i <= 1}, with a row of `generators` for each i.
+
+        `centre` has the shape (2,) or (..., 2), and `generators` (g, 2) or (..., g, 2). O(g^2); each coordinate is
+        rounded g times.
+        """
+        middle = finite_values("centre", centre, "...", 2)
+        rows = finite_values("generators", generators, "...", "g", 2)
+        shape = np.broadcast_shapes(middle.shape[:-1], rows.shape[:-2])
+        points = cls.unchecked(middle[..., None, :], np.ones(middle.shape[:-1], dtype=np.int64)).broadcast_to(shape)
+        halves = np.broadcast_to(rows, (*shape, *rows.shape[-2:])).reshape(points.counts.size, *rows.shape[-2:])
+        return points._make(2 * rows.shape[-2], kernels.add_segments, np.ascontiguousarray(halves))
+
+    @classmethod
+    def from_shapely(cls, geometry: BaseGeometry | Sequence[BaseGeometry]) -> Self:
+        """Return a convex shapely Point, LineString or Polygon as a single polygon, and a sequence of them as a batch.
+
+        O(n). Vertices along a side are dropped.
+
+        Raises
+        ------
+        ValueError
+            If a geometry is not convex by more than rounding (64 ulp of the coordinates), or is of another type.
+        """
+        if isinstance(geometry, Sequence | np.ndarray) and not isinstance(geometry, str):
+            return cls.stack([cls.from_shapely(one) for one in geometry])
+        from shapely import get_coordinates
+
+        vertices, kind = get_coordinates(geometry), geometry.geom_type
+        has_hole = kind == "Polygon" and len(geometry.interiors) > 0
+        if kind not in ("Point", "LineString", "Polygon") or has_hole or (kind == "LineString" and len(vertices) > 2):
+            raise ValueError(f"a Point, a single segment or a Polygon without a hole is needed: got {shown(geometry)}")
+        count = np.array([len(vertices)])
+        kernels.drop_repeats(vertices[None], count)
+        return cls(vertices, count[0])._make(0, kernels.exact_hull)
+
+    def to_shapely(self) -> BaseGeometry:
+        """Return a single polygon as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
+        from shapely import LineString, Point, Polygon
+
+        vertices = self.polygon()
+        if len(vertices) == 1:
+            return Point(vertices[0])
+        return LineString(vertices) if len(vertices) == 2 else Polygon(vertices)
+
+    @classmethod
+    def empty(cls, shape: tuple[int, ...] = ()) -> Self:
+        """Return a batch of empty sets."""
+        return cls.unchecked(np.zeros((*shape, 0, 2)), np.zeros(shape, dtype=np.int64))
+
+    @classmethod
+    def stack(cls, sets: Sequence[Self]) -> Self:
+        """Return a batch of single polygons, or of batches of equal shape, along a new first axis.
+
+        Raises
+        ------
+        ValueError
+            If the shapes of the batches differ.
+        """
+        shapes = {need_set("each of sets", one, cls).shape for one in sets}
+        if len(shapes) > 1:
+            raise ValueError(f"sets must be batches of the same shape: got {sorted(shapes)}")
+        room = max((one.vertices.shape[-2] for one in sets), default=0)
+        vertices = np.zeros((len(sets), *(sets[0].shape if sets else ()), room, 2))
+        for row, one in zip(vertices, sets, strict=True):
+            row[..., : one.vertices.shape[-2], :] = one.vertices
+        return cls.unchecked(
+            vertices, np.array([one.counts for one in sets], dtype=np.int64).reshape(vertices.shape[:-2])
+        )
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the batch."""
+        return self.counts.shape
+
+    @property
+    def is_empty(self) -> Flags:
+        """Whether each polygon is empty, shape (...)."""
+        return np.asarray(self.counts == 0)
+
+    def __len__(self) -> int:
+        if not self.shape:
+            raise TypeError("a single polygon has no length; its number of vertices is .counts")
+        return self.shape[0]
+
+    def __getitem__(self, index: int | slice | tuple[int | slice, ...] | Flags) -> Self:
+        if not self.shape:
+            raise TypeError("a single polygon cannot be indexed; its vertices are .polygon()")
+        return self.unchecked(self.vertices[index], np.asarray(self.counts[index]))
+
+    def __iter__(self) -> Iterator[Self]:
+        return (self[i] for i in range(len(self)))
+
+    def polygon(self) -> Floats:
+        """Return the vertices of a single polygon, shape (count, 2).
+
+        Raises
+        ------
+        ValueError
+            If this is a batch.
+        """
+        if self.shape:
+            raise ValueError(f"this is a batch of shape {self.shape}: choose one with an index first")
+        return np.array(self.vertices[: int(self.counts)])
+
+    def broadcast_to(self, shape: tuple[int, ...]) -> Self:
+        """Return the batch repeated along new axes to another shape; the vertices are shared, not copied.
+
+        Raises
+        ------
+        ValueError
+            If the batch cannot be broadcast to this shape.
+        """
+        if shape == self.shape:
+            return self
+        counts = np.broadcast_to(self.counts, shape)
+        return self.unchecked(np.broadcast_to(self.vertices, (*shape, *self.vertices.shape[-2:])), counts)
+
+    # For operations -----------------------------------------------------------------------------------------------
+
+    def _used(self) -> Flags:
+        """Which rows of the array hold vertices, shape (..., V)."""
+        return np.asarray(np.arange(self.vertices.shape[-2]) < self.counts[..., None])
+
+    def _known(self, values: Floats, quantity: str) -> Floats:
+        """Return values, shape (..., k), masked for empty members of a batch."""
+        empty = self.is_empty
+        if not empty.any():
+            return values
+        if not self.shape:
+            raise ValueError(f"the empty set has no {quantity}")
+        shape = empty.shape + (1,) * (values.ndim - empty.ndim)
+        return np.ma.masked_array(values, np.broadcast_to(empty.reshape(shape), values.shape))
+
+    def _vectors(self, value: ArrayLike, name: str) -> Floats:
+        """Return a vector for each polygon, shape (B, 2)."""
+        if isinstance(value, np.ma.MaskedArray) and value.shape == (*self.shape, 2):
+            masked = np.ma.getmaskarray(value).any(axis=-1)
+            value = value.filled(0.0) if (self.is_empty | ~masked).all() else value
+        return self._spread(finite_values(name, value, "...", 2), name, (2,))
+
+    def _and_vectors(self, value: ArrayLike, name: str) -> tuple[Self, Floats]:
+        """Return the polygons and a vector for each; a single polygon is broadcast to the batch of the vectors."""
+        values = value if self.shape or isinstance(value, np.ma.MaskedArray) else real_values(name, value)
+        one = self if self.shape else self.broadcast_to(np.shape(values)[:-1])
+        return one, one._vectors(values, name)
+
+    def _scalars(self, value: ArrayLike, name: str) -> Floats:
+        """Return a number for each polygon, shape (B,); it may be infinite."""
+        return self._spread(bound_values(name, value), name, ())
+
+    def _spread(self, values: Floats, name: str, last: tuple[int, ...]) -> Floats:
+        """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`."""
+        shape = (*self.shape, *last)
+        if values.shape != shape:
+            try:
+                if values.shape[values.ndim - len(last) :] != last:
+                    raise ValueError
+                values = np.broadcast_to(values, shape)
+            except ValueError:
+                raise ValueError(
+                    f"{name} must have the shape {last}, or one that can be broadcast to {shape}: got {values.shape}"
+                ) from None
+        return _plain(values.reshape(self.counts.size, *last))
+
+    def _with(self, other: Self) -> tuple[Self, Self]:
+        """Return both batches in their common shape."""
+        need_set("other", other, type(self))
+        if self.shape == other.shape:
+            return self, other
+        shape = np.broadcast_shapes(self.shape, other.shape)
+        return self.broadcast_to(shape), other.broadcast_to(shape)
+
+    def _flat(self) -> tuple[Floats, Integers]:
+        vertices = self.vertices.reshape(self.counts.size, self.vertices.shape[-2], 2)
+        return _plain(vertices), _plain(self.counts.reshape(-1))
+
+    def _make(self, more: int, kernel: Callable[..., None], *arguments: object) -> Self:
+        """Apply a kernel whose results have at most `more` vertices more than these polygons."""
+        vertices, counts = self._flat()
+        out = np.zeros((counts.size, vertices.shape[1] + more, 2))
+        made = np.zeros(counts.size, dtype=np.int64)
+        kernel(vertices, counts, out, made, *arguments)
+        room = int(made.max(initial=0))
+        return self.unchecked(out[:, :room].reshape(*self.shape, room, 2), made.reshape(self.shape))
+
+    def _measure(self, kernel: Callable[..., None], *arguments: object) -> Floats:
+        """Apply a kernel that computes up to three numbers for each polygon, shape (..., 3)."""
+        vertices, counts = self._flat()
+        out = np.zeros((counts.size, 3))
+        kernel(vertices, counts, out, *arguments)
+        return out.reshape(*self.shape, 3)
+
+
+def _plain(values: NDArray[Any]) -> NDArray[Any]:
+    """Return an array that kernels accept: contiguous and writeable."""
+    return values if values.flags.carray else values.copy()

@@ -1,0 +1,278 @@
+"""Compiled loops over batches of polygons: arrays `vertices`, shape (B, V, 2), and `counts`, shape (B,).
+
+Kernels that make polygons write to `out` and `made`; kernels that measure write up to three numbers for each polygon.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from infoset._compile import compiled
+from infoset.arrays import Floats, Integers
+from infoset.geometry import polygon, polygon_distance, polygon_exact, polygon_hull, polygon_lines, polygon_sum
+
+
+@compiled
+def reverse(vertices: Floats, count: int) -> None:
+    """Reverse the order of vertices, in place; the first one stays."""
+    for i in range(1, (count + 1) // 2):
+        for axis in range(2):
+            one = vertices[i, axis]
+            vertices[i, axis] = vertices[count - i, axis]
+            vertices[count - i, axis] = one
+
+
+@compiled
+def check_rings(vertices: Floats, counts: Integers, out: Floats) -> None:
+    """Turn clockwise rings, in place; write the reflex vertex (-1: none), its depth, and how each turned."""
+    for i in range(counts.size):
+        out[i, 0] = -1.0
+        if counts[i] > 2:
+            turns, reflex, depth = polygon_exact.corner(vertices[i], counts[i])
+            out[i, 0], out[i, 1], out[i, 2] = reflex, depth, turns
+            if turns < 0:
+                reverse(vertices[i], counts[i])
+
+
+@compiled
+def drop_repeats(vertices: Floats, counts: Integers) -> None:
+    """Remove repeated vertices, also the one that closes a ring, in place."""
+    for i in range(counts.size):
+        counts[i] = polygon_hull.drop_repeats(vertices[i], counts[i])
+
+
+@compiled
+def hull(vertices: Floats, counts: Integers, out: Floats, made: Integers) -> None:
+    """Convex hulls of points, with vertices that protrude by more than rounding."""
+    for i in range(counts.size):
+        made[i] = polygon_hull.hull(vertices[i], counts[i], out[i])
+
+
+@compiled
+def exact_hull(vertices: Floats, counts: Integers, out: Floats, made: Integers) -> None:
+    """Convex hulls of points, exactly decided."""
+    for i in range(counts.size):
+        made[i] = polygon_exact.hull(vertices[i], counts[i], out[i])
+
+
+@compiled
+def cut(
+    vertices: Floats,
+    counts: Integers,
+    out: Floats,
+    made: Integers,
+    normal: Floats,
+    lower: Floats,
+    upper: Floats,
+    slack: float,
+) -> None:
+    """Cuts by bands, widened by `slack` units of rounding of the heights of the vertices."""
+    for i in range(counts.size):
+        polygon.copy(vertices[i], counts[i], out[i])
+        wider = 0.0
+        if slack > 0.0:
+            for j in range(counts[i]):
+                wider = max(wider, abs(normal[i, 0] * out[i, j, 0]) + abs(normal[i, 1] * out[i, j, 1]))
+            wider *= slack * 2.0**-52
+        made[i], _ = polygon.clip_to_band(
+            out[i], counts[i], normal[i, 0], normal[i, 1], lower[i] - wider, upper[i] + wider
+        )
+
+
+@compiled
+def linear_map(vertices: Floats, counts: Integers, out: Floats, made: Integers, matrix: Floats) -> None:
+    """Images under matrices."""
+    for i in range(counts.size):
+        m = matrix[i]
+        made[i] = polygon.map_linearly(vertices[i], counts[i], m[0, 0], m[0, 1], m[1, 0], m[1, 1], out[i])
+
+
+@compiled
+def invert(matrix: Floats, out: Floats) -> None:
+    """Inverse matrices, shape (B, 2, 2); zero for a singular matrix."""
+    for i in range(len(matrix)):
+        m = matrix[i]
+        determinant = polygon_lines.minor(m[0, 0], m[0, 1], m[1, 0], m[1, 1])
+        if determinant != 0.0:
+            out[i, 0, 0], out[i, 0, 1] = m[1, 1] / determinant, -m[0, 1] / determinant
+            out[i, 1, 0], out[i, 1, 1] = -m[1, 0] / determinant, m[0, 0] / determinant
+
+
+@compiled
+def add_segments(vertices: Floats, counts: Integers, out: Floats, made: Integers, halves: Floats) -> None:
+    """Minkowski sums with segments from -half to +half, any number for each polygon: `halves` has shape (B, g, 2)."""
+    for i in range(counts.size):
+        polygon.copy(vertices[i], counts[i], out[i])
+        made[i] = counts[i]
+        for half in halves[i]:
+            made[i] = polygon_sum.add_segment(out[i], made[i], half[0], half[1])
+
+
+@compiled
+def add_polygon(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
+) -> None:
+    """Minkowski sums."""
+    for i in range(counts.size):
+        made[i] = polygon_sum.add_polygon(vertices[i], counts[i], other[i], other_counts[i], out[i])
+
+
+@compiled
+def difference(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
+) -> None:
+    """Minkowski differences; the other polygons are not empty."""
+    for i in range(counts.size):
+        if counts[i] > 0:
+            made[i] = polygon_lines.difference(vertices[i], counts[i], other[i], other_counts[i], out[i])
+
+
+@compiled
+def intersect(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
+) -> None:
+    """Intersections."""
+    for i in range(counts.size):
+        made[i] = polygon_exact.intersect(vertices[i], counts[i], other[i], other_counts[i], out[i])
+
+
+@compiled
+def intersect_rows(rows: Floats, out: Floats, made: Integers) -> None:
+    """Intersections of half-planes, shape (B, k, 3)."""
+    for i in range(made.size):
+        made[i] = polygon_lines.intersect_rows(rows[i], out[i])
+
+
+@compiled
+def reduce_outward(vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: int) -> None:
+    """Outer polygons of few vertices."""
+    for i in range(counts.size):
+        polygon.copy(vertices[i], counts[i], out[i])
+        made[i] = polygon_hull.reduce_outward(out[i], counts[i], cap)
+
+
+@compiled
+def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Floats) -> None:
+    """Half-planes with unit normals, shape (B, k, 2): one for each side; four for a segment and a point."""
+    for i in range(counts.size):
+        points, n = polygon_exact.tidy(vertices[i], counts[i])
+        if n == 0:
+            offsets[i, 0] = -1.0
+        for j in range(n if n > 2 else min(4 * n, 4)):
+            x, y = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[j] if n < 3 else (0.0, 0.0)
+            if n > 1:
+                first, last = points[j if n > 2 else 0], points[(j + 1) % n if n > 2 else 1]
+                along_x, along_y = last[0] - first[0], last[1] - first[1]
+                length = math.hypot(along_x, along_y)
+                along_x, along_y = along_x / max(length, 1e-300), along_y / max(length, 1e-300)
+                x, y = (along_y, -along_x) if n > 2 else (x * along_y + y * along_x, y * along_y - x * along_x)
+            normals[i, j, 0], normals[i, j, 1] = x, y
+            at = polygon.support_index(points, n, x, y)
+            offsets[i, j] = x * points[at, 0] + y * points[at, 1]
+
+
+@compiled
+def holds(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
+    """Whether points are in polygons, exactly decided, as 1 or 0; and signed distances from the boundaries."""
+    for i in range(counts.size):
+        points, count = polygon_exact.tidy(vertices[i], counts[i])
+        out[i, 0] = polygon_exact.holds(points, count, point[i, 0], point[i, 1])
+        out[i, 1] = polygon.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
+
+
+@compiled
+def is_subset(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
+    """Whether all vertices are in the other polygons, exactly decided, and the maximum distance of one from them."""
+    for i in range(counts.size):
+        out[i, 0] = 1.0
+        if counts[i] == 0:
+            continue
+        if other_counts[i] == 0:
+            out[i, 0], out[i, 1] = 0.0, np.inf
+            continue
+        out[i, 1] = polygon_distance.farthest(vertices[i], counts[i], other[i], other_counts[i])
+        out[i, 0] = out[i, 1] == 0.0
+
+
+@compiled
+def gap(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
+    """Distances between polygons."""
+    for i in range(counts.size):
+        out[i, 0] = polygon_distance.gap(vertices[i], counts[i], other[i], other_counts[i])
+
+
+@compiled
+def nearest(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
+    """Nearest points of polygons, and their distances."""
+    for i in range(counts.size):
+        out[i, 2] = np.inf
+        if counts[i] > 0:
+            points, count = polygon_exact.tidy(vertices[i], counts[i])
+            out[i, 0], out[i, 1], out[i, 2] = polygon_distance.nearest(points, count, point[i, 0], point[i, 1])
+
+
+@compiled
+def support(vertices: Floats, counts: Integers, out: Floats, direction: Floats) -> None:
+    """Support functions and support vectors."""
+    for i in range(counts.size):
+        if counts[i] == 0:
+            out[i, 0] = -np.inf
+            continue
+        x, y = direction[i]
+        at = polygon.support_index(vertices[i], counts[i], x, y)
+        out[i, 1] = vertices[i, at, 0]
+        out[i, 2] = vertices[i, at, 1]
+        out[i, 0] = x * out[i, 1] + y * out[i, 2]
+
+
+@compiled
+def margin(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
+    """Signed distances of points from the boundaries."""
+    for i in range(counts.size):
+        out[i, 0] = polygon.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
+
+
+@compiled
+def size(vertices: Floats, counts: Integers, out: Floats) -> None:
+    """Areas and diameters."""
+    for i in range(counts.size):
+        out[i, 0] = polygon.area(vertices[i], counts[i])
+        out[i, 1] = polygon_distance.diameter(vertices[i], counts[i])
+
+
+@compiled
+def centroid(vertices: Floats, counts: Integers, out: Floats) -> None:
+    """Centroids."""
+    for i in range(counts.size):
+        if counts[i] > 0:
+            out[i, 0], out[i, 1] = polygon.centroid(vertices[i], counts[i])
+
+
+@compiled
+def max_disc(vertices: Floats, counts: Integers, out: Floats) -> None:
+    """Centres and radii of largest discs."""
+    for i in range(counts.size):
+        if counts[i] > 0:
+            out[i, 0], out[i, 1], out[i, 2] = polygon_distance.max_disc(vertices[i], counts[i])
+
+
+@compiled
+def sample(vertices: Floats, counts: Integers, uniform: Floats, out: Floats) -> None:
+    """Points distributed uniformly, from uniform numbers of shape (B, k, 3)."""
+    for i in range(counts.size):
+        n, points = counts[i], vertices[i]
+        whole = 2.0 * polygon.area(points, n)
+        for j in range(uniform.shape[1] if n > 0 else 0):
+            rest, one, two = uniform[i, j, 0] * whole, uniform[i, j, 1], uniform[i, j, 2]
+            k = 1
+            while k < n - 2 and rest > max(0.0, polygon.fan_area(points, k)):
+                rest -= max(0.0, polygon.fan_area(points, k))
+                k += 1
+            if one + two > 1.0 and n > 2:
+                one, two = 1.0 - one, 1.0 - two
+            for axis in range(2):
+                start = points[0, axis]
+                out[i, j, axis] = start + (one * (points[k, axis] - start) if n > 1 else 0.0)
+                out[i, j, axis] += two * (points[k + 1, axis] - start) if n > 2 else 0.0

@@ -1,0 +1,257 @@
+"""Compiled convex hulls, and outer approximations of polygons by fewer vertices, stored as in `polygon`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from infoset._compile import allocation_free, compiled, inlined
+from infoset.arrays import Floats
+from infoset.geometry.polygon import ROUNDING, Points, append, close, cross
+
+
+@compiled
+def hull(points: Points, count: int, out: Points) -> int:
+    """Write the convex hull of points: counter-clockwise, without repeated vertices or vertices along an edge.
+
+    Return its number of vertices: 2 if the points lie on a line, 1 if they coincide, 0 if there are none. O(count) for
+    sorted points; the sort takes O(count^2) in the worst case. Points that protrude by less than rounding are removed.
+    The directions of the edges increase strictly in spite of rounding.
+
+    References
+    ----------
+    A. M. Andrew, Another efficient algorithm for convex hulls in two dimensions, Inf. Process. Lett. 9 (1979).
+    """
+    points = points[:count].copy()
+    sort_points(points, count)
+    count = drop_repeats(points, count)
+    made = 0
+    for i in range(count):
+        made = drop_turned(out, made, 1, points[i, 0], points[i, 1])
+        made = append(out, made, points[i, 0], points[i, 1])
+    lower = made
+    known = lower - 2
+    for i in range(count - 2, 0, -1):
+        x = points[i, 0]
+        y = points[i, 1]
+        if known > 0 and out[known, 0] == x and out[known, 1] == y:
+            known -= 1
+            continue
+        made = drop_turned(out, made, lower, x, y)
+        made = append(out, made, x, y)
+    if count > 0:
+        made = drop_turned(out, made, lower, points[0, 0], points[0, 1])
+    return made
+
+
+@compiled
+def sort_points(points: Points, count: int) -> None:
+    """Sort points by x, then by y, in place, by insertion: O(count) if they are nearly sorted."""
+    for i in range(1, count):
+        x = points[i, 0]
+        y = points[i, 1]
+        j = i
+        while j > 0 and (points[j - 1, 0] > x or (points[j - 1, 0] == x and points[j - 1, 1] > y)):
+            points[j, 0] = points[j - 1, 0]
+            points[j, 1] = points[j - 1, 1]
+            j -= 1
+        points[j, 0] = x
+        points[j, 1] = y
+
+
+@allocation_free
+def drop_turned(out: Points, made: int, fewest: int, x: float, y: float) -> int:
+    """Remove last vertices, down to `fewest`, at which the path to (x, y) does not turn left; return the new count."""
+    while made > fewest:
+        along_x = out[made - 1, 0] - out[made - 2, 0]
+        along_y = out[made - 1, 1] - out[made - 2, 1]
+        if cross(along_x, along_y, x - out[made - 1, 0], y - out[made - 1, 1]) > 0.0:
+            break
+        made -= 1
+    return made
+
+
+@compiled
+def drop_repeats(points: Points, count: int) -> int:
+    """Remove vertices that repeat the previous one, in place; return the new count. O(count)."""
+    made = 0
+    for i in range(count):
+        made = append(points, made, points[i, 0], points[i, 1])
+    return close(points, made)
+
+
+@compiled
+def reduce_outward(points: Points, count: int, cap: int) -> int:
+    """Remove edges, in place, until at most `cap` vertices are left; the result contains the polygon; return its size.
+
+    The cap is at least 4, because a convex polygon of five vertices always has an edge that can be removed. An edge is
+    removed by extending its neighbours to their intersection; the edge that adds the minimum area is removed first, at
+    O(count) per edge. If rounding has given an edge a wrong direction, the hull is taken first; a rectangle replaces a
+    hull that is too thin.
+    """
+    is_hull = False
+    while count > cap:
+        chosen, x, y = cheapest_edge(points, count)
+        if chosen >= 0:
+            points[chosen, 0] = x
+            points[chosen, 1] = y
+            gone = chosen + 1 if chosen + 1 < count else 0
+            for i in range(gone, count - 1):
+                points[i, 0] = points[i + 1, 0]
+                points[i, 1] = points[i + 1, 1]
+            count -= 1
+            is_hull = False
+        elif is_hull:
+            count = make_rectangle(points, count)
+        else:
+            count = hull(points, count, points)
+            is_hull = True
+    return count
+
+
+@allocation_free
+def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
+    """Return the edge whose removal adds the minimum area, and where its neighbours meet; -1 if not convex."""
+    minimum = np.inf
+    chosen = -1
+    chosen_x = chosen_y = 0.0
+    before = count - 1
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        added, x, y = removed_edge(points, before, i, j, j + 1 if j + 1 < count else 0)
+        before = i
+        if added < 0.0:
+            return -1, 0.0, 0.0
+        if added < minimum:
+            minimum = added
+            chosen = i
+            chosen_x = x
+            chosen_y = y
+    return chosen, chosen_x, chosen_y
+
+
+@inlined
+def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> tuple[float, float, float]:
+    """Return twice the area that the removal of the edge from vertex i to j adds, and where its neighbours meet.
+
+    The area is infinite if the edge cannot be removed, and -1 if the path is not convex there.
+    """
+    from_x = points[i, 0] - points[before, 0]
+    from_y = points[i, 1] - points[before, 1]
+    edge_x = points[j, 0] - points[i, 0]
+    edge_y = points[j, 1] - points[i, 1]
+    to_x = points[after, 0] - points[j, 0]
+    to_y = points[after, 1] - points[j, 1]
+    bend = cross(from_x, from_y, edge_x, edge_y)
+    if bend <= 0.0:
+        return -1.0, 0.0, 0.0
+    turn = cross(from_x, from_y, to_x, to_y)
+    if turn <= ROUNDING * (abs(from_x * to_y) + abs(from_y * to_x)):
+        return np.inf, 0.0, 0.0
+    reach = cross(edge_x, edge_y, to_x, to_y) / turn
+    x = points[i, 0] + reach * from_x
+    y = points[i, 1] + reach * from_y
+    # The new vertex must not be before the far end of the edge: that would cut off a sharp tip.
+    beyond = (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0
+    return reach * bend if beyond else np.inf, x, y
+
+
+@allocation_free
+def drop_inner_edges(points: Points, count: int, fewest: int, work: Points) -> tuple[int, bool]:
+    """Remove edges inside a path, in place, until `fewest` vertices are left; the path moves outward only.
+
+    The edge that adds the minimum area is removed first, of equal ones the first. Return the new number of vertices,
+    and False if no edge can be removed before that. O(count + removed log(count)). `work` is a working array of twice
+    as many rows as the minimum power of two from `count`. Its first column is a tree: the leaves are the areas that the
+    removal of the edge after each vertex adds, the other nodes are the lesser of two children. Its second column has
+    the numbers of the next and, from `leaves`, of the previous vertex.
+    """
+    leaves = 1
+    while leaves < count:
+        leaves *= 2
+    tree, links, last = work[:, 0], work[:, 1], count - 1
+    for i in range(leaves):
+        links[i], links[leaves + i] = min(i + 1, last), max(i - 1, 0)
+        tree[leaves + i] = removed_edge(points, i - 1, i, i + 1, i + 2)[0] if 0 < i < last - 1 else np.inf
+    update_nodes(tree, leaves, 2 * leaves - 1)
+    while count > fewest and 0.0 <= tree[1] < np.inf:
+        at = 1
+        while at < leaves:
+            at = 2 * at + (tree[2 * at] > tree[1])
+        i = at - leaves
+        before, j = int(links[leaves + i]), int(links[i])
+        after = int(links[j])
+        _, points[i, 0], points[i, 1] = removed_edge(points, before, i, j, after)
+        links[i], links[leaves + after], tree[leaves + j] = after, i, np.inf
+        count -= 1
+        # The removal changes the areas of four edges.
+        first = i = int(links[leaves + before])
+        for _ in range(4):
+            before, at, j = int(links[leaves + i]), i, int(links[i])
+            after = int(links[j])
+            inside = before < i < j < after
+            tree[leaves + i] = removed_edge(points, before, i, j, after)[0] if inside else np.inf
+            i = j
+        update_nodes(tree, leaves + first, leaves + at)
+    i = 0
+    for made in range(count):
+        points[made, 0], points[made, 1] = points[i, 0], points[i, 1]
+        i = int(links[i])
+    return count, count <= fewest
+
+
+@inlined
+def update_nodes(tree: Floats, first: int, last: int) -> None:
+    """Compute the nodes above the leaves from `first` to `last`."""
+    while first > 1:
+        first, last = first >> 1, last >> 1
+        for node in range(first, last + 1):
+            tree[node] = min(tree[2 * node], tree[2 * node + 1])
+
+
+@allocation_free
+def box_around(points: Points, count: int, sign: float, slope: float) -> int:
+    """Replace a path by three sides of a box, in place: from its ends along a slope to its outermost vertex.
+
+    `sign` is 1 if greater x is outward, else -1.
+    """
+    first_x, first_y, last_x, last_y = points[0, 0], points[0, 1], points[count - 1, 0], points[count - 1, 1]
+    outermost = sign * first_x
+    for i in range(count):
+        outermost = max(outermost, sign * points[i, 0])
+    out = sign * (outermost - min(sign * first_x, sign * last_x))
+    points[1, 0], points[1, 1] = first_x + out, first_y + out * slope
+    points[2, 0], points[2, 1] = last_x + out, last_y + out * slope
+    points[3, 0], points[3, 1] = last_x, last_y
+    return 4
+
+
+@compiled
+def make_rectangle(points: Points, count: int) -> int:
+    """Replace a polygon by its bounding rectangle along the longest direction from vertex 0, in place. O(count)."""
+    origin_x = points[0, 0]
+    origin_y = points[0, 1]
+    length = 0.0
+    x = 1.0
+    y = 0.0
+    for i in range(1, count):
+        distance = math.hypot(points[i, 0] - origin_x, points[i, 1] - origin_y)
+        if distance > length:
+            length = distance
+            x = (points[i, 0] - origin_x) / distance
+            y = (points[i, 1] - origin_y) / distance
+    minimum = maximum = lowest = highest = 0.0
+    for i in range(1, count):
+        from_x = points[i, 0] - origin_x
+        from_y = points[i, 1] - origin_y
+        along = x * from_x + y * from_y
+        height = cross(x, y, from_x, from_y)
+        minimum = min(minimum, along)
+        maximum = max(maximum, along)
+        lowest = min(lowest, height)
+        highest = max(highest, height)
+    made = 0
+    for along, height in ((minimum, lowest), (maximum, lowest), (maximum, highest), (minimum, highest)):
+        made = append(points, made, origin_x + along * x - height * y, origin_y + along * y + height * x)
+    return close(points, made)

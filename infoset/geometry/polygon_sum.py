@@ -1,0 +1,235 @@
+"""Compiled Minkowski sums of convex polygons, stored as in `polygon`, with segments and with polygons."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from infoset._compile import compiled, inlined
+from infoset.geometry.polygon import ROUNDING, Points, append, close, cross, extremes, put, unsigned
+from infoset.geometry.polygon_hull import hull
+
+
+@compiled
+def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int:
+    """Minkowski sum with the segment from -half to +half, in place; return the number of vertices, at most count + 2.
+
+    O(count), in two passes. The boundary is divided at its extremes across the segment; the part to the right of the
+    segment's direction moves by +half, the rest by -half. A division at extremes, and not at sign changes of edges, is
+    correct for tiny edges with a wrong direction. If rounding could hide an extreme (an edge along the segment, a set
+    thin across it, a point), `add_segment_carefully` computes the sum.
+    """
+    if count == 0 or (half_x == 0.0 and half_y == 0.0):
+        return count
+    bottom, top = extremes(points, count, -half_y, half_x)
+    if not (is_lowest(points, count, bottom, half_x, half_y) and is_lowest(points, count, top, -half_x, -half_y)):
+        return add_segment_carefully(points, count, half_x, half_y)
+    if bottom < top:
+        half_x, half_y = -half_x, -half_y
+    # Unsigned indices avoid the test for negative ones, which takes as long as the rest of this loop.
+    turns = unsigned(bottom), unsigned(top)
+    target = unsigned(count + 2)
+    for k in range(count):
+        i = unsigned(count - 1 - k)
+        x, y = points[i, 0], points[i, 1]
+        target -= unsigned(1)
+        put(points, target, x + half_x, y + half_y)
+        if i in turns:
+            half_x, half_y = -half_x, -half_y
+            target -= unsigned(1)
+            put(points, target, x + half_x, y + half_y)
+    return count + 2
+
+
+@inlined
+def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
+    """Whether a vertex is lower, across (x, y), than its neighbours by more than rounding."""
+    before = i - 1 if i > 0 else count - 1
+    after = i + 1 if i + 1 < count else 0
+    height = cross(x, y, points[i, 0], points[i, 1])
+    rise = min(cross(x, y, points[before, 0], points[before, 1]), cross(x, y, points[after, 0], points[after, 1]))
+    reach_x = max(abs(points[i, 0]), abs(points[before, 0]), abs(points[after, 0]))
+    reach_y = max(abs(points[i, 1]), abs(points[before, 1]), abs(points[after, 1]))
+    return bool(rise - height > ROUNDING * (abs(x) * reach_y + abs(y) * reach_x))
+
+
+@compiled
+def add_segment_carefully(points: Points, count: int, half_x: float, half_y: float) -> int:
+    """Minkowski sum, in place, with a segment, for all sets: thin ones, points, edges along the segment. O(count).
+
+    Heights are relative to a vertex, so that their rounding errors are relative to the size of the set. If the set is
+    longer along the segment than across it, rounding does not affect which vertices are first and last along the
+    segment: the lowest vertex is searched between the first and the last, and the highest between the last and the
+    first. Otherwise rounding does not affect which vertices are lowest and highest.
+    """
+    source = points[:count].copy()
+    scale = max(abs(half_x), abs(half_y))
+    x = half_x / scale
+    y = half_y / scale
+    origin_x = points[0, 0]
+    origin_y = points[0, 1]
+    bottom = top = hind = fore = 0
+    lowest = highest = minimum = maximum = 0.0
+    for i in range(1, count):
+        from_x = points[i, 0] - origin_x
+        from_y = points[i, 1] - origin_y
+        height = cross(x, y, from_x, from_y)
+        along = x * from_x + y * from_y
+        if height < lowest:
+            lowest = height
+            bottom = i
+        if height > highest:
+            highest = height
+            top = i
+        if along < minimum:
+            minimum = along
+            hind = i
+        if along > maximum:
+            maximum = along
+            fore = i
+    if maximum - minimum > highest - lowest:
+        bottom_first, bottom_last = lowest_between(points, count, hind, fore, x, y)
+        top_first, top_last = lowest_between(points, count, fore, hind, -x, -y)
+    else:
+        bottom_first, bottom_last = level_stretch(points, count, bottom, x, y)
+        top_first, top_last = level_stretch(points, count, top, x, y)
+    made = append_moved(source, count, bottom_last, top_first, half_x, half_y, points, 0)
+    made = append_moved(source, count, top_last, bottom_first, -half_x, -half_y, points, made)
+    return close(points, made)
+
+
+@compiled
+def lowest_between(points: Points, count: int, first: int, last: int, x: float, y: float) -> tuple[int, int]:
+    """First and last of the lowest vertices across (x, y) between two vertices, counter-clockwise."""
+    lowest = 0.0
+    lowest_first = lowest_last = first
+    i = first
+    while i != last:
+        i = i + 1 if i + 1 < count else 0
+        height = cross(x, y, points[i, 0] - points[first, 0], points[i, 1] - points[first, 1])
+        if height < lowest:
+            lowest = height
+            lowest_first = lowest_last = i
+        elif height == lowest:
+            lowest_last = i
+    return lowest_first, lowest_last
+
+
+@compiled
+def level_stretch(points: Points, count: int, i: int, x: float, y: float) -> tuple[int, int]:
+    """First and last of the vertices next to vertex i that have exactly its height across (x, y)."""
+    first = last = i
+    for _ in range(count - 1):
+        before = first - 1 if first > 0 else count - 1
+        if cross(x, y, points[before, 0] - points[i, 0], points[before, 1] - points[i, 1]) != 0.0:
+            break
+        first = before
+    for _ in range(count - 1):
+        after = last + 1 if last + 1 < count else 0
+        if cross(x, y, points[after, 0] - points[i, 0], points[after, 1] - points[i, 1]) != 0.0:
+            break
+        last = after
+    return first, last
+
+
+@compiled
+def append_moved(points: Points, count: int, first: int, last: int, x: float, y: float, out: Points, made: int) -> int:
+    """Append the vertices from first to last, counter-clockwise, moved by (x, y); return the new count."""
+    i = first
+    while True:
+        made = append(out, made, points[i, 0] + x, points[i, 1] + y)
+        if i == last:
+            return made
+        i = i + 1 if i + 1 < count else 0
+
+
+@compiled
+def lowest_index(points: Points, count: int) -> int:
+    """Index of the lowest vertex; of equally low ones the leftmost."""
+    best = 0
+    for i in range(1, count):
+        if points[i, 1] < points[best, 1] or (points[i, 1] == points[best, 1] and points[i, 0] < points[best, 0]):
+            best = i
+    return best
+
+
+@compiled
+def add_polygon(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
+    """Write the Minkowski sum of two convex polygons by merging their edges in order of direction; return its size.
+
+    The result has at most count + other_count vertices; none if either polygon is empty. O(count + other_count). If
+    rounding has given an edge a wrong direction, the hull is taken first, which costs more: the merge needs edges in
+    order. Each vertex of the sum is one addition of two vertices, so that rounding errors do not accumulate.
+    """
+    if count == 0 or other_count == 0:
+        return 0
+    first, first_count = with_edges_in_order(points, count)
+    second, second_count = with_edges_in_order(other, other_count)
+    i = lowest_index(first, first_count)
+    j = lowest_index(second, second_count)
+    steps_i = first_count if first_count > 1 else 0
+    steps_j = second_count if second_count > 1 else 0
+    made = 0
+    while True:
+        made = append(out, made, first[i, 0] + second[j, 0], first[i, 1] + second[j, 1])
+        next_i = i + 1 if i + 1 < first_count else 0
+        next_j = j + 1 if j + 1 < second_count else 0
+        order = direction_order(
+            first[next_i, 0] - first[i, 0],
+            first[next_i, 1] - first[i, 1],
+            second[next_j, 0] - second[j, 0],
+            second[next_j, 1] - second[j, 1],
+        )
+        advances_i = steps_i > 0 and (steps_j == 0 or order >= 0)
+        advances_j = steps_j > 0 and (steps_i == 0 or order <= 0)
+        if advances_i:
+            i = next_i
+            steps_i -= 1
+        if advances_j:
+            j = next_j
+            steps_j -= 1
+        if steps_i == 0 and steps_j == 0:
+            return close(out, made)
+
+
+@compiled
+def with_edges_in_order(points: Points, count: int) -> tuple[Points, int]:
+    """Return the polygon, or its hull if rounding has given an edge a wrong direction."""
+    if edges_in_order(points, count):
+        return points, count
+    ordered = np.empty((count, 2))
+    return ordered, hull(points, count, ordered)
+
+
+@compiled
+def edges_in_order(points: Points, count: int) -> bool:
+    """Whether the directions of the edges, from the lowest vertex on, increase over one revolution. O(count)."""
+    if count == 1:
+        return True
+    i = lowest_index(points, count)
+    from_x = 1.0
+    from_y = 0.0
+    for _ in range(count):
+        after = i + 1 if i + 1 < count else 0
+        edge_x = points[after, 0] - points[i, 0]
+        edge_y = points[after, 1] - points[i, 1]
+        if (edge_x == 0.0 and edge_y == 0.0) or direction_order(from_x, from_y, edge_x, edge_y) < 0:
+            return False
+        from_x = edge_x
+        from_y = edge_y
+        i = after
+    return True
+
+
+@compiled
+def direction_order(ax: float, ay: float, bx: float, by: float) -> int:
+    """Return 1 if direction a is before b, counter-clockwise from +x, -1 if it is after, and 0 if they are equal."""
+    a_returns = ay < 0.0 or (ay == 0.0 and ax < 0.0)
+    b_returns = by < 0.0 or (by == 0.0 and bx < 0.0)
+    if a_returns != b_returns:
+        return -1 if a_returns else 1
+    turn = cross(ax, ay, bx, by)
+    if turn > 0.0:
+        return 1
+    if turn < 0.0:
+        return -1
+    return 0

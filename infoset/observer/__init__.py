@@ -1,0 +1,1 @@
+"""The set observer of a linear system."""

@@ -1,0 +1,445 @@
+"""Observers of linear systems: the exact sets of states that agree with measurements, inputs and bounded errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from infoset.arrays import Flags, Floats, Integers
+from infoset.geometry._set_arguments import finite_values
+from infoset.geometry.convex_polygons import ConvexPolygons
+from infoset.geometry.polytope import Polytope
+from infoset.geometry.zonotope import Zonotope
+from infoset.limits import COUNT, real_values, shown
+from infoset.observer.sets import Motion, Polygons, Polytopes, Set, Sets, Strips, polytope_of
+
+MAX_STATES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Inconsistency:
+    """Where the measurements contradict the model; arrays of the shape () for a single run, or (B,).
+
+    Parameters
+    ----------
+    step : ndarray of int
+        Step whose measurement made the set empty; -1 if the set is not empty.
+    output : ndarray of int
+        Output whose bounds made it empty, from 0, after the outputs before it. For noise in a set, the row of
+        the normals of the polytope (of a polygon V, `V.polytope().normals`), or of its projection on the measured
+        outputs. 0 if the set is not empty.
+    excess : ndarray
+        Minimum enlargement of these bounds, all others unchanged, for which a state exists, in the unit of the output;
+        0 if the set is not empty.
+    """
+
+    step: Integers
+    output: Integers
+    excess: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The sets of possible states of all runs at a step; with `single` there is one run, without an axis of runs."""
+
+    step: int
+    sets: Sets = field(repr=False)
+    single: bool
+    states: int
+
+    @property
+    def is_empty(self) -> Flags:
+        """Whether no state is possible, shape () or (B,)."""
+        return np.asarray(self._runs(self.sets.is_empty))
+
+    @property
+    def polygons(self) -> ConvexPolygons:
+        """The sets of two states; rows of `vertices` after the `counts` of a run, which only a batch has, are NaN.
+
+        Raises
+        ------
+        ValueError
+            If the system has another number of states.
+        """
+        if not isinstance(self.sets, Polygons):
+            raise ValueError(f"the set has {self.states} states, not two: use .polytopes")
+        counts = self.sets.counts
+        used = np.arange(counts.max(initial=0)) < counts[:, None]
+        vertices = np.where(used[..., None], self.sets.vertices[:, : used.shape[1]], np.nan)
+        polygons = ConvexPolygons.unchecked(vertices, counts)
+        return polygons[0] if self.single else polygons
+
+    @property
+    def polytopes(self) -> tuple[Polytope, ...]:
+        """The set of each run; a tuple of one set for a single run."""
+        if isinstance(self.sets, Polytopes):
+            empty = Polytope.empty(self.states)
+            return tuple(empty if member is None else member.polytope for member in self.sets.members)
+        assert isinstance(self.sets, Polygons)
+        pairs = zip(self.sets.vertices, self.sets.counts, strict=True)
+        return tuple(Polytope.from_vertices(points[:count]) if count else Polytope.empty(2) for points, count in pairs)
+
+    @property
+    def lower(self) -> Floats:
+        """Minimum value of each state, shape (n,) or (B, n); NaN for the empty set."""
+        return self._hull[0]
+
+    @property
+    def upper(self) -> Floats:
+        """Maximum value of each state, shape (n,) or (B, n); NaN for the empty set."""
+        return self._hull[1]
+
+    def chebyshev_centre(self) -> Floats:
+        """Return the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty set."""
+        return self._runs(self.sets.chebyshev_centres(self.states))
+
+    def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the minimum and the maximum values of matrix x, each of shape (m,) or (B, m); NaN for the empty set.
+
+        Raises
+        ------
+        ValueError
+            If the matrix does not have the shape (m, n), m at least 1, or is not finite.
+        """
+        rows = finite_values("matrix", matrix, "m", self.states)
+        ends = [np.array([self.sets.support(sign * row) for row in rows]).T for sign in (-1.0, 1.0)]
+        lower, upper = (np.where(np.isinf(end), np.nan, end) for end in ends)
+        return self._runs(0.0 - lower), self._runs(upper)
+
+    @cached_property
+    def _hull(self) -> tuple[Floats, Floats]:
+        return self.output_hull(np.eye(self.states))
+
+    def _runs(self, values: Floats | Flags) -> Floats:
+        return np.asarray(values[0] if self.single else values)
+
+
+class LinearObserver:
+    """Exact sets of the states of x+ = A x + B u + c + w, y = C x + v, with w in W and v in V.
+
+    Two states: polygons, compiled, batched over runs. One, and three to six states: polytopes, each run after the
+    other; the number of vertices grows fast with the number of states.
+
+    Parameters
+    ----------
+    state_matrix : array_like, shape (n, n) or (K, n, n)
+        A, or A of each step.
+    output_matrix : array_like, shape (q, n) or (K, q, n)
+        C.
+    initial : ConvexPolygons, Polytope or Zonotope
+        Set of the state at step 0, before its measurement; for two states also one polygon for each run, shape (B,).
+    noise : array_like, shape () or (q,), or ConvexPolygons, Polytope or Zonotope
+        Half-widths of the box V, or V.
+    disturbance : ConvexPolygons, Polytope or Zonotope, optional
+        W; without it the point 0.
+    input_matrix : array_like, shape (n, p) or (K, n, p), optional
+        B.
+    offset : array_like, shape (n,) or (K, n), optional
+        c.
+    runs : int, optional
+        Number B of runs. Without it there is one run, and its arrays have no axis of runs.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a set or a number has a wrong type, shapes do not agree, a number is not finite, or a set is empty.
+
+    Notes
+    -----
+    The computed sets contain the exact ones. They are larger by a few ulp (two states) or by 1e-12 of the coordinates
+    (polytopes), so that errors exactly at their bounds do not lose the true state. Polygons of more than 512 vertices
+    are reduced outward.
+
+    Examples
+    --------
+    >>> observer = LinearObserver([[1, 1], [0, 1]], [[1, 0]], Zonotope.box([0, -1], [0, 1]), noise=0.1,
+    ...                           disturbance=Zonotope([0, 0], [[0, 0.05]]))
+    >>> observer.predict()
+    >>> observer.update([0.5])
+    >>> observer.estimate().lower.round(3), observer.estimate().upper.round(3)
+    (array([0.4 , 0.35]), array([0.6 , 0.65]))
+    """
+
+    def __init__(
+        self,
+        state_matrix: ArrayLike,
+        output_matrix: ArrayLike,
+        initial: Set,
+        *,
+        noise: ArrayLike | Set,
+        disturbance: Set | None = None,
+        input_matrix: ArrayLike | None = None,
+        offset: ArrayLike | None = None,
+        runs: int | None = None,
+    ) -> None:
+        self._a = _matrices("state_matrix", state_matrix)
+        self.states = self._a.shape[-1]
+        if self._a.shape[-2] != self.states or not 1 <= self.states <= MAX_STATES:
+            raise ValueError(
+                f"state_matrix must have the shape (n, n) or (K, n, n) with n from 1 to {MAX_STATES}: "
+                f"got {self._a.shape}"
+            )
+        self._c = _matrices("output_matrix", output_matrix)
+        if self._c.shape[-1] != self.states:
+            raise ValueError(f"output_matrix must have {self.states} columns, one for each state: got {self._c.shape}")
+        self.outputs = self._c.shape[-2]
+        self._b = np.zeros((self.states, 0)) if input_matrix is None else _matrices("input_matrix", input_matrix)
+        if self._b.shape[-2] != self.states:
+            raise ValueError(f"input_matrix must have {self.states} rows, one for each state: got {self._b.shape}")
+        self.inputs = self._b.shape[-1]
+        self._offset = np.zeros(self.states) if offset is None else finite_values("offset", offset, "...")
+        if self._offset.ndim not in (1, 2) or self._offset.shape[-1] != self.states:
+            raise ValueError(
+                f"offset must have the shape ({self.states},) or (K, {self.states}): got {self._offset.shape}"
+            )
+        if runs is not None:
+            COUNT.need("runs", runs)
+        self._single = runs is None
+        self._runs = runs or 1
+        self._disturbance = Zonotope(np.zeros(self.states), []) if disturbance is None else disturbance
+        self._need_set("disturbance", self._disturbance)
+        self._need_set("initial", initial, (self._runs,) if runs else ())
+        self._noise = _Noise.of(noise, self.outputs)
+        self._sets: Sets = (
+            Polygons.of(initial, self._runs)
+            if self.states == 2
+            else Polytopes.of(initial, self._runs, _sizes_of(self._disturbance))
+        )
+        self.step = 0
+        self._empty = np.full(self._runs, -1), np.zeros(self._runs, dtype=np.int64), np.zeros(self._runs)
+
+    def _need_set(self, name: str, value: Set, shape: tuple[int, ...] = ()) -> None:
+        if not isinstance(value, ConvexPolygons | Polytope | Zonotope):
+            raise TypeError(f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}")
+        space = 2 if isinstance(value, ConvexPolygons) else value.space
+        if space != self.states:
+            raise ValueError(f"{name} must have {self.states} coordinates, one for each state: got {space}")
+        if isinstance(value, ConvexPolygons) and value.shape not in ((), shape):
+            batch = f" or a batch of shape {shape}" if shape else ""
+            raise ValueError(f"{name} must be a single polygon{batch}: got a batch of shape {value.shape}")
+        if not isinstance(value, Zonotope) and np.any(value.is_empty):
+            raise ValueError(f"{name} must not be empty")
+
+    def predict(self, inputs: ArrayLike | None = None) -> None:
+        """Move the sets to the next step.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (p,) or (B, p), optional
+            u between this step and the next one; without it zero.
+
+        Raises
+        ------
+        ValueError
+            If the inputs have another shape or are not finite, or a matrix for this step is missing.
+        ArithmeticError
+            If a polytope has more than 5000 vertices.
+        """
+        self._sets = self._sets.predicted(self._motion(self.step, inputs))
+        self.step += 1
+
+    def update(self, measurement: ArrayLike) -> None:
+        """Cut the sets by the measurement of this step.
+
+        Parameters
+        ----------
+        measurement : array_like, shape (q,) or (B, q)
+            y; NaN is a missing measurement.
+
+        Raises
+        ------
+        ValueError
+            If it has another shape, or is infinite.
+        """
+        y = self._rows("measurement", measurement, self.outputs, missing=True)
+        matrix = self._at(self._c, "output_matrix", self.step)
+        for runs, strips in self._noise.strips(matrix, y):
+            self._cut(runs, strips)
+
+    def _cut(self, runs: Flags, strips: Strips) -> None:
+        exists = runs[:, None] & ~np.isnan(strips.lower)
+        lower, upper = np.where(exists, strips.lower, -np.inf), np.where(exists, strips.upper, np.inf)
+        excess = np.zeros((self._runs, len(strips.normals)))
+        before = self._sets.is_empty
+        self._sets = self._sets.cut(Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0)), excess)
+        lost = np.flatnonzero(self._sets.is_empty & ~before)
+        if len(lost):
+            step, output, amount = self._empty
+            step[lost], output[lost] = self.step, excess[lost].argmax(axis=1)
+            amount[lost] = excess[lost].max(axis=1)
+
+    def estimate(self) -> Estimate:
+        """Return the present sets."""
+        return Estimate(self.step, self._sets, self._single, self.states)
+
+    @property
+    def inconsistency(self) -> Inconsistency:
+        """Where the measurements contradict the model."""
+        parts = [part[0] if self._single else part.copy() for part in self._empty]
+        return Inconsistency(*(np.asarray(part) for part in parts))
+
+    def run(self, measurements: ArrayLike, inputs: ArrayLike | None = None) -> list[Estimate]:
+        """Process the measurements of several steps; return the estimate after each of them.
+
+        Parameters
+        ----------
+        measurements : array_like, shape (N, q) or (N, B, q)
+            y of this step and of the next ones.
+        inputs : array_like, shape (N, p) or (N, B, p), optional
+            u after each measurement; one row less is enough.
+
+        Raises
+        ------
+        ValueError
+            As `predict` and `update`, or if there are too few inputs.
+        """
+        estimates = []
+        rows = np.atleast_1d(real_values("measurements", measurements))
+        series = _series(inputs, len(rows) - 1)
+        for k, measurement in enumerate(rows):
+            if k:
+                self.predict(None if series is None else series[k - 1])
+            self.update(measurement)
+            estimates.append(self.estimate())
+        return estimates
+
+    def smooth(self, estimates: Sequence[Estimate], inputs: ArrayLike | None = None) -> list[Estimate]:
+        """Return the sets of earlier states given also the later measurements.
+
+        The exact backward pass: a state is possible if it is in its own estimate and leads, for some disturbance, to a
+        possible state of the next step.
+
+        Parameters
+        ----------
+        estimates : sequence of Estimate
+            Estimates of successive steps, as `run` returns them.
+        inputs : array_like, shape (N, p) or (N, B, p), optional
+            u after each of them; the last one is not used.
+
+        Raises
+        ------
+        ValueError
+            If the steps are not successive, or there are too few inputs.
+        """
+        if any(after.step != before.step + 1 for before, after in pairwise(estimates)):
+            raise ValueError("estimates must belong to successive steps")
+        smoothed = list(estimates)
+        rows = _series(inputs, len(smoothed) - 1)
+        for i in range(len(smoothed) - 2, -1, -1):
+            step = smoothed[i].step
+            motion = self._motion(step, None if rows is None else rows[i])
+            sets = smoothed[i].sets.preimage_cut(smoothed[i + 1].sets, motion)
+            smoothed[i] = Estimate(step, sets, self._single, self.states)
+        return smoothed
+
+    def _motion(self, step: int, inputs: ArrayLike | None) -> Motion:
+        matrix = self._at(self._a, "state_matrix", step)
+        offset = self._at(self._offset, "offset", step, 1)[None]
+        if inputs is None:
+            return Motion(matrix, offset, np.abs(offset), self._disturbance)
+        u, b = self._rows("inputs", inputs, self.inputs), self._at(self._b, "input_matrix", step)
+        return Motion(matrix, u @ b.T + offset, np.abs(u) @ np.abs(b).T + np.abs(offset), self._disturbance)
+
+    def _rows(self, name: str, values: ArrayLike, size: int, *, missing: bool = False) -> Floats:
+        """Return measurements or inputs of all runs, shape (B, size)."""
+        rows = real_values(name, values)
+        shapes = [(size,)] if self._single else [(size,), (self._runs, size)]
+        if rows.shape not in shapes:
+            raise ValueError(f"{name} must have the shape {' or '.join(map(str, shapes))}: got {rows.shape}")
+        if np.isinf(rows).any() or (not missing and np.isnan(rows).any()):
+            raise ValueError(f"{name} must be finite{' or NaN' if missing else ''}: got {shown(values)}")
+        return np.broadcast_to(rows, (self._runs, size))
+
+    def _at(self, values: Floats, name: str, step: int, rank: int = 2) -> Floats:
+        """Return a matrix or a vector of a step."""
+        if values.ndim == rank:
+            return values
+        if step >= len(values):
+            raise ValueError(f"{name} has {len(values)} steps, none for step {step}")
+        return np.asarray(values[step])
+
+
+@dataclass(frozen=True, eq=False)
+class _Noise:
+    """The set V as lower <= rows v <= upper; `polytope` is V if it is not a box."""
+
+    rows: Floats
+    lower: Floats
+    upper: Floats
+    polytope: Polytope | None = None
+
+    @classmethod
+    def of(cls, noise: ArrayLike | Set, outputs: int) -> _Noise:
+        if isinstance(noise, ConvexPolygons | Polytope | Zonotope):
+            if not isinstance(noise, Zonotope) and np.any(noise.is_empty):
+                raise ValueError("noise must not be empty")
+            if isinstance(noise, ConvexPolygons) and noise.shape:
+                raise ValueError(f"noise must be a single polygon: got a batch of shape {noise.shape}")
+            polytope = polytope_of(noise)
+            if polytope.space != outputs:
+                raise ValueError(f"noise must have {outputs} coordinates, one for each output: got {polytope.space}")
+            return cls(*_half_spaces(polytope), polytope)
+        half = finite_values("noise", noise, "...")
+        if half.shape not in ((), (outputs,)) or (half < 0.0).any():
+            raise ValueError(
+                f"noise must be half-widths of at least 0, a number or of shape ({outputs},): got {shown(noise)}"
+            )
+        half = np.broadcast_to(half, (outputs,))
+        return cls(np.eye(outputs), -half, half)
+
+    def strips(self, matrix: Floats, y: Floats) -> list[tuple[Flags, Strips]]:
+        """Return the strips of C x = y - v for groups of runs in which the same outputs are measured."""
+        known = ~np.isnan(y)
+        if self.polytope is None:
+            strips = Strips(matrix, y - self.upper, y - self.lower, np.abs(y) + self.upper)
+            return [(np.ones(len(y), dtype=bool), strips)]
+        groups = []
+        for pattern in np.unique(known, axis=0):
+            runs = (known == pattern).all(axis=1)
+            if pattern.all():
+                rows, lower, upper = self.rows, self.lower, self.upper
+            elif pattern.any():  # the errors of the measured outputs alone
+                rows, lower, upper = _half_spaces(self.polytope.project(np.flatnonzero(pattern).tolist()))
+            else:
+                continue
+            heights = y[:, pattern] @ rows.T
+            terms = np.abs(np.nan_to_num(y[:, pattern])) @ np.abs(rows).T + np.abs(upper)
+            groups.append((runs, Strips(rows @ matrix[pattern], heights - upper, heights - lower, terms)))
+        return groups
+
+
+def _half_spaces(polytope: Polytope) -> tuple[Floats, Floats, Floats]:
+    """Return rows, lower and upper bounds of a polytope."""
+    open_ends = np.full(len(polytope.offsets), -np.inf)
+    return (
+        np.vstack([polytope.normals, polytope.across]),
+        np.concatenate([open_ends, polytope.levels]),
+        np.concatenate([polytope.offsets, polytope.levels]),
+    )
+
+
+def _sizes_of(shape: Set) -> Floats:
+    """Return the maximum coordinates of a set, shape (n,), or bounds of them."""
+    if isinstance(shape, Zonotope):
+        return np.asarray(np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0))
+    return np.asarray(np.abs(shape.vertices).reshape(-1, shape.vertices.shape[-1]).max(axis=0))
+
+
+def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
+    """Return inputs of at least a number of steps."""
+    rows = None if inputs is None else real_values("inputs", inputs)
+    if rows is not None and (not rows.ndim or len(rows) < steps):
+        raise ValueError(f"inputs must have a row for each of {steps} steps: got the shape {rows.shape}")
+    return rows
+
+
+def _matrices(name: str, value: ArrayLike) -> Floats:
+    matrices = finite_values(name, value, "...")
+    if matrices.ndim not in (2, 3):
+        raise ValueError(f"{name} must be a matrix, or one for each step: got the shape {matrices.shape}")
+    return np.ascontiguousarray(matrices)

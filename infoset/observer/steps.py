@@ -1,0 +1,304 @@
+"""Compiled steps of a `LinearObserver` with two states: prediction and measurement of a batch of polygons.
+
+Every step is outward by a few ulp: the computed set contains the exact one, and a true state that is computed with
+floating-point numbers from errors at their bounds.
+
+Arrays hold B polygons: `vertices`, shape (B, room, 2), and their numbers, `counts`. Kernels write the results to `out`
+and `made`, which have the same shapes, with room for more vertices.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from infoset._compile import compiled, inlined
+from infoset.arrays import Floats, Integers
+from infoset.geometry import polygon, polygon_hull, polygon_sum
+from infoset.geometry.polygon import Points
+
+MAX_VERTICES = 512
+"""Polygons with more vertices are reduced outward."""
+_SHARP = 2.0
+"""Slope of both edges at an extreme vertex, relative to its axis, above which the vertex is divided."""
+_SHARP_CORNER = 0.5
+"""The same for a vertex that is extreme along two axes."""
+
+
+@inlined
+def reach(points: Points, count: int) -> tuple[float, float]:
+    """Maximum sizes of both coordinates of the vertices."""
+    x = y = 0.0
+    for i in range(count):
+        x = max(x, abs(points[i, 0]))
+        y = max(y, abs(points[i, 1]))
+    return x, y
+
+
+@compiled
+def predict_all(
+    vertices: Floats,
+    counts: Integers,
+    matrix: Floats,
+    shifts: Floats,
+    terms: Floats,
+    generators: Floats,
+    other: Points,
+    slack: float,
+    out: Floats,
+    made: Integers,
+) -> None:
+    """Write matrix P + shift + the segments of the generators + the polygon `other`, with slack, for each polygon P.
+
+    `shifts`, and the sums `terms` of the sizes of their terms, have the shape (B, 2) or (1, 2). `generators`, shape (g,
+    2), are half segments; `other`, shape (m, 2), may have no vertices. `slack` is half the width of the box that is
+    added, relative to the terms of a coordinate. A result has at most 2 g + m + 4 vertices more.
+    """
+    scratch, second = np.empty((out.shape[1], 2)), np.empty((out.shape[1], 2))
+    xx, xy, yx, yy = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
+    determinant = polygon.scaled_determinant(xx, xy, yx, yy)
+    added_x = added_y = 0.0
+    for g in range(len(generators)):
+        added_x += abs(generators[g, 0])
+        added_y += abs(generators[g, 1])
+    other_x, other_y = reach(other, len(other))
+    added_x += other_x
+    added_y += other_y
+    for b in range(counts.size):
+        count = counts[b]
+        made[b] = 0
+        if count == 0:
+            continue
+        points = vertices[b]
+        row = b if len(shifts) > 1 else 0
+        shift_x, shift_y = shifts[row, 0], shifts[row, 1]
+        x, y = reach(points, count)
+        slack_x = slack * (abs(xx) * x + abs(xy) * y + terms[row, 0] + added_x)
+        slack_y = slack * (abs(yx) * x + abs(yy) * y + terms[row, 1] + added_y)
+        if determinant > 0.0:
+            for i in range(count):
+                x, y = points[i, 0], points[i, 1]
+                scratch[i, 0], scratch[i, 1] = xx * x + xy * y, yx * x + yy * y
+        else:
+            count = polygon.map_linearly(points, count, xx, xy, yx, yy, scratch)
+        if len(other) > 0:
+            polygon.copy(scratch, count, second)
+            count = polygon_sum.add_polygon(second, count, other, len(other), scratch)
+        for g in range(len(generators)):
+            count = polygon_sum.add_segment(scratch, count, generators[g, 0], generators[g, 1])
+        if count > MAX_VERTICES:
+            count = polygon_hull.reduce_outward(scratch, count, MAX_VERTICES)
+        made[b] = enlarge(scratch, count, shift_x, shift_y, slack_x, slack_y, out[b])
+
+
+@inlined
+def corner(part: int) -> tuple[float, float]:
+    """Signs of the corner of a box that belongs to a part of the boundary: 0 is before the lowest vertex."""
+    k = part & 3
+    return (1.0 if 0 < k < 3 else -1.0), (1.0 if k >= 2 else -1.0)
+
+
+@compiled
+def enlarge(
+    points: Points, count: int, shift_x: float, shift_y: float, half_x: float, half_y: float, out: Points
+) -> int:
+    """Write a polygon, not empty, that is moved by (shift_x, shift_y) and contains the sum with a small box.
+
+    Half the widths of the box are (half_x, half_y). Return the number of vertices: the result has `count` vertices for
+    most sets, at most count + 4. O(count). The lowest, rightmost, highest and leftmost vertices divide the boundary
+    into four parts, and each part moves by one corner of the box. A dividing vertex moves so that both of its edges
+    move far enough, by at most five boxes; at a sharp tip it becomes two vertices. The division at extremes is correct
+    for edges of a few ulp with a wrong direction.
+    """
+    low = right = high = left = 0
+    for i in range(1, count):
+        x, y = points[i, 0], points[i, 1]
+        low = i if y < points[low, 1] else low
+        right = i if x > points[right, 0] else right
+        high = i if y > points[high, 1] else high
+        left = i if x < points[left, 0] else left
+    ends = (low, right, high, left)
+    part = 0
+    while part > -3 and ends[(part - 1) & 3] == low:
+        part -= 1
+    last_part = part + 4
+    made = 0
+    i = low
+    for _ in range(count):
+        x, y = points[i, 0] + shift_x, points[i, 1] + shift_y
+        after = part
+        while after < last_part and ends[after & 3] == i:
+            after += 1
+        if after == part:
+            along_x, along_y = corner(part)
+            polygon.put(out, made, x + along_x * half_x, y + along_y * half_y)
+            made += 1
+        else:
+            move_x, move_y = tip_move(points, count, i, part, after, half_x, half_y)
+            if move_x != 0.0 or move_y != 0.0:
+                polygon.put(out, made, x + move_x * half_x, y + move_y * half_y)
+                made += 1
+            else:
+                for k in range(part, min(after, part + 3) + 1):
+                    along_x, along_y = corner(k)
+                    polygon.put(out, made, x + along_x * half_x, y + along_y * half_y)
+                    made += 1
+            part = after
+        i = i + 1 if i + 1 < count else 0
+    if part != last_part:
+        return enlarge_carefully(points, count, shift_x, shift_y, half_x, half_y, out)
+    return polygon.close(out, made)
+
+
+@inlined
+def tip_move(
+    points: Points, count: int, i: int, part: int, after: int, half_x: float, half_y: float
+) -> tuple[float, float]:
+    """Move of an extreme vertex between two parts of the boundary, in boxes; zero if the vertex must be divided."""
+    if after - part > 2:
+        return 0.0, 0.0
+    before, behind = i - 1 if i > 0 else count - 1, i + 1 if i + 1 < count else 0
+    in_x, in_y = (points[i, 1] - points[before, 1]) * half_x, (points[before, 0] - points[i, 0]) * half_y
+    out_x, out_y = (points[behind, 1] - points[i, 1]) * half_x, (points[i, 0] - points[behind, 0]) * half_y
+    # The axis of the first division, and the next axis counter-clockwise.
+    first_x, first_y = corner(part)
+    next_x, next_y = corner(part + 1)
+    u_x, u_y = 0.5 * (first_x + next_x), 0.5 * (first_y + next_y)
+    v_x, v_y = -u_y, u_x
+    a, b = in_x * u_x + in_y * u_y, -(in_x * v_x + in_y * v_y)
+    c, d = out_x * u_x + out_y * u_y, out_x * v_x + out_y * v_y
+    if after - part == 1:
+        if min(a, b) < 0.0 or min(c, d) < 0.0:
+            return 0.0, 0.0
+        if d * a <= b * c and d <= _SHARP * c and c > 0.0:
+            far, side = 1.0 + 2.0 * (d / c), -1.0
+        elif b <= _SHARP * a and a > 0.0:
+            far, side = 1.0 + 2.0 * (b / a), 1.0
+        else:
+            return 0.0, 0.0
+        return far * u_x + side * v_x, far * u_y + side * v_y
+    c, d = d, -c
+    if min(a, b) < 0.0 or min(c, d) < 0.0 or b > _SHARP_CORNER * a or d > _SHARP_CORNER * c or a == 0.0 or c == 0.0:
+        return 0.0, 0.0
+    far = max((a + b) / (a - b), (c + d) / (c - d))
+    return far * (u_x + v_x), far * (u_y + v_y)
+
+
+@compiled
+def enlarge_carefully(
+    points: Points, count: int, shift_x: float, shift_y: float, half_x: float, half_y: float, out: Points
+) -> int:
+    """Write the same as `enlarge` for a set as thin as rounding, whose vertices may be in a wrong order: by a hull."""
+    corners = np.empty((4 * count, 2))
+    for i in range(count):
+        for k in range(4):
+            along_x, along_y = corner(k)
+            corners[4 * i + k, 0] = points[i, 0] + shift_x + along_x * half_x
+            corners[4 * i + k, 1] = points[i, 1] + shift_y + along_y * half_y
+    hull = np.empty((4 * count, 2))
+    made = polygon_hull.hull(corners, 4 * count, hull)
+    if made > count + 4:
+        made = polygon_hull.reduce_outward(hull, made, count + 4)
+    polygon.copy(hull, made, out)
+    return made
+
+
+@compiled
+def update_all(
+    vertices: Floats,
+    counts: Integers,
+    normals: Floats,
+    lower: Floats,
+    upper: Floats,
+    terms: Floats,
+    excess: Floats,
+    slack: float,
+    out: Floats,
+    made: Integers,
+) -> None:
+    """Write the part of each polygon that is within the strips of a measurement: at most 2 r vertices more.
+
+    `normals` have the shape (r, 2). The bounds of normal . x, `lower` and `upper`, shape (B, r), are infinite for a
+    missing measurement; `terms`, shape (B, r), are the sums of the sizes of their terms. `slack` is the enlargement of
+    the bounds, relative to their terms and those of normal . x. `excess`, shape (B, r), receives the distance between
+    set and strip, in the unit of the bounds, where the set becomes empty.
+    """
+    for b in range(counts.size):
+        count = counts[b]
+        points = out[b]
+        polygon.copy(vertices[b], count, points)
+        x, y = reach(points, count)
+        for r in range(len(normals)):
+            minimum, maximum = lower[b, r], upper[b, r]
+            if count == 0:
+                break
+            more = slack * (abs(normals[r, 0]) * x + abs(normals[r, 1]) * y + terms[b, r])
+            minimum, maximum = minimum - more, maximum + more
+            if normals[r, 0] == 0.0 and normals[r, 1] == 0.0:
+                overlap = min(maximum, -minimum)
+                count = count if overlap >= 0.0 else 0
+            else:
+                count, overlap = polygon.clip_to_band(points, count, normals[r, 0], normals[r, 1], minimum, maximum)
+            if count == 0:
+                excess[b, r] = -overlap
+        made[b] = count
+
+
+@compiled
+def cut_to_preimage(
+    vertices: Floats,
+    counts: Integers,
+    later: Floats,
+    later_counts: Integers,
+    matrix: Floats,
+    slack: float,
+    out: Floats,
+    made: Integers,
+) -> None:
+    """Write the points x of each polygon for which matrix x is in a later polygon.
+
+    The result has at most four vertices more than both. `slack` is the enlargement of the half-planes of the later
+    polygon, relative to the terms of a height. The level of each half-plane is the maximum height of all vertices, so
+    that the half-plane of an edge of a few ulp with a wrong direction contains the set. Half-planes along the axes
+    bound what such edges leave open at sharp tips.
+    """
+    for b in range(counts.size):
+        made[b] = 0
+        count = counts[b]
+        if count == 0 or later_counts[b] == 0:
+            continue
+        points, other = out[b], later[b]
+        polygon.copy(vertices[b], count, points)
+        x, y = reach(points, count)
+        other_x, other_y = reach(other, later_counts[b])
+        terms_x = max(other_x, abs(matrix[0, 0]) * x + abs(matrix[0, 1]) * y)
+        terms_y = max(other_y, abs(matrix[1, 0]) * x + abs(matrix[1, 1]) * y)
+        for i in range(-4, later_counts[b]):
+            if i < 0:
+                normal_x = (1.0 if i == -1 else -1.0) if i >= -2 else 0.0
+                normal_y = (1.0 if i == -3 else -1.0) if i < -2 else 0.0
+            else:
+                j = i + 1 if i + 1 < later_counts[b] else 0
+                normal_x, normal_y = other[j, 1] - other[i, 1], other[i, 0] - other[j, 0]
+            mapped_x = matrix[0, 0] * normal_x + matrix[1, 0] * normal_y
+            mapped_y = matrix[0, 1] * normal_x + matrix[1, 1] * normal_y
+            top = polygon.support_index(other, later_counts[b], normal_x, normal_y)
+            level = polygon.height(other, top, normal_x, normal_y)
+            level += slack * (abs(normal_x) * terms_x + abs(normal_y) * terms_y)
+            if mapped_x == 0.0 and mapped_y == 0.0:
+                count = count if level >= 0.0 else 0
+            else:
+                count, _ = polygon.clip_to_band(points, count, mapped_x, mapped_y, -np.inf, level)
+            if count == 0:
+                break
+        made[b] = count
+
+
+@compiled
+def support_all(vertices: Floats, counts: Integers, direction: Floats) -> Floats:
+    """Return the maximum height of each polygon along a direction; -inf for the empty set."""
+    heights = np.full(counts.size, -np.inf)
+    for b in range(counts.size):
+        if counts[b] > 0:
+            top = polygon.support_index(vertices[b], counts[b], direction[0], direction[1])
+            heights[b] = polygon.height(vertices[b], top, direction[0], direction[1])
+    return heights

@@ -1,0 +1,343 @@
+from __future__ import annotations
+
+import itertools
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from infoset.arrays import Floats
+from infoset.geometry.polytope import (
+    EmptyPolytopeError,
+    Polytope,
+    UnboundedPolytopeError,
+    _qhull,
+    polytope_from_support,
+    product,
+    relative_interior,
+)
+from tests.rendezvous.reachability.rationals import rational_hull, rational_intersection
+
+needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+
+
+def random_points(seed: int, count: int, size: int, rank: int) -> Floats:
+    """Points that span `rank` dimensions of R^size, each direction of another length."""
+    generator = np.random.default_rng(seed)
+    spread = generator.standard_normal((count, rank)) * 10.0 ** generator.uniform(-2, 2, rank)
+    turn = np.linalg.qr(generator.standard_normal((size, size)))[0]
+    return np.asarray(spread @ turn[:rank] + generator.standard_normal(size))
+
+
+def directions(seed: int, size: int, count: int = 50) -> Floats:
+    found = np.random.default_rng(seed).standard_normal((count, size))
+    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+
+
+def test_flat_box_point_and_segment() -> None:
+    flat = Polytope.from_box([0.0, 1.0, 2.0], [1.0, 1.0, 4.0])
+    assert (len(flat.vertices), len(flat.normals), flat.dimension, flat.space) == (4, 4, 2, 3)
+    assert flat.volume() == pytest.approx(2.0)
+    assert flat.excess([0.5, 1.1, 3.0]) == pytest.approx(0.1)
+    point = Polytope.from_vertices([[1.0, 2.0]])
+    assert (point.dimension, point.volume(), len(point.normals)) == (0, 1.0, 0)
+    segment = Polytope.from_vertices([[0.0, 0.0], [3.0, 4.0], [1.5, 2.0]])
+    assert (segment.dimension, len(segment.vertices), len(segment.normals)) == (1, 2, 2)
+    assert segment.volume() == pytest.approx(5.0)
+
+
+def test_cross_polytope_and_simplex_counts() -> None:
+    for size in (2, 3, 4, 5):
+        cross = Polytope.from_vertices(np.vstack([np.eye(size), -np.eye(size)]))
+        assert (len(cross.vertices), len(cross.normals)) == (2 * size, 2**size)
+        simplex = Polytope.from_constraints(np.vstack([-np.eye(size), np.ones((1, size))]), [*[0.0] * size, 1.0])
+        assert (len(simplex.vertices), len(simplex.normals)) == (size + 1, size + 1)
+        assert simplex.volume() == pytest.approx(1.0 / np.prod(np.arange(1, size + 1)))
+
+
+def test_redundant_points_and_halfspaces_are_dropped() -> None:
+    grid = np.array(list(itertools.product([0.0, 0.5, 1.0], repeat=3)))
+    cube = Polytope.from_vertices(np.vstack([grid, grid]))
+    assert (len(cube.vertices), len(cube.normals)) == (8, 6)
+    rows = np.vstack([np.eye(3), -np.eye(3), np.ones((1, 3)), np.eye(3)])
+    again = Polytope.from_constraints(rows, [1, 1, 1, 0, 0, 0, 3, 1, 5, 1])
+    assert (len(again.vertices), len(again.normals)) == (8, 6)
+
+
+def test_many_vertices_and_few_facets() -> None:
+    corners = np.array(list(itertools.product([-1.0, 1.0], repeat=8)))
+    normals, offsets = np.vstack([np.eye(8), -np.eye(8)]), np.ones(16)
+    on = corners @ normals.T == 1.0
+    every = np.arange(256)
+    vertices, facets, _ = _qhull.essential(corners, normals, offsets)
+    assert (len(vertices), len(facets)) == (256, 16)
+    assert _qhull._meet_in(corners, every, normals, offsets, on)
+    assert not _qhull._meet_in(corners, every[1:], normals, offsets, on)
+    assert not _qhull._meet_in(np.vstack([corners, 1.1 * corners[:1]]), every, normals, offsets, on)
+    assert not _qhull._meet_in(
+        np.vstack([corners, np.zeros(8)]), np.arange(257), normals, offsets, np.vstack([on, on[:1]])
+    )
+    for facet in range(3):  # the others do not bound a set
+        rest = np.delete(normals, facet, 0), np.delete(offsets, facet), np.delete(on, facet, 1)
+        assert not _qhull._meet_in(corners, every, *rest)
+    on[0] = False
+    assert not _qhull._meet_in(corners, every, normals, offsets, on)
+
+
+@needs_ppl
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 6), flat=st.integers(0, 3), extra=st.integers(1, 8))
+def test_hull_is_the_exact_one(seed: int, size: int, flat: int, extra: int) -> None:
+    rank = max(1, size - flat)
+    points = random_points(seed, rank + extra, size, rank)
+    hull = Polytope.from_vertices(points)
+    assert hull.dimension == rank
+    # Every point is inside, every vertex is a point, and supports are those of the points.
+    assert float(hull.excess(points).max()) < 1e-9 * np.abs(points).max()
+    found = directions(seed, size)
+    np.testing.assert_allclose(
+        hull.support_function(found), (points @ found.T).max(axis=0), atol=1e-9 * np.abs(points).max()
+    )
+    if rank == size:  # floats that are flat to rounding only are not flat in rationals
+        exact = rational_hull(points)
+        assert (len(hull.vertices), len(hull.normals)) == (len(exact.vertices), exact.facets)
+
+
+@needs_ppl
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 6), rank=st.integers(1, 5), extra=st.integers(1, 6))
+def test_flat_hull_is_the_exact_one(seed: int, size: int, rank: int, extra: int) -> None:
+    generator = np.random.default_rng(seed)
+    rank = min(rank, size)
+    points = (generator.integers(-9, 10, (rank + extra, rank)) @ generator.integers(-9, 10, (rank, size))).astype(float)
+    exact, hull = rational_hull(points), Polytope.from_vertices(points)
+    facets = 0 if hull.dimension == 0 else len(hull.normals)
+    assert (hull.dimension, len(hull.vertices), facets) == (exact.dimension, len(exact.vertices), exact.facets)
+
+
+@needs_ppl
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 5), count=st.integers(1, 8))
+@example(seed=1219, size=5, count=6)  # Qhull stops in the check of the facets unless vertices are joggled
+@example(seed=1374, size=5, count=2)
+@example(seed=1477, size=5, count=6)
+def test_intersection_is_the_exact_one(seed: int, size: int, count: int) -> None:
+    generator = np.random.default_rng(seed)
+    rows = np.vstack([np.eye(size), -np.eye(size), generator.standard_normal((count, size))])
+    limits = np.concatenate([np.ones(2 * size), generator.uniform(0.05, 1.0, count)])
+    found = Polytope.from_constraints(rows, limits)
+    exact = rational_intersection(rows, limits)
+    assert (len(found.vertices), len(found.normals)) == (len(exact.vertices), exact.facets)
+    np.testing.assert_allclose(np.stack(found.bounding_box(), axis=-1), exact.bounds, atol=1e-9)
+    again = Polytope.from_vertices(found.vertices)
+    assert (len(again.vertices), len(again.normals)) == (len(found.vertices), len(found.normals))
+
+
+def test_flat_sets_meet_in_flat_sets() -> None:
+    square = Polytope.from_box([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0])
+    other = Polytope.from_box([0.0, -1.0, -1.0], [0.0, 1.0, 1.0])
+    line = square.intersection(other)
+    assert (line.dimension, len(line.vertices)) == (1, 2)
+    cube = Polytope.from_box([0.0, 0.0, 0.0], [1.0, 1.0, 1.0])
+    touching = Polytope.from_box([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])
+    face = cube.intersection(touching)  # equations hidden in half-spaces
+    assert (face.dimension, len(face.vertices)) == (2, 4)
+    corner = cube.intersection(Polytope.from_box([1.0, 1.0, 1.0], [2.0, 2.0, 2.0]))
+    assert corner.dimension == 0
+    np.testing.assert_allclose(corner.vertices, [[1.0, 1.0, 1.0]], atol=1e-12)
+
+
+def test_nearly_parallel_facets_are_told_apart() -> None:
+    # A corner cut off by a plane that turns by little: each vertex is a real one.
+    rows = np.array([[1.0, 0.0], [1.0, 1e-6], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    found = Polytope.from_constraints(rows, [1.0, 1.0, 1.0, 1.0, 1.0])
+    assert (len(found.vertices), len(found.normals)) == (5, 5)
+
+
+def test_cut_and_product() -> None:
+    cube = Polytope.from_box([-1.0] * 3, [1.0] * 3)
+    half = cube.cut([[1.0, 0.0, 0.0]], upper=[0.0])
+    assert half.volume() == pytest.approx(4.0)
+    assert cube.cut([[1.0, 1.0, 1.0]], upper=[5.0]) is cube
+    assert cube.cut([[1.0, 0.0, 0.0]], upper=[-2.0]).is_empty
+    both = product(Polytope.from_box([0.0], [1.0]), Polytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    assert (len(both.vertices), len(both.normals)) == (6, 5)
+    assert both.volume() == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_projection_by_supports_is_the_projection(size: int) -> None:
+    solid = Polytope.from_vertices(random_points(3, 30, 5, 5))
+
+    def furthest(direction: Floats) -> Floats:
+        return solid.support_vector(np.concatenate([direction, np.zeros(5 - size)]))[:size]
+
+    found, expected = polytope_from_support(furthest, size), solid.project(range(size))
+    assert (len(found.vertices), len(found.normals)) == (len(expected.vertices), len(expected.normals))
+    seen = directions(1, size)
+    np.testing.assert_allclose(
+        found.support_function(seen), expected.support_function(seen), atol=1e-9 * np.abs(solid.vertices).max()
+    )
+
+
+def test_projection_of_a_flat_set_and_of_one_with_too_many_facets() -> None:
+    flat = Polytope.from_vertices([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
+    assert polytope_from_support(flat.support_vector, 3).dimension == 2
+    with pytest.raises(ArithmeticError, match="over 20 facets"):
+        polytope_from_support(lambda direction: direction / np.linalg.norm(direction), 2, max_facets=20)
+
+
+def test_vertices_that_lie_together_count_once() -> None:
+    near = Polytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [1.0, 1e-8], [0.0, 1.0]])
+    assert len(near.vertices) == 4
+    assert near.essential_vertices() == 3
+
+
+@pytest.mark.parametrize("junk", [0.0, 1e-17, -1e-17])
+def test_rows_that_rounding_left_of_nothing_are_no_constraints(junk: float) -> None:
+    rows = np.vstack([np.eye(3), -np.eye(3), [[0.0, junk, -junk]], np.zeros((1, 3))])
+    limits = np.concatenate([np.ones(6), [-1e-17, -1e-16]])
+    found = Polytope.from_constraints(rows, limits)
+    assert found.dimension == 3
+    assert len(found.vertices) == 8
+
+
+def test_a_set_with_a_known_member_is_not_empty() -> None:
+    member = np.array([0.3, 0.1])
+    rows = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    limits = rows @ member - 1e-16
+    found = relative_interior(rows, limits, np.zeros((0, 2)), np.zeros(0), bounded=True, member=member)
+    assert found.dimension == 0
+    np.testing.assert_allclose(found.point, member, atol=1e-15)
+
+
+@pytest.mark.parametrize("far", [1e3, 1e6, 1e9, 1e12, 1e15])
+def test_a_far_constraint_does_not_hide_a_set(far: float) -> None:
+    """It once made the unit cube count as flat, and then as empty."""
+    unit = np.eye(3)
+    rows = np.vstack([unit, -unit, [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]])
+    cube = Polytope.from_constraints(rows, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, far, far])
+    assert len(cube.vertices) == 8
+    assert cube.volume() == pytest.approx(1.0, rel=1e-12)
+
+
+def test_units_that_differ_by_1e30() -> None:
+    """Formerly an error: the sizes differed too much for a hull."""
+    units, row = np.array([1e15, 1.0, 1e-15]), np.array([0.5, -0.7, -0.2])
+    plain = Polytope.from_box(np.zeros(3), np.ones(3)).cut(row, upper=-0.2)
+    cut = Polytope.from_box(np.zeros(3), units).cut(row / units, upper=-0.2)
+    assert len(cut.vertices) == len(plain.vertices)
+    assert np.sort(cut.vertices / units, axis=0) == pytest.approx(np.sort(plain.vertices, axis=0), abs=1e-12)
+
+
+FLAT_SETS = {
+    "triangle": [[0.0, 0.0, 0.0], [4.0, 0.0, 8.0], [0.0, 4.0, -4.0]],
+    "parallel to axes": [[0.0, 3.0, 0.0], [4.0, 3.0, 8.0], [0.0, 3.0, -4.0], [8.0, 3.0, 0.0]],
+    "segment": [[-4.0, 8.0, 2.0], [4.0, 0.0, -6.0]],
+    "point": [[1.0, 2.0, 3.0]],
+    "solid": [[0.0, 0.0, 0.0], [8.0, 0.0, 4.0], [0.0, 8.0, 0.0], [4.0, 0.0, -8.0], [3.0, 5.0, 7.0]],
+}
+
+
+@pytest.mark.parametrize("name", FLAT_SETS)
+def test_flat_sets_in_mixed_units_and_far_from_the_origin(name: str) -> None:
+    """Formerly most operations on flat sets whose units differ by 1e8 lost vertices, or gave points or no set."""
+    points, scale, far = np.array(FLAT_SETS[name]), np.array([2.0**13, 1.0, 2.0**-13]), 1e6
+    origin = far * np.array([1.0, -2.0, 1.0])
+    # The same set at the origin with equal units is the reference.
+    plain, other = Polytope.from_vertices(points), Polytope.from_vertices((points + origin) * scale)
+    centre = points.mean(axis=0).round(2)
+    cube, box = (Polytope.from_box(-size, size) for size in (np.full(3, 2.0), 2.0 * scale))
+    around = (centre + origin) * scale
+    normal, matrix = np.array([1.0, 2.0, -1.0]), np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
+    unscaled = scale[:, None] * matrix / scale
+    level, far_level = float(normal @ centre), float(normal @ (centre + origin))
+    pairs = [
+        (plain, other),
+        (plain, Polytope.from_constraints(*other.constraints())),
+        (plain, Polytope.from_constraints(other.normals, other.offsets, other.across, other.levels)),
+        (plain, other & other),
+        (plain & cube.translate(centre), other & box.translate(around)),
+        (plain + cube, other + box),
+        (plain, (other + box).minkowski_difference(box)),
+        (plain.cut(normal, upper=level), other.cut(normal / scale, upper=far_level)),
+        (plain.cut(normal, level, level), other.cut(normal / scale, far_level, far_level)),
+        (plain, other.affine_map(unscaled).preimage(unscaled)),
+    ]
+    for wanted, got in pairs:
+        assert got.dimension == wanted.dimension
+        vertices = (got.vertices / scale - origin)[:, None]
+        apart = np.abs(vertices - wanted.vertices).max(axis=2)
+        # A cut at a vertex may leave two vertices near each other.
+        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-9 + 1e-13 * far
+        assert got.contains(got.vertices).all()
+        assert not got.contains((2.0 * points.max(axis=0) + 1.0 + origin) * scale)
+    for axes in ([0], [1, 2]):
+        rest = np.delete(np.arange(3), axes)
+        section = other.slice(axes, around[axes])
+        assert section.dimension == plain.slice(axes, centre[axes]).dimension
+        ends = (np.array(section.bounding_box()) / scale[rest] - origin[rest]) if not section.is_empty else 0.0
+        wanted_ends = np.array(plain.slice(axes, centre[axes]).bounding_box()) if not section.is_empty else 0.0
+        assert ends == pytest.approx(wanted_ends, abs=1e-9 + 1e-13 * far)
+    edges = np.array(other.vertices[1 : plain.dimension + 1] - other.vertices[0])
+    if len(plain.vertices) == plain.dimension + 1:  # a simplex
+        volume = np.sqrt(max(np.linalg.det(edges @ edges.T), 0.0)) / [1.0, 1.0, 2.0, 6.0][plain.dimension]
+        assert other.volume() == pytest.approx(volume, rel=1e-7)
+    middle, radius = other.chebyshev_centre()
+    assert other.contains(middle, 1e-9 * float(scale.max()))
+    assert (radius > 0.0) == (plain.dimension > 0)
+    assert float((other.offsets - other.normals @ middle).min(initial=np.inf)) >= radius * (1.0 - 1e-6) - 1e-9 * far
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_coordinates_that_are_equal_at_all_points_stay_exact(seed: int) -> None:
+    """Formerly they had the rounding errors of the other coordinates, which can have larger units."""
+    points = 1e9 * np.random.default_rng(seed).normal(size=(9, 5))
+    points[:, [1, 3]] = 5e-9, 0.0
+    steps = points - points[0]
+    for flat in (Polytope.from_vertices(points), Polytope.from_zonotope(points[0], steps)):
+        assert flat.dimension == 3
+        np.testing.assert_array_equal(flat.vertices[:, [1, 3]], np.tile([5e-9, 0.0], (len(flat.vertices), 1)))
+        assert not flat.normals[:, [1, 3]].any()
+        np.testing.assert_array_equal(flat.across.T @ flat.across, np.diag([0.0, 1.0, 0.0, 1.0, 0.0]))
+        np.testing.assert_array_equal(flat.across.T @ flat.levels, [0.0, 5e-9, 0.0, 0.0, 0.0])
+
+
+def test_a_row_of_another_length_does_not_hide_a_thin_set() -> None:
+    """Formerly a point: the rounding of the offsets was not divided by the lengths of the rows."""
+    rows = [[-1.0, 0.0], [8388609.0, -8388608.0], [-8388599.0, 8388608.0], [25165827.0, -25165824.0]]
+    assert len(Polytope.from_constraints(rows, [0.0, 32.0, 48.0, 251658399.0]).vertices) == 3
+
+
+def test_equations_in_mixed_units() -> None:
+    point = Polytope.from_box([1.0, 2.0], [1.0, 2.0]).preimage(np.diag([1e-6, 1e6]))
+    np.testing.assert_allclose(point.vertices, [[1e6, 2e-6]], rtol=1e-9)
+    rows, levels = [[0.0, 1e-7, 0.0], [0.0, 0.0, 1e6]], [1e-7, 1e6]
+    segment = Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [1.0, 1.0], rows, levels)
+    np.testing.assert_allclose(np.sort(segment.vertices, axis=0), [[-1.0, 1.0, 1.0], [1.0, 1.0, 1.0]], rtol=1e-9)
+
+
+def test_empty_says_by_how_much() -> None:
+    with pytest.raises(EmptyPolytopeError, match=r"relaxed by 0\.25") as caught:
+        Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-0.5, 0.0, 1.0, 1.0]).needed()
+    assert caught.value.relaxation == pytest.approx(0.25)
+    with pytest.raises(EmptyPolytopeError):
+        Polytope.from_constraints(
+            [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-1.0, 1, 1, 1, 1]
+        ).needed()
+    with pytest.raises(EmptyPolytopeError):
+        Polytope.from_constraints(
+            np.vstack([np.eye(2), -np.eye(2)]), np.ones(4), [[1.0, 0.0], [1.0, 0.0]], [0.0, 0.5]
+        ).needed()
+
+
+def test_unbounded_says_along_what() -> None:
+    with pytest.raises(UnboundedPolytopeError, match="along") as caught:
+        Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0, 1.0, 1.0])
+    assert caught.value.direction @ [1.0, 0.0] < -0.9
+    with pytest.raises(UnboundedPolytopeError):
+        Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0]], [1.0, 1.0])
+    with pytest.raises(UnboundedPolytopeError):
+        Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [0.0, 0.0], [[0.0, 1.0, 0.0]], [0.0])

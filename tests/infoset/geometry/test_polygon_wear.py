@@ -1,0 +1,133 @@
+"""Kernels on polygons as thin as rounding, which a thousand operations leave: ends of needles, and edges to remove.
+
+`test_polygon_oracle.py` has the operations on exactly convex polygons and on those with vertices moved by an ulp.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from infoset.arrays import Floats
+from infoset.geometry import polygon, polygon_hull, polygon_sum
+from tests.infoset.geometry.test_polygon_oracle import Exact, exact, exact_sum, hull, outside_by
+from tests.rationals import Fraction
+
+EPS = Fraction(1, 2**52)
+
+
+def assert_agree(made: Floats, right: Sequence[Exact], tolerance: Fraction) -> None:
+    """A polygon and the exact one lie in each other, enlarged by a box."""
+    box, corners = (tolerance, tolerance), hull(exact(made))
+    assert outside_by(corners, right, box) is None
+    assert outside_by(right, corners, box) is None
+
+
+def reach(*arrays: Floats) -> Fraction:
+    """Maximum modulus of the coordinates of some arrays."""
+    return Fraction(max(float(np.abs(array).max()) for array in arrays))
+
+
+def add_segment(corners: Floats, half: Floats) -> Floats:
+    out = np.concatenate([corners, np.zeros((2, 2))])
+    return out[: polygon_sum.add_segment(out, len(corners), half[0], half[1])]
+
+
+NEEDLES = [
+    [
+        (-0.4199648838291332, -0.8046284964945892),
+        (-0.21663544825908576, -0.41506102470000833),
+        (-0.06900951438607994, -0.1322182495308004),
+        (0.05993258520542393, 0.11482737672060572),
+        (0.19391520840777354, 0.3715303555048267),
+        (0.44135165135307153, 0.8456043096167817),
+        (0.4416662909540454, 0.8462071409458227),
+    ],
+    [
+        (0.5619530156120761, 1.7224009108576142),
+        (0.5858609290896699, 1.6829734085839667),
+        (1.0192741493643804, 0.9682142246081361),
+        (1.2989574143031726, 0.5069772967344721),
+        (1.300131356201347, 0.5050413019056982),
+    ],
+    [
+        (9999.351639831943, 10000.181875125238),
+        (9999.379090582095, 10000.174174762278),
+        (9999.580493035284, 10000.117678237346),
+        (10000.020727967303, 9999.994185482325),
+        (10000.955757722317, 9999.731895073139),
+        (9999.723394015195, 10000.07759228683),
+    ],
+]
+HALVES = [(-0.04627034494556237, -0.08865131233444135), (0.051849929567132004, -0.08550780551437075)]
+HALVES += [(0.09628350189477886, -0.027009021879329843)]
+
+
+@pytest.mark.parametrize(("needle", "half"), list(zip(NEEDLES, HALVES, strict=True)))
+def test_a_needle_of_a_few_ulp_keeps_its_ends(needle: list[tuple[float, float]], half: tuple[float, float]) -> None:
+    """Lowest and highest were found a thousandth of the length past its end: the end did not move by half."""
+    corners, step = np.array(needle), np.array(half)
+    right = exact_sum(hull(exact(corners)), exact([step, -step]))
+    assert_agree(add_segment(corners, step), right, 11 * EPS * (reach(corners) + reach(step)))
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("distance", "thickness"), [(0.0, 1e-16), (1.0, 1e-15), (1e4, 1e-12)])
+def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: float) -> None:
+    """Where heights agree within rounding, the lowest vertex may be found on the upper side: an end would be lost."""
+    rng = np.random.default_rng(1)
+    for trial in range(8000):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+        parts, sides = rng.uniform(-1.0, 1.0, (2, 10))
+        offsets = thickness * 10.0 ** rng.uniform(-1.0, 2.0) * sides * (1.0 - parts**2)
+        cloud = distance + parts[:, np.newaxis] * along + offsets[:, np.newaxis] * across
+        corners = np.empty((21, 2))
+        corners = corners[: polygon_hull.hull(cloud, len(cloud), corners)]
+        made = add_segment(corners, 0.1 * along)
+        for end in (along, -along):
+            grown = np.max((made - corners[0]) @ end) - np.max((corners - corners[0]) @ end)
+            assert abs(grown - 0.1) <= 16 * float(EPS) * (1.0 + distance)
+        if trial % 200 == 0:
+            right = exact_sum(hull(exact(corners)), exact([0.1 * along, -0.1 * along]))
+            assert_agree(made, right, 11 * EPS * (reach(corners) + 1))
+
+
+def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
+    """Where no edge can go, for rounding has left none a direction, a rectangle is taken."""
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        along = rng.uniform(-1.0, 1.0, 12)
+        noise = 10.0 ** rng.uniform(-18.0, -15.0) * rng.uniform(-1.0, 1.0, 12)
+        corners = np.stack([along, rng.uniform(-2.0, 2.0) * along + noise], axis=-1)
+        reduced = corners.copy()
+        reduced = reduced[: polygon_hull.reduce_outward(reduced, len(reduced), 4)]
+        assert len(reduced) <= 4
+        tolerance = 11 * EPS * reach(reduced)
+        assert outside_by(exact(corners), hull(exact(reduced)), (tolerance, tolerance)) is None
+        assert polygon.area(reduced, len(reduced)) < 1e-14
+
+
+def test_the_edge_that_adds_the_min_area_is_removed_first() -> None:
+    """The reference computes all areas again after each removal; the lengths are equal in pairs, so that areas tie."""
+    rng = np.random.default_rng(2)
+    work = np.empty((128, 2))
+    for count in (5, 16, 33, 60):
+        lengths = 10.0 ** rng.uniform(-4.0, 0.0, count)
+        directions = np.linspace(0.0, 3.0, count)
+        steps = np.minimum(lengths, lengths[::-1])[:, None] * np.stack(
+            [np.cos(directions), np.sin(directions)], axis=-1
+        )
+        path = np.cumsum(steps, axis=0)
+        expected = path.copy()
+        while len(expected) > 4:
+            removals = [
+                polygon_hull.removed_edge(expected, i - 1, i, i + 1, i + 2) for i in range(1, len(expected) - 2)
+            ]
+            first = min(range(len(removals)), key=lambda i: removals[i][0])
+            expected[first + 1] = removals[first][1:]
+            expected = np.delete(expected, first + 2, axis=0)
+        assert polygon_hull.drop_inner_edges(path, count, 4, work) == (4, True)
+        np.testing.assert_array_equal(path[:4], expected)
