@@ -2,8 +2,9 @@
 
 Shown elsewhere: hulls and intersections are those of exact rationals, supports of sums, images and projections,
 members of intersections, flat sets, empty and unbounded ones (`tests/infoset/geometry/polytope`); exact and lifted
-reachable sets agree with each other and with rationals, samples and selections are members (`tests/rendezvous/reachability`). The
-other problems have no set operations: a front of points (`tests/rendezvous/pareto`), paths, or numbers.
+reachable sets agree with each other and with rationals, samples and selections are members
+(`tests/rendezvous/reachability`). The other problems have no set operations: a front of points
+(`tests/rendezvous/pareto`), paths, or numbers.
 
 Here: every operation is monotone and includes what it must; cuts, sums, hulls and intersections commute with linear
 maps (shear, shift, scaling, mirror); volumes scale by determinants, multiply in products and obey Brunn and Minkowski.
