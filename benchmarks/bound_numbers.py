@@ -16,7 +16,7 @@ from experiments import load_scenario
 from guidance import Thruster
 from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
 from sim import Scenario, Sun
-from sim.bound import lower_bound
+from sim.bound.lower_bound import lower_bound
 from sim.scenario import of_model
 
 RANGES_KM = (60e3, 140e3, 190e3, 200e3, 300e3, 400e3)

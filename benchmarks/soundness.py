@@ -32,9 +32,9 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from infoset import InformationSetView, InitialSet, Model, RateSensor
 from sim import Manoeuvre, Outcome, Scenario, Target
+from sim.bound.pair_flight import middle
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
-from sim.pair import middle
 from sim.scenario import of_model
 
 Floats = NDArray[np.float64]

@@ -78,7 +78,7 @@ nitpick_ignore = [
         "rendezvous.reachability.problem": ("Block",),
         "rendezvous.reachability.admissible": ("Lifted",),
         "rendezvous.reachability.optimum": ("BlockOptimum",),
-        "sim.truth_pair": ("TruthPair",),
+        "sim.bound.pair_of_motions": ("TruthPair",),
         "sim.parallel": ("Task",),
         "sim.storage.campaign_folder": ("CampaignFolder",),
         "sim.storage.manifest": ("Manifest",),

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from experiments.common.built_in_files import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files, kind_of, taken_by
 from experiments.common.errors import InputError
-from experiments.common.file_kinds import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files, kind_of, taken_by
 from experiments.common.options import AsJson, Overwrite, Quiet
 
 BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from guidance.predicted_miss import range_at_impulse
 from guidance.situation import Situation
+from guidance.symmetric_impulse import range_at_impulse
 from guidance.thruster import Thruster
 from infoset.arrays import Floats
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from guidance.authority import correctable_later_m
-from guidance.predicted_miss import range_at_impulse
 from guidance.situation import Situation
+from guidance.symmetric_impulse import range_at_impulse
 from infoset._compile import entry
 from infoset.arrays import Floats
 

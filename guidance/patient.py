@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from guidance.authority import correctable_later_m
-from guidance.predicted_miss import range_at_impulse, symmetric_impulse
 from guidance.situation import Situation
+from guidance.symmetric_impulse import range_at_impulse, symmetric_impulse
 from infoset.arrays import Floats
 
 LAST_SECONDS_S = 3.0

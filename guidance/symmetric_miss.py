@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from guidance.predicted_miss import symmetric_impulse
 from guidance.situation import Situation
+from guidance.symmetric_impulse import symmetric_impulse
 from infoset.arrays import Floats
 
 

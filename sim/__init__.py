@@ -1,10 +1,10 @@
 """The simulator: scenarios, true motion, closed loop, records, campaigns, bounds and statistics."""
 
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
-from sim.bound import LowerBound, lower_bound
+from sim.bound.linear_program import BoundError
+from sim.bound.lower_bound import LowerBound, lower_bound
 from sim.campaign import Campaign
 from sim.closed_form import possible_miss_of
-from sim.farthest_pair import BoundError
 from sim.parallel import CampaignNoise
 from sim.record import AxisStep, Inconsistency, Record, StepRecord, fly_one
 from sim.requirement import HitRequirement, Requirement

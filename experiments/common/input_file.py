@@ -22,8 +22,8 @@ from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_ori
 
 from pydantic import ValidationError
 
+from experiments.common.built_in_files import SCENARIO, built_in, built_in_names, kind_of, taken_by
 from experiments.common.errors import InputError, nearest, shown
-from experiments.common.file_kinds import SCENARIO, built_in, built_in_names, kind_of, taken_by
 from experiments.common.units import quantity_and_unit, si_factor
 from infoset.limits import LONGEST_DESCRIPTION
 from sim.storage.codec import adapter

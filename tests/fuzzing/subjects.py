@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from experiments.common.file_kinds import SCENARIO, built_in_files
+from experiments.common.built_in_files import SCENARIO, built_in_files
 from experiments.common.input_file import read_text, to_toml
 from experiments.interception import record_file
 from experiments.interception.scenario_file import load_scenario, scenario_warnings

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from experiments.cli import main
+from experiments.common.built_in_files import PROBLEMS, SCENARIO
 from experiments.common.errors import InputError
-from experiments.common.file_kinds import PROBLEMS, SCENARIO
 from experiments.common.input_file import MAX_FILE_BYTES, keys_of, read_text
 
 from .mutations import VALUES, mutated_toml

@@ -24,11 +24,11 @@ from infoset import (
 )
 from infoset.arrays import Floats
 from sim import Record, Results, Scenario, fly_one, simulate
-from sim.bound import lower_bound, pair_at
+from sim.bound.lower_bound import lower_bound, pair_at
+from sim.bound.pair_flight import fly_pair
 from sim.closed_form import images_s, possible_miss_m, possible_miss_of
 from sim.draws import draw
 from sim.engagement import Engagements, Step
-from sim.pair import fly_pair
 from sim.scenario import of_model
 
 SPEED_M_S, PIXEL_RAD, CENTROID_M = 6140.0, 5e-6, 12.0

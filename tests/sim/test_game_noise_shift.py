@@ -10,9 +10,9 @@ import pytest
 from experiments import load_scenario
 from guidance import NoiseKind
 from sim import Scenario, simulate
-from sim.bound import pair_at
+from sim.bound.lower_bound import pair_at
+from sim.bound.pair_of_motions import TruthPair
 from sim.closed_form import possible_miss_m, possible_miss_of, worst_shift_m
-from sim.truth_pair import TruthPair
 
 RUNS = 10
 

@@ -13,8 +13,8 @@ from experiments.common.figure_style import BOUND, CURVE_LOOKS, INK, SET_EDGE, S
 from experiments.common.screen import number
 from infoset.arrays import Floats
 from sim import Scenario
-from sim.bound import LowerBound
-from sim.truth_pair import TruthPair, later_impulses
+from sim.bound.lower_bound import LowerBound
+from sim.bound.pair_of_motions import TruthPair, later_impulses
 
 _FIRST, _SECOND = CURVE_LOOKS[3], CURVE_LOOKS[2]
 _LOOKS = tuple(

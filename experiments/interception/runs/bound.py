@@ -18,11 +18,11 @@ from experiments.interception.strategies import chosen_strategies
 from experiments.interception.study import max_guarantee_m
 from guidance import Strategy
 from sim import BoundError, Record, Results, Scenario
-from sim.bound import LowerBound, lower_bound, pair_at
-from sim.game_value import ValueReserve, value_reserve, why_no_value
-from sim.pair import PairFlight, fly_pair
+from sim.bound.game_value import ValueReserve, value_reserve, why_no_value
+from sim.bound.lower_bound import LowerBound, lower_bound, pair_at
+from sim.bound.pair_flight import PairFlight, fly_pair
+from sim.bound.pair_of_motions import TruthPair
 from sim.results import join
-from sim.truth_pair import TruthPair
 
 FIGURE = "figure-bound"
 

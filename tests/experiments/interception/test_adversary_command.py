@@ -97,8 +97,8 @@ def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Sc
 @pytest.mark.thorough
 def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
-    monkeypatch.setattr("sim.bound.PERIODS_LOOKED_AT", 1)  # few pairs
-    monkeypatch.setattr("sim.bound.REFINEMENTS", 0)
+    monkeypatch.setattr("sim.bound.lower_bound.PERIODS_LOOKED_AT", 1)  # few pairs
+    monkeypatch.setattr("sim.bound.lower_bound.REFINEMENTS", 0)
     options = ("--budget", 12, "--model", "paper", "--json")
     same = ("--objective", "fixed-truth", *options)
     table = infoset("bound", "--strategies", "symmetric-miss", *options, "bound.json")[1]

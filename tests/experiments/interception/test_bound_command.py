@@ -13,7 +13,7 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import strategy_names
 from infoset import StateBox
 from sim import Scenario
-from sim.bound import LowerBound, lower_bound, pair_at
+from sim.bound.lower_bound import LowerBound, lower_bound, pair_at
 from sim.scenario import of_model
 from sim.storage.codec import fingerprint
 from sim.versions import versions

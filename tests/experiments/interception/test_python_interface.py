@@ -41,8 +41,8 @@ def test_names_and_paths_give_the_numbers_of_scenarios(results: Results, record:
 
 
 def test_the_search_and_the_bound_take_names(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sim.bound.PERIODS_LOOKED_AT", 1)  # few labels
-    monkeypatch.setattr("sim.bound.REFINEMENTS", 0)
+    monkeypatch.setattr("sim.bound.lower_bound.PERIODS_LOOKED_AT", 1)  # few labels
+    monkeypatch.setattr("sim.bound.lower_bound.REFINEMENTS", 0)
     assert find_worst(NAME, budget=4, strategy="patient").strategy == "patient"
     assert len(repr(lower_bound(NAME))) < 100
 

@@ -72,7 +72,7 @@ def test_every_command_takes_a_strategy_of_a_file(
     infoset: Command,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("sim.bound.REFINEMENTS", 0)
+    monkeypatch.setattr("sim.bound.lower_bound.REFINEMENTS", 0)
     few = {
         "experiment": ["--runs", 2],
         "compare": ["--runs", 2],

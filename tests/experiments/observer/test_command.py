@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.common.file_kinds import built_in_files
+from experiments.common.built_in_files import built_in_files
 from experiments.observer.command import Errors
 from experiments.observer.data import simulate
 from experiments.observer.file import load_observer

@@ -12,10 +12,10 @@ from experiments import load_scenario
 from guidance import Thruster, make_strategy
 from infoset import InitialSet, Model, StateBox
 from sim import Scenario
-from sim.bound import lower_bound, pair_at
-from sim.pair import fly_pair
+from sim.bound.lower_bound import lower_bound, pair_at
+from sim.bound.pair_flight import fly_pair
+from sim.bound.pair_of_motions import Approach
 from sim.scenario import of_model
-from sim.truth_pair import Approach
 from tests.space import in_space
 
 

@@ -11,12 +11,12 @@ from guidance.noise import LineOfSight
 from infoset import InformationSetView
 from infoset.arrays import Floats
 from infoset.sensor import Measurements
+from sim.bound.pair_of_motions import TruthPair
 from sim.draws import Draws
 from sim.engagement import Engagements
 from sim.results import Results
 from sim.scenario import Scenario
 from sim.target import GivenTarget
-from sim.truth_pair import TruthPair
 
 STEPS_BEYOND = 2
 """Maximum number of simulated steps after the one in which x = 0."""

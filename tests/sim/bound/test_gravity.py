@@ -18,10 +18,10 @@ from scipy.integrate import solve_ivp
 from guidance import Thruster
 from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
 from sim import Scenario, Sun
-from sim.bound import pair_at
-from sim.coasting import coasting
+from sim.bound.coasting import coasting
+from sim.bound.lower_bound import pair_at
+from sim.bound.pair_of_motions import Approach, TruthPair, later_impulses
 from sim.scenario import of_model
-from sim.truth_pair import Approach, TruthPair, later_impulses
 from tests.space import in_space
 
 Floats = NDArray[np.float64]

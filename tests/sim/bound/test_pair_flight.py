@@ -21,8 +21,8 @@ from infoset import (
 from infoset.model import InitialSet, Model
 from infoset.sensor import Sensor
 from sim import Scenario, Sun
-from sim.bound import lower_bound, pair_at
-from sim.pair import PairNoise, fly_pair
+from sim.bound.lower_bound import lower_bound, pair_at
+from sim.bound.pair_flight import PairNoise, fly_pair
 from sim.scenario import of_model
 
 QUICK = 4

@@ -19,10 +19,10 @@ from infoset import (
     StateBox,
 )
 from sim import Scenario, Sun
-from sim.bound import lower_bound, pair_at
-from sim.pair import fly_pair
+from sim.bound.lower_bound import lower_bound, pair_at
+from sim.bound.pair_flight import fly_pair
+from sim.bound.pair_of_motions import TruthPair
 from sim.scenario import of_model
-from sim.truth_pair import TruthPair
 from tests.space import in_space
 
 NOMINAL_LABEL_M = 5801.3e3

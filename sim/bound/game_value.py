@@ -10,7 +10,7 @@ import numpy as np
 from infoset import AngleSensor, InformationSet, StateBox
 from infoset.arrays import Flags, Floats
 from infoset.model import CENTROID_ERRORS_AT_THRESHOLD
-from sim.bound import LowerBound
+from sim.bound.lower_bound import LowerBound
 from sim.gravity import on_board_model
 from sim.scenario import Scenario
 

@@ -12,9 +12,9 @@ import numpy as np
 from infoset import AngleSensor
 from infoset.arrays import Floats, Integers
 from infoset.sensor import Apart
-from sim.coasting import NoArrivalError, coasting
-from sim.farthest_pair import MARGIN, PairProgram
-from sim.gravity_reserve import GravityReserve, gravity_reserve
+from sim.bound.coasting import NoArrivalError, coasting
+from sim.bound.gravity_reserve import GravityReserve, gravity_reserve
+from sim.bound.linear_program import MARGIN, PairProgram
 from sim.scenario import Scenario
 
 FEW_CANDIDATES = 16

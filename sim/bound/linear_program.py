@@ -10,7 +10,7 @@ import numpy as np
 from infoset import SetModel
 from infoset.arrays import Flags, Floats, Integers
 from infoset.sensor import Sensor
-from sim.coasting import Coasting
+from sim.bound.coasting import Coasting
 
 MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding."""

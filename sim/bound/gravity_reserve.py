@@ -9,7 +9,7 @@ import numpy as np
 
 from guidance import Thruster
 from infoset.arrays import Floats
-from sim.coasting import Coasting
+from sim.bound.coasting import Coasting
 from sim.scenario import Sun
 
 ROUNDING = 1e-12

@@ -13,7 +13,7 @@ from guidance import NoiseKind, Thruster
 from infoset import AngleSensor, InitialSet, Model, StateBox
 from infoset.sensors import RateSensor
 from sim import Scenario, Sun, lower_bound, simulate
-from sim.game_value import ValueReserve, value_reserve, why_no_value
+from sim.bound.game_value import ValueReserve, value_reserve, why_no_value
 from sim.scenario import of_model
 from tests.space import in_space
 
