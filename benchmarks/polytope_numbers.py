@@ -1,0 +1,81 @@
+"""Vertices of half-spaces and hulls of points in three to six dimensions, and cddlib's time for the same sets.
+
+``python -m benchmarks.polytope_numbers``. Both run in one process, in turn; the shortest of several rounds counts.
+cddlib computes with doubles (`pycddlib`, which pip builds from its source with Debian's `libcdd-dev` and `libgmp-dev`);
+without it only our times are printed.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset import Polytope
+
+Floats = NDArray[np.float64]
+
+SIZES = ((3, 20), (4, 40), (5, 24), (6, 14), (6, 20))
+"""Dimensions and numbers of points; the facets of their hull are the half-spaces."""
+ROUNDS = 7
+TARGET = 2.0
+
+
+def main() -> None:
+    """Print the times and their ratios."""
+    try:
+        cdd = importlib.import_module("cdd")
+    except ImportError:
+        cdd = None
+        print("pycddlib is not installed: no ratios")  # noqa: T201
+    print("n  points  facets | H of V, ms  cddlib  ratio | V of H, ms  cddlib  ratio")  # noqa: T201
+    worst = 0.0
+    for space, count in SIZES:
+        points = np.random.default_rng([space, count]).normal(size=(count, space))
+        rows, limits = Polytope.from_vertices(points).constraints()
+        line = f"{space}  {count:6}  {len(rows):6}"
+        for ours, theirs in (
+            (lambda p=points: Polytope.from_vertices(p), lambda p=points: facets_of(cdd, p)),
+            (lambda r=rows, b=limits: Polytope.from_constraints(r, b), lambda r=rows, b=limits: vertices_of(cdd, r, b)),
+        ):
+            mine, other = in_turn(ours, theirs if cdd else None)
+            worst = max(worst, mine / other)
+            line += f" | {mine:10.3f}  {other:6.3f}  {mine / other:5.2f}"
+        print(line)  # noqa: T201
+    print(f"target: at most {TARGET:g} times cddlib; the greatest ratio is {worst:.2f}")  # noqa: T201
+
+
+def in_turn(ours: Callable[[], object], theirs: Callable[[], object] | None) -> tuple[float, float]:
+    """Return the shortest processor times, ms, of two functions that are called in turn."""
+    best = [np.inf, np.inf]
+    for _ in range(ROUNDS + 1):
+        for index, compute in enumerate((ours, theirs)):
+            if compute is not None:
+                start = time.process_time()
+                compute()
+                best[index] = min(best[index], 1e3 * (time.process_time() - start))
+    return best[0], best[1]
+
+
+def facets_of(cdd: Any, points: Floats) -> object:
+    """Return the inequalities of the hull of points, by cddlib."""
+    table = np.column_stack([np.ones(len(points)), points]).tolist()
+    return cdd.copy_inequalities(
+        cdd.polyhedron_from_matrix(cdd.matrix_from_array(table, rep_type=cdd.RepType.GENERATOR))
+    )
+
+
+def vertices_of(cdd: Any, normals: Floats, offsets: Floats) -> object:
+    """Return the vertices of {x: normals x <= offsets}, by cddlib."""
+    table = np.column_stack([offsets, -normals]).tolist()
+    return cdd.copy_generators(
+        cdd.polyhedron_from_matrix(cdd.matrix_from_array(table, rep_type=cdd.RepType.INEQUALITY))
+    )
+
+
+if __name__ == "__main__":
+    main()
