@@ -38,7 +38,10 @@ class Kernels:
     """
 
     def __init__(self, *fastmath: str) -> None:
-        self._options = {"nogil": True, "error_model": "numpy", "fastmath": set(fastmath)}
+        # Nothing needs the function that Numba writes to call a kernel from C.
+        options = {"nogil": True, "error_model": "numpy", "fastmath": set(fastmath), "no_cfunc_wrapper": True}
+        self._options = options
+        self._inner_options = {**options, "_nrt": False, "no_cpython_wrapper": True}
 
     def compiled(self, function: F) -> F:
         """Compile a kernel that may allocate arrays; its machine code is stored on disk."""
@@ -52,13 +55,17 @@ class Kernels:
         return self._stored(function, _nrt=False)
 
     def allocation_free(self, function: F) -> F:
-        """Compile a kernel that allocates no array and is called by other kernels, which are stored with it."""
-        kernel: F = JIT(_nrt=False, **self._options)(function)
+        """Compile a kernel that allocates no array and that only kernels call; it is stored with them.
+
+        Numba writes no function to call it from Python, which would be a quarter of the time to compile: a call from
+        Python crashes the process. Tests call it through `tests.kernels`.
+        """
+        kernel: F = JIT(**self._inner_options)(function)
         return kernel
 
     def inlined(self, function: F) -> F:
         """Compile a small `allocation_free` kernel that is inlined wherever it is called."""
-        kernel: F = JIT(_nrt=False, forceinline=True, **self._options)(function)
+        kernel: F = JIT(forceinline=True, **self._inner_options)(function)
         return kernel
 
     def _stored(self, function: F, **options: object) -> F:

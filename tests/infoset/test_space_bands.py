@@ -11,13 +11,15 @@ from hypothesis import strategies as st
 
 from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
+from infoset.engine import section_life
 from infoset.engine.section_law import section_laws
-from infoset.engine.section_life import slope_band
+from tests.kernels import callable_kernels
 
 EPS = float(np.finfo(np.float64).eps)
 WIDE, SLOW = (-1e7, 1e7), (-100.0, 100.0)
 KNOWN = StateBox(WIDE, (5.3e6, 6.3e6), SLOW, (-59e3, -57e3), WIDE, SLOW)
 
+slope_band = callable_kernels(section_life).slope_band
 shares = st.floats(0.0, 1.0)
 signed = st.floats(-1.0, 1.0)
 bounds = st.one_of(st.floats(1e-6, 0.05), st.sampled_from([1e-9, 1e-4]))

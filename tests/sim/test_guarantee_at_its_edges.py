@@ -16,15 +16,17 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, RandomNoise, Thruster, TieRule
 from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
+from infoset.engine import section_life
 from infoset.engine.history import LastSight
 from infoset.engine.section_law import BOUND_SLACK, SectionLaw, section_laws
-from infoset.engine.section_life import rate_band
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.scenario import of_model
+from tests.kernels import callable_kernels
 
 CASES = Path(__file__).parent / "cases"
+rate_band = callable_kernels(section_life).rate_band
 HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
 
 

@@ -25,13 +25,16 @@ import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
+import infoset.engine.chain_storage
+import infoset.engine.chains
 from infoset.arrays import Floats
-from infoset.engine import chain_storage, chains
 from infoset.engine.chain_storage import FIRST_RING, TAKEN
 from infoset.engine.chains import CAPACITY
 from tests.infoset.geometry.test_polygon_oracle import AXES, Exact, dot, exact_clip, hull, outside_by
+from tests.kernels import callable_kernels
 from tests.rationals import Fraction
 
+chain_storage, chains = map(callable_kernels, (infoset.engine.chain_storage, infoset.engine.chains))
 Level = tuple[float, float, float]
 
 RIGHT, LEFT = range(2)
@@ -119,10 +122,10 @@ class Section:
     def shift(self, v: float) -> None:
         chains.shift(*self.sides, self.tau, v)
 
-    def cut(self, lower: float, upper: float) -> tuple[bool, float]:
+    def cut(self, lower: float, upper: float) -> Any:
         return chains.cut(*self.parts, self.tau, lower, upper)
 
-    def cut_misses(self, lower: float, upper: float) -> tuple[bool, float]:
+    def cut_misses(self, lower: float, upper: float) -> Any:
         return chains.cut_misses(*self.parts, self.tau, 0.0, lower, upper, chain_storage.working_room())
 
     def reduce(self) -> None:
@@ -134,13 +137,13 @@ class Section:
 
     @property
     def count(self) -> int:
-        return chains.count_of(*self.sides)
+        return int(chains.count_of(*self.sides))
 
-    def heights(self) -> tuple[float, float]:
+    def heights(self) -> Any:
         return chains.heights(*self.parts, self.tau)
 
     def outline(self) -> Floats:
-        out = chain_storage.working_room()
+        out: Floats = chain_storage.working_room()
         return out[: chains.outline(*self.parts, self.tau, out)].copy()
 
     def corners(self) -> list[Exact]:
@@ -172,7 +175,7 @@ class Section:
         v, v_rest, m, m_rest = map(Fraction, self.origin(side))
         return [(Fraction(x) + v + v_rest, Fraction(y) + m + m_rest) for x, y in self.local(side)]
 
-    def peak(self, side: int) -> int:
+    def peak(self, side: int) -> Any:
         chain = self.sides[side]
         return chains.find_peak(chain, self.chains.rings, (1.0, -1.0)[side], abs(float(chain.m)))
 
@@ -255,7 +258,7 @@ class Life:
             self.check()
         else:
             assert not self.narrow
-        return alive
+        return bool(alive)
 
     def check(self) -> None:
         """All that holds after any operation."""

@@ -10,10 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+import infoset.geometry.polygon_hull
 from infoset.arrays import Floats
-from infoset.geometry import polygon, polygon_hull, polygon_sum
+from infoset.geometry import polygon, polygon_sum
 from tests.infoset.geometry.test_polygon_oracle import Exact, exact, exact_sum, hull, outside_by
+from tests.kernels import callable_kernels
 from tests.rationals import Fraction
+
+polygon_hull = callable_kernels(infoset.geometry.polygon_hull)
 
 EPS = Fraction(1, 2**52)
 
