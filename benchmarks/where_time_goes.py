@@ -64,9 +64,9 @@ class Clock:
     def measured(self, work: Callable[..., Any]) -> Callable[..., Any]:
         """Return the kernel of a measurement with a timer and a count of its sections."""
 
-        def part(behind: Any, measured: Any, _stale: Any, _heights: Any, *others: Any) -> str:
-            sections = others[3]
-            self.section_steps += int((sections.slots["living"] & (measured | behind)[:, None]).sum())
+        def part(measured: Any, *others: Any) -> str:
+            sections = others[-2]
+            self.section_steps += int((sections.slots["living"] & (measured | sections.behind)[:, None]).sum())
             return SECTION_STEPS
 
         return self.timed(part, work)
@@ -93,7 +93,7 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
     while flight.flying:
         flight.advance()
         sections = flight._information._state.stack.sections
-        records = sections.records.reshape(-1, 2)[sections.slots["living"].ravel()]
+        records = sections.chains.records.reshape(-1, 2)[sections.slots["living"].ravel()]
         if len(records):
             count = (records["end"] - records["begin"]).sum(axis=1)
             means.append(float(count.mean()))

@@ -11,7 +11,7 @@ from infoset.kernels import Kernels
 
 _kernels = Kernels("nnan", "nsz")
 compiled, entry = _kernels.compiled, _kernels.entry
-allocation_free, inlined = _kernels.allocation_free, _kernels.inlined
+allocation_free, inlined, pasted = _kernels.allocation_free, _kernels.inlined, _kernels.pasted
 
 
 @cache

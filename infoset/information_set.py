@@ -211,7 +211,8 @@ class InformationSet(InformationSetView):
         state, active = self._state, self._active(where)
         event = state.history.record(ANGLE, measured, active)
         before = state.lower_label.copy(), state.upper_label.copy()
-        if state.stack.measure_angle(active, measured, state.history.elapsed, event):
+        elapsed, sections, laws = state.history.elapsed, state.stack.sections, state.stack.table
+        if section_passes.step_all(active, measured, event, elapsed, section_passes.MOVED, sections, laws):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, event, *before)
 
@@ -237,7 +238,7 @@ class InformationSet(InformationSetView):
         error = error_rad_s * (1.0 + BOUND_SLACK)
         event = state.history.record(RATE, measured, active, error)
         before = state.lower_label.copy(), state.upper_label.copy()
-        if state.stack.measure_rate(active, measured, error, state.history.elapsed, event, state.history):
+        if state.stack.measure_rate(error, state.history):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, event, *before)
 

@@ -68,6 +68,14 @@ class Kernels:
         kernel: F = JIT(forceinline=True, **self._inner_options)(function)
         return kernel
 
+    def pasted(self, function: F) -> F:
+        """Paste a small kernel into the code of those that call it, before it is compiled.
+
+        For kernels that return addresses of records in a tuple, which a compiled function cannot.
+        """
+        kernel: F = JIT(inline="always", **self._inner_options)(function)
+        return kernel
+
     def _stored(self, function: F, **options: object) -> F:
         folder, before = cache_folder(function), CONFIG.CACHE_DIR
         CONFIG.CACHE_DIR = str(folder or "")

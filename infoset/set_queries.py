@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats
 from infoset.engine import section_life
-from infoset.engine.chain_storage import Chains
 from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.engine.replays import PROBE, ROWS, replay_label, replay_room
+from infoset.engine.replays import PROBE, ROWS, past_of, replay_label
 from infoset.engine.section_stack import outline
 from infoset.engine.set_state import SetState, SetStatus
 from infoset.geometry.convex_polygons import ConvexPolygons
@@ -256,13 +255,12 @@ class SetQueries:
         NUMBER.need("label_m", label_m)
         self._need_engagement(engagement)
         history, stack, label = self._state.history, self._state.stack, float(label_m)
-        room = replay_room(len(stack.laws), history.events)
-        died = replay_label(label, history.tape(engagement), history.errors_if_any, stack.table, room)
-        chains = Chains(room.records, room.rings)
+        past = past_of(history, stack.table)
+        died = replay_label(label, engagement, past)
         outlines = [np.empty((0, 2)) for _ in self._channels]
         if died == section_life.ALIVE:
             rows = [ROWS * channel + PROBE for channel in self._channels]
-            outlines = [outline(chains, row, label, history.elapsed, stack.law) for row in rows]
+            outlines = [outline(past.room.chains, row, label, history.elapsed, stack.law) for row in rows]
         x = label - stack.law.closing_speed * (stack.law.step * history.elapsed)
         return self._section(label, x, outlines)
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset._compile import ZERO, allocation_free, inlined, record_of
+from infoset._compile import ZERO, allocation_free, inlined, pasted, record_of
 from infoset.arrays import Floats
-from infoset.engine.chains import CAPACITY, MAX_ADDED, Chain, count_of, number_vertices, read, write
+from infoset.engine.chains import CAPACITY, MAX_ADDED, Chain, SectionView, count_of, number_vertices, read, write
 
 ROOM_AT_START = 64
 """Initial room of a chain, in vertices, a power of two."""
@@ -78,16 +78,17 @@ def working_room() -> Floats:
     return np.empty((3 * CAPACITY + 4, 2))
 
 
-@inlined
-def chains_of(records: Records, n: int) -> tuple[Chain, Chain]:
-    """Return the right and the left chain of a section."""
-    return records[np.uint64(2 * n)], records[np.uint64(2 * n + 1)]
+@pasted
+def view_of(chains: Chains, n: int, label: float) -> SectionView:
+    """Return the view of a section by its number."""
+    records = chains.records
+    return SectionView(records[np.uint64(2 * n)], records[np.uint64(2 * n + 1)], chains.rings, label)
 
 
 @inlined
-def room_of(right: Chain) -> int:
+def room_of(section: SectionView) -> int:
     """Room of each chain of a section, in vertices."""
-    return right.mask + 1
+    return section.right.mask + 1
 
 
 @inlined
@@ -105,9 +106,10 @@ def floats_of(room: int) -> int:
 
 
 @allocation_free
-def widen_rings(right: Chain, left: Chain, rings: Floats, room: int) -> None:
+def widen_rings(section: SectionView, room: int) -> None:
     """Move both chains of a section to new rings of `room` vertices, a power of two, at the end of those in use."""
-    for chain in (right, left):
+    rings = section.rings
+    for chain in (section.right, section.left):
         first = int(rings[TAKEN])
         rings[TAKEN] = first + floats_of(room)
         for i in range(chain.begin, chain.end):
@@ -136,14 +138,13 @@ def copy_chain(chain: Chain, rings: Floats, to: Chain, to_rings: Floats) -> None
 
 
 @allocation_free
-def copy_section(records: Records, rings: Floats, n: int, to_records: Records, to_rings: Floats, to: int) -> None:
-    """Copy a section to section `to` of other chains, whose rings must have enough unused room."""
-    right, left = chains_of(records, n)
-    to_right, to_left = chains_of(to_records, to)
-    number_vertices(to_right, ZERO)
-    number_vertices(to_left, ZERO)
-    wanted = room_for(min(count_of(right, left) + ROOM_AHEAD, CAPACITY), room_of(to_right))
-    if wanted > room_of(to_right):
-        widen_rings(to_right, to_left, to_rings, wanted)
-    copy_chain(right, rings, to_right, to_rings)
-    copy_chain(left, rings, to_left, to_rings)
+def copy_section(chains: Chains, n: int, to_chains: Chains, to_n: int) -> None:
+    """Copy section `n` to section `to_n` of other chains, whose rings must have enough unused room."""
+    section, to = view_of(chains, n, 0.0), view_of(to_chains, to_n, 0.0)
+    number_vertices(to.right, ZERO)
+    number_vertices(to.left, ZERO)
+    wanted = room_for(min(count_of(section) + ROOM_AHEAD, CAPACITY), room_of(to))
+    if wanted > room_of(to):
+        widen_rings(to, wanted)
+    copy_chain(section.right, section.rings, to.right, to.rings)
+    copy_chain(section.left, section.rings, to.left, to.rings)

@@ -22,7 +22,7 @@ chain; their length is zero where the chains meet. `chain_storage` contains the 
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -72,6 +72,15 @@ class Chain(Protocol):
     mask: int
 
 
+class SectionView(NamedTuple):
+    """A section, as kernels take it: the addresses of its chains, the rings with their vertices, and its label, m."""
+
+    right: Chain
+    left: Chain
+    rings: Floats
+    label: float
+
+
 @inlined
 def offset_of(chain: Chain, i: int) -> int:
     """Offset of a vertex in the rings."""
@@ -105,8 +114,9 @@ def number_vertices(chain: Chain, count: int) -> None:
 
 
 @inlined
-def count_of(right: Chain, left: Chain) -> int:
+def count_of(section: SectionView) -> int:
     """Number of vertices of both chains."""
+    right, left = section.right, section.left
     return (right.end - right.begin) + (left.end - left.begin)
 
 
@@ -147,9 +157,7 @@ def move_to_zero(chain: Chain) -> None:
 
 @allocation_free
 def start(
-    right: Chain,
-    left: Chain,
-    rings: Floats,
+    section: SectionView,
     tau: float,
     bottom: tuple[float, float, float],
     top: tuple[float, float, float],
@@ -158,6 +166,7 @@ def start(
 
     `bottom` and `top` are the minimum V, the maximum V, m/s, and z, m, of each level.
     """
+    right, left, rings, _ = section
     for chain in (right, left):
         move_to_zero(chain)
         number_vertices(chain, TWO)
@@ -216,8 +225,9 @@ def hand_over(
 
 
 @inlined
-def turn(right: Chain, left: Chain, rings: Floats, tau: float) -> None:
+def turn(section: SectionView, tau: float) -> None:
     """Decrease the time to go to `tau`: the level turns, and the chains get new highest and lowest ends."""
+    right, left, rings, _ = section
     same_v = 4.0 * EPSILON * right.reach
     same_m = 2.0 * EPSILON * (abs(right.m) + abs(left.m))
     same = (same_v, same_m + tau * same_v)
@@ -229,28 +239,28 @@ def turn(right: Chain, left: Chain, rings: Floats, tau: float) -> None:
 
 
 @inlined
-def spread(right: Chain, left: Chain, tau: float, half_v: float) -> None:
+def spread(section: SectionView, tau: float, half_v: float) -> None:
     """Add the segment of V from -half_v to half_v along the level of `tau` (Minkowski sum)."""
     half_m = half_v * tau
-    move(right, half_v, half_m)
-    move(left, -half_v, -half_m)
-    right.reach += half_v
+    move(section.right, half_v, half_m)
+    move(section.left, -half_v, -half_m)
+    section.right.reach += half_v
 
 
 @inlined
-def shift(right: Chain, left: Chain, tau: float, v: float) -> None:
+def shift(section: SectionView, tau: float, v: float) -> None:
     """Move a section by `v` along the level of `tau`: z is unchanged, the predicted miss changes by v tau."""
     m, rest = two_product(v, tau)
-    move(right, v, m)
-    move(left, v, m)
-    right.m_rest += rest
-    left.m_rest += rest
-    right.reach += abs(v)
+    for chain in (section.right, section.left):
+        move(chain, v, m)
+        chain.m_rest += rest
+    section.right.reach += abs(v)
 
 
 @inlined
-def heights(right: Chain, left: Chain, rings: Floats, tau: float) -> tuple[float, float]:
+def heights(section: SectionView, tau: float) -> tuple[float, float]:
     """Minimum and maximum z of a section at time to go `tau`."""
+    right, left, rings, _ = section
     right_origin, left_origin = origin_height(right, tau), origin_height(left, tau)
     minimum = min(
         right_origin + height_in(right, rings, right.begin, tau),
@@ -293,14 +303,15 @@ def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level:
 
 
 @inlined
-def cut(right: Chain, left: Chain, rings: Floats, tau: float, lower: float, upper: float) -> tuple[bool, float]:
+def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[bool, float]:
     """Intersect a section at time to go `tau` with the band lower <= z <= upper.
 
     Return whether it lives, and the smaller overlap of section and band at the two borders, m: minus their distance if
     they do not intersect. If the intersection is empty, the section is unchanged. A band with `lower` above `upper` is
     empty: that of a label behind x = 0, or beyond the range at which the error bound is zero.
     """
-    minimum, maximum = heights(right, left, rings, tau)
+    right, left, rings, _ = section
+    minimum, maximum = heights(section, tau)
     overlap = min(maximum - lower, upper - minimum)
     if overlap < 0.0 or lower > upper:
         return False, min(overlap, upper - lower)
@@ -351,8 +362,9 @@ def first_near_peak(chain: Chain, rings: Floats, sign: float, tolerance: float) 
 
 
 @inlined
-def max_and_min_miss(right: Chain, left: Chain, rings: Floats, tau: float) -> tuple[float, float]:
+def max_and_min_miss(section: SectionView, tau: float) -> tuple[float, float]:
     """Return the maximum and the minimum predicted miss of a section; store their vertices as peaks."""
+    right, left, rings, _ = section
     # A miss is z + V tau; both terms may be far greater than the sum.
     reach = tau * right.reach
     _, upper = vertex(right, rings, find_peak(right, rings, 1.0, abs(right.m) + reach))
@@ -362,13 +374,14 @@ def max_and_min_miss(right: Chain, left: Chain, rings: Floats, tau: float) -> tu
 
 @allocation_free
 def extreme_points(
-    right: Chain, left: Chain, rings: Floats, tau: float, relative: float, slack: float
+    section: SectionView, tau: float, relative: float, slack: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return points with the extremes of the predicted miss; `max_and_min_miss` must have stored the peaks.
 
     They are V and m of the lowest point with the maximum miss, and of the highest point with the minimum. `relative`
     and `slack` are tolerances for equal misses, relative to the interval and to the magnitudes of the terms.
     """
+    right, left, rings, _ = section
     upper_v, upper = vertex(right, rings, right.peak)
     lower_v, lower = vertex(left, rings, left.peak)
     magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
@@ -387,8 +400,9 @@ def vertex_from(chain: Chain, rings: Floats, i: int, tau: float, v: float, z: fl
 
 
 @allocation_free
-def margin_in(right: Chain, left: Chain, rings: Floats, tau: float, v: float, z: float) -> float:
+def margin_in(section: SectionView, tau: float, v: float, z: float) -> float:
     """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
+    right, left, rings, _ = section
     last_v, last_m = vertex(left, rings, left.end - 1)
     rounded = (tau * (last_v - v), (last_m - tau * last_v) - z)
     end = vertex_from(left, rings, left.end - 1, tau, v, z)
@@ -406,11 +420,12 @@ def margin_in(right: Chain, left: Chain, rings: Floats, tau: float, v: float, z:
 
 
 @allocation_free
-def outline(right: Chain, left: Chain, rings: Floats, tau: float, out: Floats) -> int:
+def outline(section: SectionView, tau: float, out: Floats) -> int:
     """Write the vertices (V, z), counter-clockwise; return their number, at most CAPACITY.
 
     A point in which the chains meet is stored in both, equal to within rounding. It is written once.
     """
+    right, left, rings, _ = section
     made = ZERO
     for chain in (right, left):
         for i in range(chain.begin, chain.end):
@@ -431,19 +446,20 @@ def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) 
 
 
 @inlined
-def is_crowded(right: Chain, left: Chain) -> bool:
+def is_crowded(section: SectionView) -> bool:
     """Whether the next step may increase the number of vertices beyond CAPACITY."""
-    return count_of(right, left) > CAPACITY - MAX_ADDED
+    return count_of(section) > CAPACITY - MAX_ADDED
 
 
 @allocation_free
-def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points: Floats) -> None:
+def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
     """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
 
     An edge is removed by extending its neighbours to their intersection; the edge that adds the minimum area is removed
     first. Vertices that are not convex because of rounding are removed before. If no edge can be removed, three sides
     of a box around the chain replace it. `points`, shape (3 CAPACITY + 4, 2), is a working array.
     """
+    right, left, rings, _ = section
     in_right, in_left = right.end - right.begin, left.end - left.begin
     longer, sign = (right, 1.0) if in_right > in_left else (left, -1.0)
     count = ZERO
@@ -464,13 +480,14 @@ def reduce_outward(right: Chain, left: Chain, rings: Floats, tau: float, points:
 
 @allocation_free
 def cut_misses(
-    right: Chain, left: Chain, rings: Floats, tau: float, tilt: float, lower: float, upper: float, points: Floats
+    section: SectionView, tau: float, tilt: float, lower: float, upper: float, points: Floats
 ) -> tuple[bool, float]:
     """Intersect a section with the band lower <= m + V tilt <= upper; returns are those of `cut`.
 
     This band is not parallel to the level, so that it may cut any edge: the chains are computed anew. O(vertices).
     `points` is a working array of CAPACITY + 2 vertices.
     """
+    right, left, rings, _ = section
     count = ZERO
     for chain in (right, left):
         for i in range(chain.begin, chain.end):

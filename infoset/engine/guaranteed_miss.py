@@ -15,13 +15,24 @@ import numpy as np
 from infoset._compile import ZERO, allocation_free, entry
 from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
-from infoset.engine.chain_storage import chains_of
 from infoset.engine.concave_bounds import bound_between
-from infoset.engine.history import History, Tape, Tapes, tape_of
+from infoset.engine.history import History
 from infoset.engine.location import FIRST, LABEL_RESOLUTION, LAST, locate_end, search_window
-from infoset.engine.replays import LOWER, PROBE, ROWS, UPPER, ReplayRoom, Workspace, keep_section, probe, run, workspace
-from infoset.engine.section_law import Laws, SectionLaw, law_of
-from infoset.engine.section_life import ALIVE
+from infoset.engine.replays import (
+    LOWER,
+    PROBE,
+    UPPER,
+    Past,
+    keep_section,
+    past_of,
+    probe,
+    replayed_section,
+    run,
+    select,
+    with_window,
+)
+from infoset.engine.section_law import SectionLaw, law_of
+from infoset.engine.section_life import ALIVE, time_to_go
 from infoset.engine.section_passes import Sections
 from infoset.engine.section_stack import SectionStack, impulse_doubts
 
@@ -114,33 +125,30 @@ def bound_leaving(
     lower: float,
     upper: float,
     known: float,
-    elapsed: int,
-    tape: Tape,
+    past: Past,
     errors: Floats | None,
-    laws: Laws,
-    room: Workspace,
     outlines: Outlines,
     pieces: Floats,
 ) -> int:
     """Bound the predicted miss of all living labels between two limits, m; return the number of pieces written.
 
     The pieces of all axes have the same ends; `pieces`, shape (C, >= PIECES, 4), receives them. With rates, the window
-    of the tape consists of these limits. `known` is a label between them that lives; less than `lower` if none is
-    known.
+    consists of these limits; `errors` are those of the history, as in `replay`. `known` is a label between them that
+    lives; less than `lower` if none is known.
     """
-    living, limits, replays = known, room.known, room.replays
+    living, limits, laws, elapsed = known, past.room.known, past.laws, past.log.elapsed
     if errors is not None:
         # The living labels need not form an interval, so that the window must be searched.
         first_label = known if known >= lower else 0.5 * (lower + upper)
-        if not search_window(lower, upper, first_label, tape, errors, laws, room):
+        if not search_window(lower, upper, first_label, past):
             return 0
         living = limits[1].label
-    lower_lives = probe(limits, FIRST, lower, tape, errors, laws, replays)
+    lower_lives = probe(limits, FIRST, lower, past)
     if lower_lives:
-        keep_section(replays, LOWER)
-    upper_lives = probe(limits, LAST, upper, tape, errors, laws, replays)
+        keep_section(past, LOWER)
+    upper_lives = probe(limits, LAST, upper, past)
     if upper_lives:
-        keep_section(replays, UPPER)
+        keep_section(past, UPPER)
     if lower_lives:
         living = lower
     elif upper_lives:
@@ -152,9 +160,9 @@ def bound_leaving(
     first_dead, last_dead = lower, upper
     first, last = lower, upper
     if not lower_lives:
-        first_dead, first = locate_end(limits[0], living, resolution, tape, errors, laws, room, LOWER)
+        first_dead, first = locate_end(limits[0], living, resolution, past, LOWER)
     if not upper_lives:
-        last_dead, last = locate_end(limits[2], living, resolution, tape, errors, laws, room, UPPER)
+        last_dead, last = locate_end(limits[2], living, resolution, past, UPPER)
     spacing = (last - first) / (LABELS - 1)
     law = law_of(laws, ZERO)
     travelled = law.closing_speed * (law.step * elapsed)
@@ -179,7 +187,7 @@ def bound_leaving(
             row = LOWER
         elif k == LABELS - 1:
             row = UPPER
-        elif run(label, tape, errors, laws, replays)[0] != ALIVE:
+        elif run(label, past)[0] != ALIVE:
             continue
         if outside and k < 0:
             inner = 1
@@ -188,10 +196,8 @@ def bound_leaving(
         outlines.labels[number] = label
         tau = (label - travelled) / law.closing_speed
         for channel in range(laws.shape[0]):
-            right, left = chains_of(replays.records, ROWS * channel + row)
-            outlines.counts[channel, number] = chains.outline(
-                right, left, replays.rings, tau, outlines.points[channel, number]
-            )
+            section = replayed_section(past, channel, row, label)
+            outlines.counts[channel, number] = chains.outline(section, tau, outlines.points[channel, number])
         number += 1
     if spacing == 0.0 or number < 3:
         # The living labels are equal to within the resolution: one outline and a small margin bound them all.
@@ -231,12 +237,8 @@ def bound_leaving_all(
     lower: Floats,
     upper: Floats,
     floor: Floats,
-    elapsed: int,
-    tapes: Tapes,
-    errors: Floats | None,
+    past: Past,
     sections: Sections,
-    laws: Laws,
-    room: Workspace,
     outlines: Outlines,
     pieces: Floats,
     made: Integers,
@@ -246,12 +248,13 @@ def bound_leaving_all(
     With rates, a window of labels is halved while its bound is loose, since the bands that are convex on a window are
     wider on a wider window. `floor` is the bound of the labels that have arrived: Phi is no less.
     """
-    slots, used, windows = sections.slots, sections.used, room.windows
+    slots, used, windows = sections.slots, sections.used, past.room.windows
+    errors, laws = past.errors, past.laws
     for b in range(active.shape[0]):
         made[b] = 0
         if not active[b] or lower[b] > upper[b]:
             continue
-        tape = tape_of(tapes, b, room.replays.values, room.replays.applies)
+        select(past, b)
         reached = 0.5 * floor[b]
         windows[0].near, windows[0].far = lower[b], upper[b]
         count = 1
@@ -262,21 +265,19 @@ def bound_leaving_all(
             for s in range(used[b]):
                 if slots[b, s].living and near <= slots[b, s].label <= far:
                     known = slots[b, s].label
-            window, middle = tape, 0.5 * (near + far)
+            window, middle = past, 0.5 * (near + far)
             may_halve = errors is not None and MAX_LEAVING_WINDOWS * (far - near) > 1.5 * (upper[b] - lower[b])
             if errors is not None:
-                window = Tape(tape.kinds, tape.values, tape.applies, tape.events, near, far)
+                window = with_window(past, near, far)
             spread = 0.0
             if may_halve:
-                spread = spread_at(middle, elapsed, window, errors, laws, room.replays, outlines.points[0, 0])
+                spread = spread_at(middle, window, outlines.points[0, 0])
                 if spread > LOOSE * reached:
-                    reached = max(
-                        reached, spread_at(middle, elapsed, tape, errors, laws, room.replays, outlines.points[0, 0])
-                    )
+                    reached = max(reached, spread_at(middle, past, outlines.points[0, 0]))
             number = ZERO
             new_pieces = pieces[:, b, made[b] :]
             if spread <= LOOSE * reached:
-                number = bound_leaving(near, far, known, elapsed, window, errors, laws, room, outlines, new_pieces)
+                number = bound_leaving(near, far, known, window, errors, outlines, new_pieces)
                 spread = 0.0
                 for channel in range(laws.shape[0] if number > 0 else 0):
                     minimum, maximum = np.inf, -np.inf
@@ -294,18 +295,15 @@ def bound_leaving_all(
 
 
 @allocation_free
-def spread_at(
-    label: float, elapsed: int, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom, outline: Floats
-) -> float:
+def spread_at(label: float, past: Past, outline: Floats) -> float:
     """Return half the width of the predicted misses at one label, m, in space half the diagonal; zero if it is dead."""
-    if run(label, tape, errors, laws, room)[0] != ALIVE:
+    if run(label, past)[0] != ALIVE:
         return 0.0
     spread = 0.0
-    for channel in range(laws.shape[0]):
-        law = law_of(laws, channel)
-        right, left = chains_of(room.records, ROWS * channel + PROBE)
-        tau = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
-        count = chains.outline(right, left, room.rings, tau, outline)
+    for channel in range(past.laws.shape[0]):
+        law = law_of(past.laws, channel)
+        tau = time_to_go(label, past.log.elapsed, law)
+        count = chains.outline(replayed_section(past, channel, PROBE, label), tau, outline)
         minimum, maximum = extremes_along(outline, count, tau)
         spread = math.hypot(spread, 0.5 * (maximum - minimum) + 0.5 * law.disturbance * tau * tau)
     return spread
@@ -383,12 +381,8 @@ class GuaranteedMiss:
             lower,
             upper,
             self._settled,
-            history.elapsed,
-            history.tapes,
-            errors,
+            past_of(history, stack.table),
             stack.sections,
-            stack.table,
-            workspace(channels, history.events, 1),
             Outlines(
                 np.empty(MAX_LABELS),
                 np.empty((channels, MAX_LABELS, chains.CAPACITY, 2)),

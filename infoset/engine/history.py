@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import allocation_free
 from infoset.arrays import Flags, Floats, Integers
 
 ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
@@ -14,34 +13,26 @@ ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 ROOM_AT_START = 64
 
 
-class Tape(NamedTuple):
-    """History of one engagement.
+class EventLog(NamedTuple):
+    """Events of a batch of B engagements in order, as kernels take them: the arrays and counts of `History`.
 
     Parameters
     ----------
-    kinds : ndarray of int, shape (>= events,)
+    kinds : ndarray of int, shape (>= number,)
         Kind of each event.
-    values : ndarray, shape (C, >= events)
+    values : ndarray, shape (>= number, C, B)
         Angle, rad, impulse, m/s, or rate, rad/s, along each lateral axis.
-    applies : ndarray of bool, shape (>= events,)
-        Whether the event applies to this engagement.
-    events : int
-        Number of events.
-    nearest, farthest : float
-        Window of labels, m, over which the bands of measured rates are convex. The empty window, from infinity to
-        minus infinity, makes the window of each label the label itself.
+    applies : ndarray of bool, shape (>= number, B)
+        Whether the event applies to the engagement.
+    number, elapsed : int
+        Number of events, and of the predictions among them.
     """
 
     kinds: Integers
     values: Floats
     applies: Flags
-    events: int
-    nearest: float
-    farthest: float
-
-
-NO_WINDOW = (np.inf, -np.inf)
-"""The empty window: the rate band of each label is exact for that label."""
+    number: int
+    elapsed: int
 
 
 class LastSight(NamedTuple):
@@ -71,25 +62,6 @@ class LastSight(NamedTuple):
 
 
 NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
-
-
-class Tapes(NamedTuple):
-    """Histories of a batch for the kernels: `Tape` with values of shape (events, C, B) and applies (events, B)."""
-
-    kinds: Integers
-    values: Floats
-    applies: Flags
-    events: int
-
-
-@allocation_free
-def tape_of(tapes: Tapes, b: int, values: Floats, applies: Flags) -> Tape:
-    """Copy the history of one engagement to contiguous arrays, for many replays."""
-    for event in range(tapes.events):
-        applies[event] = tapes.applies[event, b]
-        for channel in range(values.shape[0]):
-            values[channel, event] = tapes.values[event, channel, b]
-    return Tape(tapes.kinds, values, applies, tapes.events, np.inf, -np.inf)
 
 
 class History:
@@ -158,14 +130,9 @@ class History:
         return self._fired
 
     @property
-    def tapes(self) -> Tapes:
-        """Histories of the whole batch."""
-        return Tapes(self.kinds, self.values, self.applies, self.events)
-
-    def tape(self, engagement: int) -> Tape:
-        """Return the history of one engagement."""
-        values, applies = self.values[:, :, engagement].T.copy(), self.applies[:, engagement].copy()
-        return Tape(self.kinds, values, applies, self.events, *NO_WINDOW)
+    def log(self) -> EventLog:
+        """The events for kernels."""
+        return EventLog(self.kinds, self.values, self.applies, self.events, self.elapsed)
 
     @property
     def errors_if_any(self) -> Floats | None:

@@ -14,23 +14,24 @@ import numpy as np
 
 from infoset._compile import allocation_free, constants, entry
 from infoset.arrays import Flags, Floats
-from infoset.engine.chain_storage import chains_of, copy_section, room_of
+from infoset.engine.chain_storage import copy_section, room_of, view_of
 from infoset.engine.chains import CAPACITY, count_of
 from infoset.engine.concave_bounds import is_dead_between
-from infoset.engine.history import Tape, Tapes, tape_of
 from infoset.engine.replays import (
     LOWER,
     MAX_HALVED_WINDOWS,
     PROBE,
     ROWS,
     UPPER,
+    Past,
     Record,
-    Workspace,
     keep_living,
     keep_section,
     outlives,
     probe,
     run,
+    select,
+    with_window,
 )
 from infoset.engine.section_law import Laws, law_of
 from infoset.engine.section_life import ALIVE, summarise_section
@@ -64,10 +65,7 @@ def locate_end(
     dead: Record,
     living: float,
     resolution: float,
-    tape: Tape,
-    errors: Floats | None,
-    laws: Laws,
-    room: Workspace,
+    past: Past,
     row: int,
 ) -> tuple[float, float]:
     """Narrow the bracket between a dead and a living label; return the bracket (dead, living).
@@ -76,11 +74,11 @@ def locate_end(
     empty is a concave function of the label, so that the Illinois variant of regula falsi converges fast. If four
     probes have not narrowed the bracket to an eighth, because that event changes with the label, one bisection follows.
     """
-    run(living, tape, errors, laws, room.replays)
-    keep_living(room, tape.events, row)
+    run(living, past)
+    keep_living(past, row)
     end, died, overlap, emptied = dead.label, dead.died, dead.overlap, dead.emptied
     weight_dead = overlap
-    weight_living = room.living_overlaps[emptied, died]
+    weight_living = past.room.living_overlaps[emptied, died]
     side = 0
     before = 0.0
     for probes in range(MAX_PROBES):
@@ -96,30 +94,30 @@ def locate_end(
             minimum = 0.5 * resolution / width
             fraction = min(max(-weight_dead / (weight_living - weight_dead), minimum), 1.0 - minimum)
         label = end + fraction * (living - end)
-        probe_died, probe_overlap, probe_emptied = run(label, tape, errors, laws, room.replays)
+        probe_died, probe_overlap, probe_emptied = run(label, past)
         if probe_died == ALIVE:
             living = label
-            keep_living(room, tape.events, row)
-            weight_living = room.living_overlaps[emptied, died]
+            keep_living(past, row)
+            weight_living = past.room.living_overlaps[emptied, died]
             weight_dead = 0.5 * weight_dead if side == 1 else overlap
             side = 1
         else:
             end, died, overlap, emptied = label, probe_died, probe_overlap, probe_emptied
             weight_dead = overlap
-            weight_living = (0.5 if side == -1 else 1.0) * room.living_overlaps[emptied, died]
+            weight_living = (0.5 if side == -1 else 1.0) * past.room.living_overlaps[emptied, died]
             side = -1
     return end, living
 
 
 @allocation_free
-def search_living(tape: Tape, errors: Floats | None, laws: Laws, room: Workspace) -> bool:
+def search_living(past: Past) -> bool:
     """Search for a living label between the first three known ones, which are dead; the middle one outlives the others.
 
     Return whether the middle label now lives; if not, there is no living label in the bracket. The pair (event,
     overlap) is a unimodal function of the label: the larger half of the bracket is probed at its middle. The search
     ends if the bracket is as narrow as `NARROWEST`, or if no label in it can live.
     """
-    known, four = room.known, room.four
+    known, four = past.room.known, past.room.four
     for _ in range(MAX_PROBES):
         if known[2].label - known[0].label <= NARROWEST * known[2].label:
             return False
@@ -127,8 +125,8 @@ def search_living(tape: Tape, errors: Floats | None, laws: Laws, room: Workspace
         outer, at = (0, 1) if lower_half else (2, 2)
         for i in range(3):
             four[i if i < at else i + 1] = known[i]
-        lives = probe(four, at, 0.5 * (known[1].label + known[outer].label), tape, errors, laws, room.replays)
-        if not lives and is_dead_between(four, room.latest):
+        lives = probe(four, at, 0.5 * (known[1].label + known[outer].label), past)
+        if not lives and is_dead_between(four, past.room.latest):
             return False
         if lives or outlives(four[at], known[1]):
             known[2 - outer], known[1] = known[1], four[at]
@@ -144,18 +142,15 @@ def search_window(
     lower: float,
     upper: float,
     first: float,
-    tape: Tape,
-    errors: Floats | None,
-    laws: Laws,
-    room: Workspace,
+    past: Past,
 ) -> bool:
-    """Return whether a label of the tape's window lives with the bands that are convex on the window.
+    """Return whether a label of the window lives with the bands that are convex on the window.
 
     `first` is the first label replayed. If a label lives, it is the second of the known ones afterwards.
     """
-    known = room.known
+    known = past.room.known
     for i, label in ((MIDDLE, first), (FIRST, lower), (LAST, upper)):
-        if probe(known, i, label, tape, errors, laws, room.replays):
+        if probe(known, i, label, past):
             known[1] = known[i]
             return True
     for end in (0, 2):
@@ -163,24 +158,21 @@ def search_window(
             known[2 - end] = known[1]
             known[1] = known[end]
             break
-    return search_living(tape, errors, laws, room)
+    return search_living(past)
 
 
 @allocation_free
-def search_everywhere(
-    lower: float,
-    upper: float,
-    tape: Tape,
-    errors: Floats | None,
-    laws: Laws,
-    room: Workspace,
-) -> tuple[bool, float]:
+def search_everywhere(lower: float, upper: float, past: Past, errors: Floats | None) -> tuple[bool, float]:
     """Find a living label within limits if the living labels need not form an interval, or prove that none lives.
 
     A window without living labels under the bands that are convex on it is discarded. The others are halved until they
     are as narrow as `NARROWEST`, beginning with the one in which a probed label lived longest with its own bands.
+
+    Only rates make the search necessary. `errors` are those of the history, as in `replay`.
     """
-    windows, probed = room.windows, room.four
+    if errors is None:
+        return False, lower
+    windows, probed = past.room.windows, past.room.four
     windows[0].near, windows[0].far, windows[0].died, windows[0].overlap = lower, upper, ALIVE, 0.0
     count = 1
     for _ in range(MAX_HALVED_WINDOWS):
@@ -195,13 +187,12 @@ def search_everywhere(
         count -= 1
         windows[best] = windows[count]
         for p, q in ((near, middle), (middle, far)):
-            window = Tape(tape.kinds, tape.values, tape.applies, tape.events, p, q)
-            if not search_window(p, q, 0.5 * (p + q), window, errors, laws, room):
+            if not search_window(p, q, 0.5 * (p + q), with_window(past, p, q)):
                 continue
             new = windows[count]
             new.near, new.far, new.died, new.overlap = p, q, -1, -np.inf
-            for label in (room.known[1].label, p, q):
-                if probe(probed, FIRST, label, tape, errors, laws, room.replays):
+            for label in (past.room.known[1].label, p, q):
+                if probe(probed, FIRST, label, past):
                     return True, label
                 if outlives(probed[0], new):
                     new.died, new.overlap = probed[0].died, probed[0].overlap
@@ -215,10 +206,7 @@ def locate_living(
     limit_below: float,
     limit_above: float,
     sections: Sections,
-    tape: Tape,
-    errors: Floats | None,
-    laws: Laws,
-    room: Workspace,
+    past: Past,
 ) -> Living:
     """Locate the living labels of an engagement within limits, from its stored labels.
 
@@ -229,7 +217,7 @@ def locate_living(
         return none_lives
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
     # The limits, and the stored labels between them.
-    slots, stored, known = sections.slots, sections.used[b], room.known
+    slots, stored, known = sections.slots, sections.used[b], past.room.known
     end = 1
     first = last = 0
     known[0].label = limit_below
@@ -247,11 +235,11 @@ def locate_living(
     known[end].label = limit_above
     some_live = last > 0
     # A limit must be replayed only if no dead label separates it from the living ones.
-    if (not some_live or first == 1) and probe(known, FIRST, limit_below, tape, errors, laws, room.replays):
-        keep_section(room.replays, LOWER)
+    if (not some_live or first == 1) and probe(known, FIRST, limit_below, past):
+        keep_section(past, LOWER)
         first, some_live = 0, True
-    if (not some_live or last == end - 1) and probe(known, end, limit_above, tape, errors, laws, room.replays):
-        keep_section(room.replays, UPPER)
+    if (not some_live or last == end - 1) and probe(known, end, limit_above, past):
+        keep_section(past, UPPER)
         first = first if some_live else end
         last, some_live = end, True
     if not some_live:
@@ -260,14 +248,12 @@ def locate_living(
             if outlives(known[i], known[best]):
                 best = i
         # Bracket of the dead label that lived longest: this label and its neighbours, at the front of the same array.
-        room.four[0] = known[best]
+        past.room.four[0] = known[best]
         known[0], known[2] = known[max(best - 1, 0)], known[min(best + 1, end)]
-        known[1] = room.four[0]
+        known[1] = past.room.four[0]
         first, last, end = 1, 1, 2
-        if not search_living(tape, errors, laws, room):
-            if errors is None:
-                return none_lives
-            alive_now, label = search_everywhere(limit_below, limit_above, tape, errors, laws, room)
+        if not search_living(past):
+            alive_now, label = search_everywhere(limit_below, limit_above, past, past.errors)
             if not alive_now:
                 return none_lives
             below, above = limit_below, limit_above
@@ -278,18 +264,18 @@ def locate_living(
                 elif label < stored_label < above:
                     above = stored_label
             known[1].label = label
-            if probe(known, FIRST, below, tape, errors, laws, room.replays):
-                keep_section(room.replays, LOWER)
+            if probe(known, FIRST, below, past):
+                keep_section(past, LOWER)
                 first = 0
-            if probe(known, LAST, above, tape, errors, laws, room.replays):
-                keep_section(room.replays, UPPER)
+            if probe(known, LAST, above, past):
+                keep_section(past, UPPER)
                 last = 2
     below = lower = known[first].label
     if first > 0:
-        below, lower = locate_end(known[first - 1], lower, resolution, tape, errors, laws, room, LOWER)
+        below, lower = locate_end(known[first - 1], lower, resolution, past, LOWER)
     above = upper = known[last].label
     if last < end:
-        above, upper = locate_end(known[last + 1], upper, resolution, tape, errors, laws, room, UPPER)
+        above, upper = locate_end(known[last + 1], upper, resolution, past, UPPER)
     return Living(True, below, lower, upper, above)
 
 
@@ -304,38 +290,27 @@ def is_convex(laws: Laws) -> bool:
 
 
 @entry
-def refine_all(
-    wanted: Flags,
-    number: int,
-    elapsed: int,
-    limit_below: Floats,
-    limit_above: Floats,
-    tapes: Tapes,
-    errors: Floats | None,
-    sections: Sections,
-    laws: Laws,
-    room: Workspace,
-) -> int:
+def refine_all(wanted: Flags, number: int, limits: tuple[Floats, Floats], past: Past, sections: Sections) -> int:
     """Replace the sections of the wanted engagements by a grid of `number` over the living labels, ends included.
 
     Return the number of vertices that every new section may gain. If no label lives, the engagement has no living
-    section afterwards. `limit_below` and `limit_above` are narrowed to dead labels, except where other labels may live
-    beyond them: with rates, with the rectangle as initial set of the guaranteed model, and with an error bound that
-    rises with range in the paper's model.
+    section afterwards. The limits of the labels, each of shape (B,), are narrowed to dead labels, except where other
+    labels may live beyond them: with rates, with the rectangle as initial set of the guaranteed model, and with an
+    error bound that rises with range in the paper's model.
     """
     spare = CAPACITY
-    slots, used, summaries = sections.slots, sections.used, sections.summaries
-    records, rings, new = sections.records, sections.rings, room.replays
+    slots, used, laws = sections.slots, sections.used, past.laws
+    limit_below, limit_above = limits
     for b in range(len(used)):
         if not wanted[b]:
             continue
-        tape = tape_of(tapes, b, room.replays.values, room.replays.applies)
-        living = locate_living(b, limit_below[b], limit_above[b], sections, tape, errors, laws, room)
+        select(past, b)
+        living = locate_living(b, limit_below[b], limit_above[b], sections, past)
         for s in range(used[b]):
             slots[b, s].living = False
         if not living.exists:
             continue
-        if errors is None and is_convex(laws):
+        if past.errors is None and is_convex(laws):
             limit_below[b] = living.below
             limit_above[b] = living.above
         used[b] = number
@@ -350,13 +325,13 @@ def refine_all(
                 row = LOWER if s == 0 else UPPER
                 slot.died, slot.overlap = ALIVE, 0.0
             else:
-                slot.died, slot.overlap, slot.emptied = run(label, tape, errors, laws, room.replays)
+                slot.died, slot.overlap, slot.emptied = run(label, past)
             slot.living = slot.died == ALIVE
             if slot.living:
                 for channel in range(laws.shape[0]):
-                    n, at = row_of(sections, channel, b, s), ROWS * channel + row
-                    copy_section(new.records, new.rings, at, records, rings, n)
-                    right, left = chains_of(records, n)
-                    summarise_section(right, left, rings, label, elapsed, law_of(laws, channel), summaries, b, s)
-                    spare = min(spare, room_of(right) - count_of(right, left))
+                    n, law = row_of(sections, channel, b, s), law_of(laws, channel)
+                    copy_section(past.room.chains, ROWS * channel + row, sections.chains, n)
+                    section = view_of(sections.chains, n, label)
+                    summarise_section(section, past.log.elapsed, law, sections.summaries, b, s)
+                    spare = min(spare, room_of(section) - count_of(section))
     return spare

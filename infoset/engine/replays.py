@@ -6,25 +6,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from infoset._compile import ZERO, allocation_free, constants, entry
+from infoset._compile import ZERO, allocation_free, constants, entry, pasted
 from infoset.arrays import Flags, Floats, Integers
-from infoset.engine import chain_storage, chains
-from infoset.engine.chain_storage import chains_of, copy_section, empty_sections, working_room
-from infoset.engine.history import (
-    ANGLE,
-    IMPULSE,
-    NO_SIGHT,
-    PREDICTION,
-    WIDENING,
-    History,
-    LastSight,
-    Tape,
-    Tapes,
-    tape_of,
-)
+from infoset.engine import chains
+from infoset.engine.chain_storage import Chains, copy_section, empty_sections, view_of, working_room
+from infoset.engine.chains import SectionView
+from infoset.engine.history import ANGLE, IMPULSE, NO_SIGHT, PREDICTION, WIDENING, EventLog, History, LastSight
 from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
     ALIVE,
+    Rate,
     across_of,
     measure_rate_section,
     measure_section,
@@ -59,38 +50,19 @@ WINDOW = np.dtype([("near", np.float64), ("far", np.float64), *OUTCOME])
 """A window of labels, m, with the latest outcome that a label of it reached."""
 
 
-class ReplayRoom(NamedTuple):
-    """Working arrays for replays of E events.
+class Workspace(NamedTuple):
+    """Working arrays for replays of E events and for a search over K labels.
 
     Parameters
     ----------
     values, applies : ndarray, shape (C, E) and (E,)
-        History of one engagement in contiguous arrays: angles, rates and impulses, SI, and the events that apply.
-    records, rings : ndarray
-        Sections, stored as in `chain_storage`; the last replay is `PROBE`.
-    overlaps : ndarray, shape (C, E)
-        Overlap of section and band at each measurement, m, in the last replay.
+        Events of the engagement that is replayed, contiguous: values and whether they apply, as in `EventLog`.
+    chains : Chains
+        The sections `PROBE`, which is the last replay, `LOWER` and `UPPER` along each axis.
+    overlaps, living_overlaps : ndarray, shape (C, E)
+        Overlap of section and band at each measurement, m, in the last replay and in that of a living label.
     points : ndarray, shape (n, 2)
         Vertices of a section.
-    """
-
-    values: Floats
-    applies: Flags
-    records: chain_storage.Records
-    rings: Floats
-    overlaps: Floats
-    points: Floats
-
-
-class Workspace(NamedTuple):
-    """Working arrays for replays and for a search over K labels.
-
-    Parameters
-    ----------
-    replays : ReplayRoom
-        Arrays of the replays, with the sections `PROBE`, `LOWER` and `UPPER`.
-    living_overlaps : ndarray, shape (C, E)
-        Overlaps of the last replay of a living label, m.
     known : recarray of PROBED, shape (K,)
         Replayed labels.
     four : recarray of PROBED, shape (4,)
@@ -101,35 +73,82 @@ class Workspace(NamedTuple):
         Windows of labels to be searched.
     """
 
-    replays: ReplayRoom
+    values: Floats
+    applies: Flags
+    chains: Chains
+    overlaps: Floats
     living_overlaps: Floats
+    points: Floats
     known: Records
     four: Records
     latest: Floats
     windows: Records
 
 
-def replay_room(channels: int, events: int) -> ReplayRoom:
-    """Allocate the arrays for replays of `events` events along a number of axes."""
-    return ReplayRoom(
+class Past(NamedTuple):
+    """The history of a batch, and what a replay of it needs.
+
+    Parameters
+    ----------
+    log : EventLog
+        Events of all engagements.
+    errors : ndarray, shape (E,), or None
+        Error bound of each measured rate, rad/s; None without rates.
+    laws : Laws
+        Constants of the axes.
+    room : Workspace
+        Working arrays, with the events of the engagement that `select` has chosen.
+    nearest, farthest : float
+        Window of labels, m, over which the bands of measured rates are convex. The empty window, from infinity to
+        minus infinity, makes the window of each label the label itself.
+    """
+
+    log: EventLog
+    errors: Floats | None
+    laws: Laws
+    room: Workspace
+    nearest: float
+    farthest: float
+
+
+def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
+    """Return the history of a batch, with working arrays for a search over `slots` stored labels."""
+    channels, events = len(laws), history.events
+    room = Workspace(
         np.empty((channels, events)),
         np.empty(events, dtype=bool),
-        *empty_sections(ROWS * channels),
+        empty_sections(ROWS * channels),
         overlaps=np.empty((channels, events)),
-        points=working_room(),
-    )
-
-
-def workspace(channels: int, events: int, slots: int) -> Workspace:
-    """Allocate the arrays for replays of `events` events and a search over `slots` stored labels."""
-    return Workspace(
-        replay_room(channels, events),
         living_overlaps=np.empty((channels, events)),
+        points=working_room(),
         known=np.recarray(slots + 2, PROBED),
         four=np.recarray(4, PROBED),
         latest=np.empty((2, 4)),
         windows=np.recarray(MAX_HALVED_WINDOWS + 2, WINDOW),
     )
+    return Past(history.log, history.errors_if_any, laws, room, np.inf, -np.inf)
+
+
+@allocation_free
+def select(past: Past, b: int) -> None:
+    """Copy the events of an engagement to the contiguous arrays that replays read."""
+    log, values, applies = past.log, past.room.values, past.room.applies
+    for event in range(log.number):
+        applies[event] = log.applies[event, b]
+        for channel in range(values.shape[0]):
+            values[channel, event] = log.values[event, channel, b]
+
+
+@allocation_free
+def with_window(past: Past, nearest: float, farthest: float) -> Past:
+    """Return a history with another window of labels."""
+    return Past(past.log, past.errors, past.laws, past.room, nearest, farthest)
+
+
+@pasted
+def replayed_section(past: Past, channel: int, row: int, label: float) -> SectionView:
+    """Return the section in a row of the workspace along an axis."""
+    return view_of(past.room.chains, ROWS * channel + row, label)
 
 
 class Replayed(NamedTuple):
@@ -145,66 +164,63 @@ AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
 
 @allocation_free
 def replay(
-    done: Replayed, label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: ReplayRoom
+    done: Replayed, label: float, until: int, past: Past, errors: Floats | None, law: SectionLaw
 ) -> tuple[int, Replayed]:
-    """Compute the section at any label along one axis from a history: apply the events of a tape after those `done`.
+    """Compute the section at any label along one axis: apply the events after those `done`, up to number `until`.
 
     Return the number of the event that makes the section empty, or ALIVE, and the events done. About 30 ns for each
-    event. `errors` are the error bounds of each rate, rad/s; None without rates. It is not a field of the tape because
-    the compiler omits the code for rates only if an argument is None. The `room` receives the section, in row `PROBE`
-    of the axis, and the overlaps with the bands of the measurements up to the one that makes it empty.
+    event. The workspace receives the section, in row `PROBE` of the axis, and the overlaps with the bands of the
+    measurements up to the one that makes it empty.
+
+    `errors` are those of the history. They are an argument because the compiler omits the code for rates, which is most
+    of it, only if an argument is None.
     """
-    kinds, values, applies, events, nearest, farthest = tape
-    right, left = chains_of(room.records, ROWS * law.channel + PROBE)
-    rings, points, window = room.rings, room.points, (nearest, farthest)
+    kinds, applies, points = past.log.kinds, past.room.applies, past.room.points
+    values, overlaps = past.room.values, past.room.overlaps[law.channel]
+    own = values[law.channel]
+    section = replayed_section(past, law.channel, PROBE, label)
     first, elapsed, sight = done
-    own, overlaps = values[law.channel], room.overlaps[law.channel]
     if first == 0:
-        start_section(right, left, rings, label, law)
-    for event in range(first, events):
+        start_section(section, law)
+    for event in range(first, until):
         if kinds[event] == PREDICTION:
-            if chains.is_crowded(right, left):
-                chains.reduce_outward(right, left, rings, time_to_go(label, elapsed, law), points)
+            if chains.is_crowded(section):
+                chains.reduce_outward(section, time_to_go(label, elapsed, law), points)
             elapsed += 1
-            predict_section(right, left, rings, label, elapsed, law)
+            predict_section(section, elapsed, law)
         elif not applies[event]:
             continue
         elif kinds[event] == ANGLE:
-            living, overlaps[event] = measure_section(
-                right, left, rings, label, elapsed, own[event], across_of(values, event, law), law
-            )
+            living, overlaps[event] = measure_section(section, elapsed, own[event], across_of(values, event, law), law)
             if not living:
                 return event, done
         elif kinds[event] == IMPULSE:
-            shift_section(right, left, label, elapsed, own[event], across_of(values, event, law), law)
+            shift_section(section, elapsed, own[event], across_of(values, event, law), law)
         elif kinds[event] == WIDENING:
-            widen_section(right, left, label, elapsed, law)
+            widen_section(section, elapsed, law)
         elif errors is not None:
-            # Not compiled for histories without rates: this branch is most of the code.
-            living, overlaps[event] = measure_rate_section(
-                right, left, rings, label, elapsed, own[event], errors[event], sight, window, law, points
-            )
+            rate = Rate(own[event], errors[event], sight, past.nearest, past.farthest)
+            living, overlaps[event] = measure_rate_section(section, elapsed, rate, law, points)
             if not living:
                 return event, done
         if errors is not None:
             sight = sight_after(sight, kinds[event], own[event], across_of(values, event, law), applies[event], law)
-    return ALIVE, Replayed(events, elapsed, sight)
+    return ALIVE, Replayed(until, elapsed, sight)
 
 
 @allocation_free
-def run(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom) -> tuple[int, float, int]:
+def run(label: float, past: Past) -> tuple[int, float, int]:
     """Replay a label along all axes; return the event at which it became empty, or ALIVE, the overlap, m, and its axis.
 
     A label becomes empty with the first of its axes. If several become empty at one event, the minimum overlap counts.
     """
     died, overlap, emptied = ALIVE, 0.0, 0
-    kinds, values, applies, events, nearest, farthest = tape
-    for channel in range(laws.shape[0]):
+    for channel in range(past.laws.shape[0]):
         # Later events of a label that is empty along one axis do not matter.
-        part = Tape(kinds, values, applies, events if died == ALIVE else died + 1, nearest, farthest)
-        died_here, _ = replay(AT_START, label, part, errors, law_of(laws, channel), room)
+        until = past.log.number if died == ALIVE else died + 1
+        died_here, _ = replay(AT_START, label, until, past, past.errors, law_of(past.laws, channel))
         if died_here != ALIVE:
-            overlap_here = room.overlaps[channel, died_here]
+            overlap_here = past.room.overlaps[channel, died_here]
             if died_here != died or overlap_here < overlap:
                 overlap, emptied = overlap_here, channel
             died = died_here
@@ -212,30 +228,29 @@ def run(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: Repla
 
 
 @allocation_free
-def probe(
-    known: Records, i: int, label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom
-) -> bool:
+def probe(known: Records, i: int, label: float, past: Past) -> bool:
     """Replay a label and write it to record `i`; return whether it lives."""
-    died, overlap, emptied = run(label, tape, errors, laws, room)
+    died, overlap, emptied = run(label, past)
     known[i].label, known[i].died, known[i].overlap, known[i].emptied = label, died, overlap, emptied
     return died == ALIVE
 
 
 @allocation_free
-def keep_section(room: ReplayRoom, row: int) -> None:
+def keep_section(past: Past, row: int) -> None:
     """Copy the sections of the last replay to a row of the workspace."""
-    for first in range(0, ROWS * room.overlaps.shape[0], ROWS):
-        copy_section(room.records, room.rings, first + PROBE, room.records, room.rings, first + row)
+    chains = past.room.chains
+    for channel in range(past.laws.shape[0]):
+        copy_section(chains, ROWS * channel + PROBE, chains, ROWS * channel + row)
 
 
 @allocation_free
-def keep_living(room: Workspace, events: int, row: int) -> None:
+def keep_living(past: Past, row: int) -> None:
     """Copy sections and overlaps of the last replay to those of the living label."""
-    keep_section(room.replays, row)
-    overlaps = room.replays.overlaps
+    keep_section(past, row)
+    overlaps = past.room.overlaps
     for channel in range(overlaps.shape[0]):
-        for event in range(events):
-            room.living_overlaps[channel, event] = overlaps[channel, event]
+        for event in range(past.log.number):
+            past.room.living_overlaps[channel, event] = overlaps[channel, event]
 
 
 @allocation_free
@@ -255,45 +270,34 @@ def margins_along(
     axis, m/s and m.
     """
     margins, reaches = np.empty(v.shape), np.empty(v.shape)
-    room = replay_room(len(laws), history.events)
-    margins_all(labels, looks, v, z, history.tapes, history.errors_if_any, laws, room, margins, reaches)
+    margins_all(labels, looks, v, z, past_of(history, laws), margins, reaches)
     return margins, reaches
 
 
 @entry
 def margins_all(
-    labels: Floats,
-    looks: Integers,
-    v: Floats,
-    z: Floats,
-    tapes: Tapes,
-    errors: Floats | None,
-    laws: Laws,
-    room: ReplayRoom,
-    margins: Floats,
-    reaches: Floats,
+    labels: Floats, looks: Integers, v: Floats, z: Floats, past: Past, margins: Floats, reaches: Floats
 ) -> None:
     """Write the results of `margins_along`."""
     for b in range(labels.shape[0]):
-        label, tape = labels[b], tape_of(tapes, b, room.values, room.applies)
-        for channel in range(laws.shape[0]):
-            law = law_of(laws, channel)
-            right, left = chains_of(room.records, ROWS * channel + PROBE)
+        label = labels[b]
+        select(past, b)
+        for channel in range(past.laws.shape[0]):
+            law, section = law_of(past.laws, channel), replayed_section(past, channel, PROBE, label)
             died, done = ALIVE, AT_START
             for look in range(looks.shape[0]):
                 if died == ALIVE:
-                    part = Tape(tape.kinds, tape.values, tape.applies, looks[look], tape.nearest, tape.farthest)
-                    died, done = replay(done, label, part, errors, law, room)
+                    died, done = replay(done, label, looks[look], past, past.errors, law)
                 if died == ALIVE:
                     tau = time_to_go(label, done.elapsed, law)
-                    state = v[channel, look, b], z[channel, look, b]
-                    margins[channel, look, b] = chains.margin_in(right, left, room.rings, tau, *state)
+                    margins[channel, look, b] = chains.margin_in(section, tau, v[channel, look, b], z[channel, look, b])
                 else:
-                    margins[channel, look, b] = room.overlaps[channel, died]
-                reaches[channel, look, b] = right.reach
+                    margins[channel, look, b] = past.room.overlaps[channel, died]
+                reaches[channel, look, b] = section.right.reach
 
 
 @entry
-def replay_label(label: float, tape: Tape, errors: Floats | None, laws: Laws, room: ReplayRoom) -> int:
-    """Replay a label from Python; return the event at which it became empty, or ALIVE."""
-    return run(label, tape, errors, laws, room)[0]
+def replay_label(label: float, b: int, past: Past) -> int:
+    """Replay a label of an engagement from Python; return the event at which it became empty, or ALIVE."""
+    select(past, b)
+    return run(label, past)[0]

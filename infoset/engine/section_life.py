@@ -10,13 +10,14 @@ Therefore `replays` computes the section at any label exactly, with the function
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from infoset._compile import ZERO, allocation_free, inlined
 from infoset.arrays import Floats
 from infoset.engine import chains
-from infoset.engine.chains import Chain
+from infoset.engine.chains import SectionView
 from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, LastSight
 from infoset.engine.section_law import SectionLaw
 
@@ -45,14 +46,13 @@ def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
 
 
 @allocation_free
-def start_section(right: Chain, left: Chain, rings: Floats, label: float, law: SectionLaw) -> None:
+def start_section(section: SectionView, law: SectionLaw) -> None:
     """Write the section at t = 0.
 
     The rectangle is that of the paper (section 4), but with V_x at the end of its interval that makes the rectangle
     larger. The printed formula always takes the lower end; both agree if z can have either sign.
     """
-    x = label
-    e = law.closing_speed
+    x, e = section.label, law.closing_speed
     z_min, z_max = law.z_min, law.z_max
     shift_at_min = shift_at_max = 0.0
     lowest, highest = law.vz_min, law.vz_max
@@ -61,17 +61,15 @@ def start_section(right: Chain, left: Chain, rings: Floats, label: float, law: S
         highest -= min(law.vx_min * z_max, law.vx_max * z_max) / x
         shift_at_min, shift_at_max = -e * math.atan(z_min / x), -e * math.atan(z_max / x)
         z_min, z_max = math.atan(z_min / x) * x, math.atan(z_max / x) * x
-    tau = time_to_go(label, ZERO, law)
+    tau = time_to_go(x, ZERO, law)
     chains.start(
-        right,
-        left,
-        rings,
+        section,
         tau,
         (lowest + shift_at_min, highest + shift_at_min, z_min),
         (lowest + shift_at_max, highest + shift_at_max, z_max),
     )
     if law.half_v_at_start > 0.0:
-        chains.spread(right, left, tau, law.half_v_at_start)
+        chains.spread(section, tau, law.half_v_at_start)
 
 
 @inlined
@@ -164,26 +162,19 @@ def linear_slope_band(alpha: float, across: float, travelled: float, x: float, l
 
 @inlined
 def measure_section(
-    right: Chain,
-    left: Chain,
-    rings: Floats,
-    label: float,
-    elapsed: int,
-    alpha: float,
-    across: float,
-    law: SectionLaw,
+    section: SectionView, elapsed: int, alpha: float, across: float, law: SectionLaw
 ) -> tuple[bool, float]:
-    """Cut a section by an angle measurement; return what `chains.cut` does. `across` is the angle of the other
-    axis.
+    """Cut a section by an angle measurement; return what `chains.cut` does. `across` is the angle of the other axis.
 
     The band is widened by 16 ulp, so that rounding does not exclude true states on the border, which extremal noise
     produces. The ulp is that of the terms of a height and does not decrease with the range.
     """
+    label = section.label
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = slope_band(alpha, across, law.closing_speed * (law.step * elapsed), x, law)
-    slack = CUT_SLACK * (label * (abs(alpha) + bound) + right.reach * (label / law.closing_speed))
-    return chains.cut(right, left, rings, x / law.closing_speed, x * lower - slack, x * upper + slack)
+    slack = CUT_SLACK * (label * (abs(alpha) + bound) + section.right.reach * (label / law.closing_speed))
+    return chains.cut(section, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
 
 @inlined
@@ -224,17 +215,29 @@ def across_of(values: Floats, i: int, law: SectionLaw) -> float:
     return values[law.other, i] if law.other >= 0 else 0.0
 
 
+class Rate(NamedTuple):
+    """A measured rate of the line of sight along one axis.
+
+    Parameters
+    ----------
+    omega, error : float
+        The rate and its error bound, rad/s.
+    sight : LastSight
+        The last angle before it.
+    nearest, farthest : float
+        Window of labels, m, over which the band is convex. The empty window, from infinity to minus infinity, makes the
+        window of each label the label itself.
+    """
+
+    omega: float
+    error: float
+    sight: LastSight
+    nearest: float
+    farthest: float
+
+
 @allocation_free
-def rate_band(
-    label: float,
-    near_label: float,
-    far_label: float,
-    elapsed: int,
-    omega: float,
-    error: float,
-    sight: LastSight,
-    law: SectionLaw,
-) -> tuple[float, float]:
+def rate_band(label: float, elapsed: int, rate: Rate, law: SectionLaw) -> tuple[float, float]:
     """Return the bounds of z + V x_c/e, m, that agree with a measured rate; x_c is the middle of a window of labels.
 
     On the window the lower bound is a convex function of the label and the upper one is concave. Sets that are cut by
@@ -249,9 +252,9 @@ def rate_band(
     m x_jc/x_j lies between (omega -+ error) times x^2 x_jc/(e x_j), a convex function of x. Its chord replaces it in
     the bound that needs a concave function. The band of alpha_j bounds the second term. See docs/guarantee.md.
     """
-    e = law.closing_speed
+    e, omega, error, sight = law.closing_speed, rate.omega, rate.error, rate.sight
     travelled = label - range_of(label, elapsed, law)
-    x, near, far = label - travelled, near_label - travelled, far_label - travelled
+    x, near, far = label - travelled, min(label, rate.nearest) - travelled, max(label, rate.farthest) - travelled
     ago = law.step * sight.steps
     then = e * ago
     near_then, far_then = near + then, far + then
@@ -300,81 +303,60 @@ def scaled_square(x: float, middle: float, then: float) -> float:
 
 @allocation_free
 def measure_rate_section(
-    right: Chain,
-    left: Chain,
-    rings: Floats,
-    label: float,
-    elapsed: int,
-    omega: float,
-    error: float,
-    sight: LastSight,
-    window: tuple[float, float],
-    law: SectionLaw,
-    points: Floats,
+    section: SectionView, elapsed: int, rate: Rate, law: SectionLaw, points: Floats
 ) -> tuple[bool, float]:
     """Cut a section by a line-of-sight rate, which is a band of the predicted miss omega x^2 / e.
 
     Return what `chains.cut` does, with the overlap in metres of predicted miss.
     """
-    near, far = min(label, window[0]), max(label, window[1])
-    lower, upper = rate_band(label, near, far, elapsed, omega, error, sight, law)
+    label = section.label
+    near, far = min(label, rate.nearest), max(label, rate.farthest)
+    lower, upper = rate_band(label, elapsed, rate, law)
     # The band bounds z + V x_c/e = m + V tilt.
     tau, tilt = time_to_go(label, elapsed, law), (0.5 * (near + far) - label) / law.closing_speed
-    if chains.is_crowded(right, left):
-        chains.reduce_outward(right, left, rings, tau, points)
-    slack = CUT_SLACK * (label * (abs(omega) + error) + right.reach) * (label / law.closing_speed)
+    if chains.is_crowded(section):
+        chains.reduce_outward(section, tau, points)
+    slack = CUT_SLACK * (label * (abs(rate.omega) + rate.error) + section.right.reach) * (label / law.closing_speed)
     # The section already contains the first half of the next step's disturbance, which does not commute with the cut.
     slack += (tau + tilt) * law.half_v_at_start
-    return chains.cut_misses(right, left, rings, tau, tilt, lower - slack, upper + slack, points)
+    return chains.cut_misses(section, tau, tilt, lower - slack, upper + slack, points)
 
 
 @inlined
-def widen_section(right: Chain, left: Chain, label: float, elapsed: int, law: SectionLaw) -> None:
+def widen_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
     """Enlarge a section by the error bound b of one angle measurement: by e b in V, or x b in the predicted miss."""
-    x = range_of(label, elapsed, law)
+    x = range_of(section.label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x + law.centroid_error / x
-    chains.spread(right, left, x / law.closing_speed, law.closing_speed * bound)
+    chains.spread(section, x / law.closing_speed, law.closing_speed * bound)
 
 
 @inlined
-def shift_section(
-    right: Chain, left: Chain, label: float, elapsed: int, impulse: float, across: float, law: SectionLaw
-) -> None:
+def shift_section(section: SectionView, elapsed: int, impulse: float, across: float, law: SectionLaw) -> None:
     """Shift a section by an impulse: V becomes V - k, for all k within the error bound of the commanded impulse.
 
     `across` is the impulse along the other axis.
     """
-    tau, doubt = time_to_go(label, elapsed, law), impulse_doubt(impulse, across, law)
-    chains.shift(right, left, tau, -impulse)
+    tau, doubt = time_to_go(section.label, elapsed, law), impulse_doubt(impulse, across, law)
+    chains.shift(section, tau, -impulse)
     if law.impulse_error > 0.0 or law.pointing_across > 0.0:
-        chains.spread(right, left, tau, doubt)
+        chains.spread(section, tau, doubt)
 
 
 @inlined
-def predict_section(right: Chain, left: Chain, rings: Floats, label: float, elapsed: int, law: SectionLaw) -> None:
+def predict_section(section: SectionView, elapsed: int, law: SectionLaw) -> None:
     """Move a section to step `elapsed`: the level turns, and the segment of the disturbance, 8 ulp longer, is added."""
-    tau = time_to_go(label, elapsed, law)
-    chains.turn(right, left, rings, tau + law.disturbance_lead)
-    chains.spread(right, left, tau + law.disturbance_lead, law.half_v + SUM_SLACK * right.reach)
+    tau = time_to_go(section.label, elapsed, law)
+    chains.turn(section, tau + law.disturbance_lead)
+    chains.spread(section, tau + law.disturbance_lead, law.half_v + SUM_SLACK * section.right.reach)
     if law.disturbance_lead > 0.0:
-        chains.turn(right, left, rings, tau)
+        chains.turn(section, tau)
 
 
 @inlined
-def summarise_section(
-    right: Chain,
-    left: Chain,
-    rings: Floats,
-    label: float,
-    elapsed: int,
-    law: SectionLaw,
-    summaries: Floats,
-    b: int,
-    s: int,
-) -> None:
+def summarise_section(section: SectionView, elapsed: int, law: SectionLaw, summaries: Floats, b: int, s: int) -> None:
     """Write the extremes (13), (14) of the predicted miss of a section, those of z + V x/e -+ nu/2 (x/e)^2."""
-    tau = time_to_go(label, elapsed, law)
-    upper, lower = chains.max_and_min_miss(right, left, rings, tau)
+    tau = time_to_go(section.label, elapsed, law)
+    upper, lower = chains.max_and_min_miss(section, tau)
     drift = 0.5 * law.disturbance * tau * tau
     summaries[law.channel, b, s, UPPER_MISS] = upper + drift
     summaries[law.channel, b, s, LOWER_MISS] = lower - drift

@@ -7,11 +7,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset._compile import ZERO, allocation_free, entry, inlined, record_of
+from infoset._compile import ZERO, allocation_free, constants, entry, inlined, pasted, record_of
 from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chain_storage, chains
-from infoset.engine.chain_storage import chains_of
-from infoset.engine.history import LastSight, Tapes
+from infoset.engine.chain_storage import Chains, view_of
+from infoset.engine.chains import SectionView
+from infoset.engine.history import EventLog, LastSight
 from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
     ALIVE,
@@ -21,6 +22,7 @@ from infoset.engine.section_life import (
     UPPER_MISS,
     Z_MAX,
     Z_MIN,
+    Rate,
     across_of,
     impulse_doubt,
     measure_rate_section,
@@ -36,6 +38,10 @@ from infoset.engine.section_life import (
 )
 
 TIE_TOLERANCE = 1e-9
+
+MOVED, SUMMARISED, WITH_HEIGHTS = constants(3)
+"""What `step_all` brings up to date: sections, and with each further value also summaries, and their columns of z."""
+NO_EVENT = -1
 
 
 class Slot(Protocol):
@@ -74,19 +80,22 @@ class Sections(NamedTuple):
         The slots in use are first, with increasing labels.
     used : ndarray of int, shape (B,)
         Number of slots in use.
-    records, rings : ndarray
-        The polygons, stored as in `chain_storage`: slot s of engagement b is section (c B + b) S + s for axis c.
+    chains : Chains
+        The polygons: slot s of engagement b is section (c B + b) S + s for axis c.
     summaries : ndarray, shape (C, B, S, columns)
         Extremes of the predicted miss and of z, m.
+    behind, stale : ndarray of bool, shape (B,)
+        Engagements with sections one step behind the present one, and those with summaries out of date.
     rows : ndarray of int, shape (B S, 3)
         Working array for a list of sections: row, engagement and slot.
     """
 
     slots: NDArray[np.record]
     used: Integers
-    records: chain_storage.Records
-    rings: Floats
+    chains: Chains
     summaries: Floats
+    behind: Flags
+    stale: Flags
     rows: Integers
 
 
@@ -94,13 +103,13 @@ def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections
     """Allocate the arrays of a batch of sections for a number of axes."""
     slots = np.zeros(labels.shape, dtype=record_of(Slot))
     slots["label"], slots["died"] = labels, ALIVE
-    records, rings = chain_storage.empty_sections(channels * labels.size, chain_storage.ROOM_AT_START)
     return Sections(
         slots=slots,
         used=used,
-        records=records,
-        rings=rings,
+        chains=chain_storage.empty_sections(channels * labels.size, chain_storage.ROOM_AT_START),
         summaries=np.zeros((channels, *labels.shape, SUMMARY_COLUMNS)),
+        behind=np.zeros(len(labels), dtype=bool),
+        stale=np.ones(len(labels), dtype=bool),
         rows=np.empty((labels.size, 3), dtype=np.int64),
     )
 
@@ -111,18 +120,21 @@ def row_of(sections: Sections, channel: int, b: int, s: int) -> int:
     return int((channel * sections.slots.shape[0] + b) * sections.slots.shape[1] + s)
 
 
+@pasted
+def section_of(sections: Sections, channel: int, b: int, s: int) -> SectionView:
+    """Return the section of a slot along an axis."""
+    return view_of(sections.chains, row_of(sections, channel, b, s), sections.slots[b, s].label)
+
+
 @entry
 def start_all(sections: Sections, laws: Laws) -> None:
     """Write the initial sections of a batch, without their summaries."""
-    slots, used = sections.slots, sections.used
-    records, rings = sections.records, sections.rings
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
-        for b in range(len(used)):
-            for s in range(used[b]):
-                right, left = chains_of(records, row_of(sections, channel, b, s))
-                start_section(right, left, rings, slots[b, s].label, law)
-                slots[b, s].living = True
+        for b in range(len(sections.used)):
+            for s in range(sections.used[b]):
+                start_section(section_of(sections, channel, b, s), law)
+                sections.slots[b, s].living = True
 
 
 @inlined
@@ -136,7 +148,7 @@ def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool
 
 
 @inlined
-def bury(slot: Slot, channel: int, event: int, overlap: float) -> int:
+def mark_empty(slot: Slot, channel: int, event: int, overlap: float) -> int:
     """Note that an event has made a section empty; return 1 if the label lived until now, else 0."""
     lived = slot.living
     if lived or overlap < slot.overlap:
@@ -148,14 +160,12 @@ def bury(slot: Slot, channel: int, event: int, overlap: float) -> int:
 
 
 @allocation_free
-def list_rows(
-    channel: int, event: int, first: Flags, second: Flags, third: Flags, every: bool, sections: Sections
-) -> int:
-    """List the sections of an axis in any of three groups of engagements, or in all; return their number."""
-    used, rows = sections.used, sections.rows
+def list_rows(channel: int, event: int, measured: Flags, wanted: int, sections: Sections) -> int:
+    """List the sections of an axis that `step_all` changes; return their number."""
+    used, rows, behind, stale = sections.used, sections.rows, sections.behind, sections.stale
     count = 0
     for b in range(len(used)):
-        if first[b] or second[b] or third[b] or every:
+        if behind[b] or measured[b] or (stale[b] and wanted >= SUMMARISED) or wanted == WITH_HEIGHTS:
             for s in range(used[b]):
                 if is_cut(sections, channel, event, b, s):
                     rows[count, 0], rows[count, 1], rows[count, 2] = row_of(sections, channel, b, s), b, s
@@ -165,55 +175,51 @@ def list_rows(
 
 @entry
 def step_all(
-    behind: Flags,
-    measured: Flags,
-    stale: Flags,
-    heights_wanted: bool,
-    alpha: Floats,
-    elapsed: int,
-    event: int,
-    sections: Sections,
-    laws: Laws,
+    measured: Flags, alpha: Floats, event: int, elapsed: int, wanted: int, sections: Sections, laws: Laws
 ) -> int:
     """Predict, cut and summarise the living sections in one pass; return the number of labels that became empty.
 
-    Sections of engagements that are `behind` are at step `elapsed` - 1 and are moved to step `elapsed`. Those that are
-    `measured` are cut by an angle, `alpha` of shape (C, B), rad, and summarised; those that are `stale` are summarised.
-    `event` is the number of the measurement, -1 without one. `heights_wanted` writes the minimum and the maximum z of
-    all sections.
+    Sections that are behind are moved to the present step `elapsed`. Those of the engagements that are `measured`,
+    shape (B,), are cut by angles `alpha`, shape (C, B), rad, and summarised. `event` is the number of the measurement,
+    `NO_EVENT` without one. `wanted` is what is brought up to date besides: `MOVED`, `SUMMARISED` or `WITH_HEIGHTS`.
     """
     deaths = 0
-    slots, summaries, rows = sections.slots, sections.summaries, sections.rows
-    records, rings = sections.records, sections.rings
+    slots, summaries, rows, behind, stale = (
+        sections.slots,
+        sections.summaries,
+        sections.rows,
+        sections.behind,
+        sections.stale,
+    )
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
-        count = list_rows(channel, event, behind, measured, stale, heights_wanted, sections)
+        count = list_rows(channel, event, measured, wanted, sections)
         for k in range(count):
             b, s = rows[k, 1], rows[k, 2]
             slot = slots[b, s]
-            right, left = chains_of(records, rows[k, 0])
+            section = view_of(sections.chains, rows[k, 0], slot.label)
             if behind[b]:
-                predict_section(right, left, rings, slot.label, elapsed, law)
+                predict_section(section, elapsed, law)
             if measured[b]:
-                survives, overlap = measure_section(
-                    right, left, rings, slot.label, elapsed, alpha[channel, b], across_of(alpha, b, law), law
-                )
+                survives, overlap = measure_section(section, elapsed, alpha[channel, b], across_of(alpha, b, law), law)
                 if not survives:
-                    deaths += bury(slot, channel, event, overlap)
+                    deaths += mark_empty(slot, channel, event, overlap)
                 if not slot.living:
                     continue
-            if measured[b] or stale[b]:
-                summarise_section(right, left, rings, slot.label, elapsed, law, summaries, b, s)
-            if heights_wanted:
-                tau = time_to_go(slot.label, elapsed, law)
-                minimum, maximum = chains.heights(right, left, rings, tau)
+            if measured[b] or (stale[b] and wanted >= SUMMARISED):
+                summarise_section(section, elapsed, law, summaries, b, s)
+            if wanted == WITH_HEIGHTS:
+                minimum, maximum = chains.heights(section, time_to_go(slot.label, elapsed, law))
                 summaries[channel, b, s, Z_MIN] = minimum
                 summaries[channel, b, s, Z_MAX] = maximum
+    for b in range(len(behind)):
+        behind[b] = False
+        stale[b] = stale[b] and not measured[b] and wanted < SUMMARISED
     return deaths
 
 
 @allocation_free
-def follow_sight(tapes: Tapes, done: int, b: int, sights: Floats, law: SectionLaw) -> LastSight:
+def follow_sight(log: EventLog, done: int, b: int, sights: Floats, law: SectionLaw) -> LastSight:
     """Return the last sight of an engagement along an axis.
 
     `sights` contains the last sights after `done` events, shape (C, B, columns), and is updated.
@@ -228,10 +234,10 @@ def follow_sight(tapes: Tapes, done: int, b: int, sights: Floats, law: SectionLa
         sights[c, b, 5],
         sights[c, b, 6],
     )
-    for event in range(done, tapes.events):
-        values = tapes.values[event]
-        across, applies = across_of(values, b, law), tapes.applies[event, b]
-        sight = sight_after(sight, tapes.kinds[event], values[c, b], across, applies, law)
+    for event in range(done, log.number):
+        values = log.values[event]
+        across, applies = across_of(values, b, law), log.applies[event, b]
+        sight = sight_after(sight, log.kinds[event], values[c, b], across, applies, law)
     sights[c, b, 0] = 1.0 if sight.known else 0.0
     sights[c, b, 1], sights[c, b, 2], sights[c, b, 3] = sight.alpha, sight.across, sight.steps
     sights[c, b, 4], sights[c, b, 5], sights[c, b, 6] = sight.moved, sight.doubt, sight.fired
@@ -240,60 +246,38 @@ def follow_sight(tapes: Tapes, done: int, b: int, sights: Floats, law: SectionLa
 
 @entry
 def measure_rate_all(
-    active: Flags,
-    omega: Floats,
-    error: float,
-    elapsed: int,
-    event: int,
-    tapes: Tapes,
-    done: int,
-    sights: Floats,
-    sections: Sections,
-    laws: Laws,
-    points: Floats,
+    log: EventLog, error: float, done: int, sights: Floats, sections: Sections, laws: Laws, points: Floats
 ) -> int:
-    """Cut the living sections of the active engagements by rates and summarise them; return how many became empty.
+    """Cut the living sections by the rates of the latest event and summarise them; return how many became empty.
 
-    `omega` has the shape (C, B); `sights` contains the last sights after `done` events and is updated.
+    `error` is the error bound of the rates, rad/s; `sights` has the last sights after `done` events and is updated.
     """
     deaths = 0
     slots, used = sections.slots, sections.used
-    records, rings = sections.records, sections.rings
+    event = log.number - 1
+    active, omega = log.applies[event], log.values[event]
     for b in range(len(used)):
         for channel in range(laws.shape[0]):
             law = law_of(laws, channel)
-            sight = follow_sight(tapes, done, b, sights, law)
+            sight = follow_sight(log, done, b, sights, law)
+            rate = Rate(omega[channel, b], error, sight, np.inf, -np.inf)
             for s in range(used[b]):
                 if not (active[b] and is_cut(sections, channel, event, b, s)):
                     continue
-                slot = slots[b, s]
-                label = slot.label
-                right, left = chains_of(records, row_of(sections, channel, b, s))
-                survives, overlap = measure_rate_section(
-                    right,
-                    left,
-                    rings,
-                    label,
-                    elapsed,
-                    omega[channel, b],
-                    error,
-                    sight,
-                    (label, label),
-                    law,
-                    points,
-                )
+                section = section_of(sections, channel, b, s)
+                survives, overlap = measure_rate_section(section, log.elapsed, rate, law, points)
                 if not survives:
-                    deaths += bury(slot, channel, event, overlap)
-                if slot.living:
-                    summarise_section(right, left, rings, label, elapsed, law, sections.summaries, b, s)
+                    deaths += mark_empty(slots[b, s], channel, event, overlap)
+                if slots[b, s].living:
+                    summarise_section(section, log.elapsed, law, sections.summaries, b, s)
+        sections.stale[b] = sections.stale[b] and not active[b]
     return deaths
 
 
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Laws) -> None:
     """Shift the living sections of the active engagements and their summaries by impulses of shape (C, B)."""
-    slots, used = sections.slots, sections.used
-    records, summaries = sections.records, sections.summaries
+    slots, used, summaries = sections.slots, sections.used, sections.summaries
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
         for b in range(len(used)):
@@ -306,8 +290,7 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
                 slot = slots[b, s]
                 if not slot.living:
                     continue
-                right, left = chains_of(records, row_of(sections, channel, b, s))
-                shift_section(right, left, slot.label, elapsed, along, across, law)
+                shift_section(section_of(sections, channel, b, s), elapsed, along, across, law)
                 tau, error = time_to_go(slot.label, elapsed, law), impulse_doubt(along, across, law)
                 summaries[channel, b, s, UPPER_MISS] += (error - along) * tau
                 summaries[channel, b, s, LOWER_MISS] -= (error + along) * tau
@@ -324,7 +307,6 @@ def make_room_all(
     `MAX_ADDED` if a section must be reduced first; `widen` reduces those of the active engagements.
     """
     slots, used = sections.slots, sections.used
-    records, rings = sections.records, sections.rings
     floats = ZERO
     spare = chains.CAPACITY
     for channel in range(laws.shape[0]):
@@ -334,17 +316,16 @@ def make_room_all(
                 slot = slots[b, s]
                 if not slot.living:
                     continue
-                right, left = chains_of(records, row_of(sections, channel, b, s))
-                if widen and active[b] and chains.is_crowded(right, left):
-                    tau = time_to_go(slot.label, elapsed, law)
-                    chains.reduce_outward(right, left, rings, tau, points)
-                count, room = chains.count_of(right, left), chain_storage.room_of(right)
+                section = section_of(sections, channel, b, s)
+                if widen and active[b] and chains.is_crowded(section):
+                    chains.reduce_outward(section, time_to_go(slot.label, elapsed, law), points)
+                count, room = chains.count_of(section), chain_storage.room_of(section)
                 wanted = chain_storage.room_for(min(count + added, chains.CAPACITY), room)
                 if wanted > room and widen:
-                    chain_storage.widen_rings(right, left, rings, wanted)
+                    chain_storage.widen_rings(section, wanted)
                 elif wanted > room:
                     floats += 2 * chain_storage.floats_of(wanted)
-                spare = min(spare, chain_storage.room_of(right) - count)
+                spare = min(spare, chain_storage.room_of(section) - count)
     return floats, spare
 
 
@@ -358,7 +339,6 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
     that a mirrored engagement gives exactly mirrored results.
     """
     slots, used = sections.slots, sections.used
-    records, rings = sections.records, sections.rings
     for channel in range(laws.shape[0]):
         law, summaries = law_of(laws, channel), sections.summaries
         for b in range(len(used)):
@@ -376,8 +356,8 @@ def widest_all(elapsed: int, sections: Sections, laws: Laws, exists: Flags, ends
             exists[b] = True
             for end, s in ((0, lowest), (1, highest)):
                 tau, x = time_to_go(slots[b, s].label, elapsed, law), range_of(slots[b, s].label, elapsed, law)
-                right, left = chains_of(records, row_of(sections, channel, b, s))
-                points = chains.extreme_points(right, left, rings, tau, TIE_TOLERANCE, CUT_SLACK)
+                section = section_of(sections, channel, b, s)
+                points = chains.extreme_points(section, tau, TIE_TOLERANCE, CUT_SLACK)
                 v, m = points[1 - end]
                 alpha = (m - tau * v) / x
                 ends[channel, b, end, 0] = summaries[channel, b, s, LOWER_MISS + end]
@@ -428,10 +408,9 @@ def keep_labels_all(active: Flags, minimum: Floats, maximum: Floats, sections: S
 
 
 @entry
-def write_outline(records: chain_storage.Records, rings: Floats, n: int, tau: float, out: Floats) -> int:
+def write_outline(section: Chains, n: int, tau: float, out: Floats) -> int:
     """Call `chains.outline` from Python."""
-    right, left = chains_of(records, n)
-    return chains.outline(right, left, rings, tau, out)
+    return chains.outline(view_of(section, n, 0.0), tau, out)
 
 
 @entry

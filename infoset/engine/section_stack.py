@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,22 +13,7 @@ from infoset.engine import chain_storage, chains, section_life, section_passes
 from infoset.engine.chain_storage import Chains
 from infoset.engine.history import History
 from infoset.engine.section_law import SectionLaw, law_table
-from infoset.engine.section_passes import Sections
-
-NO_EVENT = -1
-
-
-class Freshness(IntEnum):
-    """Which parts of a stack are up to date. Each state includes those before it."""
-
-    BEHIND = 0
-    """Some sections are one step behind."""
-    MOVED = 1
-    """All sections are at the present step; some summaries are out of date."""
-    SUMMARISED = 2
-    """The extremes of the predicted miss are up to date."""
-    WITH_HEIGHTS = 3
-    """The minimum and the maximum z are up to date too."""
+from infoset.engine.section_passes import MOVED, NO_EVENT, SUMMARISED, WITH_HEIGHTS, Sections
 
 
 class SectionStack:
@@ -52,10 +36,7 @@ class SectionStack:
         self.laws = laws
         self.table = law_table(laws)
         self.sections = section_passes.room_for_sections(len(laws), labels, used.astype(np.int64))
-        self._none = np.zeros(self.batch, dtype=bool)
-        self._freshness = Freshness.MOVED
-        # Engagements with sections one step behind, and those with summaries out of date.
-        self._behind, self._stale = self._none, np.ones(self.batch, dtype=bool)
+        self._none, self._no_angles = np.zeros(self.batch, dtype=bool), np.empty((len(laws), 0))
         # Vertices that every section may still gain, and the present step.
         self._spare = self._elapsed = 0
         section_passes.start_all(self.sections, self.table)
@@ -84,36 +65,29 @@ class SectionStack:
     @property
     def summaries(self) -> Floats:
         """Summaries of the living sections, shape (C, B, S, columns). The columns of z may be out of date."""
-        self._summarise(Freshness.SUMMARISED)
+        self._summarise()
         return self.sections.summaries
 
     def extreme_angles(self, elapsed: int) -> Floats:
         """Return the extreme angles of the living sections in the format of `section_passes.extreme_angles_all`."""
         # The predicted misses are usually needed next: one pass computes both.
-        self._summarise(Freshness.WITH_HEIGHTS)
+        self._update(WITH_HEIGHTS)
         extremes = np.zeros((4, len(self.laws), self.batch))
         section_passes.extreme_angles_all(elapsed, self.sections, self.table, extremes)
         return extremes
 
-    def _summarise(self, wanted: Freshness) -> None:
-        """Update the sections and the summaries."""
-        if self._freshness < wanted:
-            self._update(self._stale, wanted is Freshness.WITH_HEIGHTS)
-            self._stale, self._freshness = self._none, wanted
+    def _summarise(self) -> None:
+        """Bring the sections and the predicted misses in their summaries up to date."""
+        if self.sections.stale.any():
+            self._update(SUMMARISED)
 
     def _catch_up(self) -> None:
         """Move the sections that are behind to the present step."""
-        if self._freshness is Freshness.BEHIND:
-            self._update(self._none, False)
-            self._freshness = Freshness.MOVED
+        if self.sections.behind.any():
+            self._update(MOVED)
 
-    def _update(self, stale: Flags, heights_wanted: bool) -> None:
-        """Move the sections that are behind, and summarise the stale ones."""
-        alpha = np.empty((len(self.laws), 0))
-        section_passes.step_all(
-            self._behind, self._none, stale, heights_wanted, alpha, self._elapsed, NO_EVENT, self.sections, self.table
-        )
-        self._behind = self._none
+    def _update(self, wanted: int) -> None:
+        section_passes.step_all(self._none, self._no_angles, NO_EVENT, self._elapsed, wanted, self.sections, self.table)
 
     def ranges(self, elapsed: int) -> Floats:
         """Return the range of every slot after a number of steps, m, shape (B, S)."""
@@ -131,17 +105,21 @@ class SectionStack:
         make_room = section_passes.make_room_all
         floats, spare = make_room(active, chain_storage.ROOM_AHEAD, elapsed, self.sections, self.table, points, False)
         if floats or spare < chains.MAX_ADDED:
-            self.sections = self.sections._replace(rings=chain_storage.with_room(self.sections.rings, floats))
+            self._add_room(floats)
             _, spare = make_room(active, chain_storage.ROOM_AHEAD, elapsed, self.sections, self.table, points, True)
         self._spare = spare - chains.MAX_ADDED
+
+    def _add_room(self, floats: int) -> None:
+        """Allocate `floats` more floats of the rings."""
+        records, rings = self.sections.chains
+        self.sections = self.sections._replace(chains=Chains(records, chain_storage.with_room(rings, floats)))
 
     def make_room_for_new(self, wanted: Flags, number: int) -> None:
         """Allocate room for `number` sections of any size in each of the wanted engagements."""
         self._catch_up()
-        self._freshness = min(self._freshness, Freshness.SUMMARISED)
         new = number * int(np.count_nonzero(wanted)) * len(self.laws)
         floats = 2 * (2 * chains.CAPACITY + chain_storage.LINE) * new
-        self.sections = self.sections._replace(rings=chain_storage.with_room(self.sections.rings, floats))
+        self._add_room(floats)
 
     def note_new(self, spare: int) -> None:
         """Register new sections, each of which may gain at least `spare` vertices."""
@@ -151,43 +129,15 @@ class SectionStack:
     def _min_label(self) -> float:
         return float(np.where(self.living, self.labels, np.inf).min())
 
-    def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
-        """Cut the living sections by angles of shape (C, B), rad; return the number of labels that became empty."""
-        deaths = section_passes.step_all(
-            self._behind, active, self._none, False, alpha, elapsed, event, self.sections, self.table
-        )
-        self._behind = self._none
-        self._set_summarised(active)
-        return deaths
-
-    def measure_rate(
-        self, active: Flags, omega: Floats, error: float, elapsed: int, event: int, history: History
-    ) -> int:
-        """Cut the living sections by rates of shape (C, B), rad/s; return the number of labels that became empty."""
+    def measure_rate(self, error: float, history: History) -> int:
+        """Cut the living sections by the rates of the latest event; return the number of labels that became empty."""
         self._catch_up()
-        self._make_room(active)
+        self._make_room(history.applies[history.events - 1])
         deaths = section_passes.measure_rate_all(
-            active,
-            omega,
-            error,
-            elapsed,
-            event,
-            history.tapes,
-            history.seen,
-            history.sights,
-            self.sections,
-            self.table,
-            chain_storage.working_room(),
+            history.log, error, history.seen, history.sights, self.sections, self.table, chain_storage.working_room()
         )
         history.seen = history.events
-        self._set_summarised(active)
         return deaths
-
-    def _set_summarised(self, active: Flags) -> None:
-        """Register that a cut has updated the summaries of the active engagements, except the heights."""
-        if self._freshness < Freshness.SUMMARISED:
-            self._stale = self._stale & ~active
-        self._freshness = Freshness.MOVED if self._stale.any() else Freshness.SUMMARISED
 
     def shift(self, active: Flags, impulse: Floats, elapsed: int) -> None:
         """Shift the living sections and their summaries by impulses of shape (C, B), m/s."""
@@ -201,9 +151,8 @@ class SectionStack:
         """
         self._catch_up()
         self._make_room(active)
-        self._behind = active.copy()
-        self._stale = self._stale | active if self._freshness < Freshness.SUMMARISED else self._behind
-        self._freshness = Freshness.BEHIND
+        self.sections.behind[:] = active
+        self.sections.stale[active] = True
         self._elapsed = elapsed
 
     def keep_labels(self, minimum: Floats, maximum: Floats, active: Flags) -> tuple[Flags, int]:
@@ -216,7 +165,7 @@ class SectionStack:
 
         `pending` are later impulses that count as given: time from now, s, and impulse, m/s, shape (C, B).
         """
-        self._summarise(Freshness.SUMMARISED)
+        self._summarise()
         exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((len(self.laws), self.batch, 2, 4))
         sections = self.sections
         if pending:
@@ -238,16 +187,15 @@ class SectionStack:
         """Return the vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
         self._catch_up()
         row = (channel * self.batch + engagement) * self.labels.shape[1] + slot
-        section = Chains(self.sections.records, self.sections.rings)
-        return outline(section, row, float(self.labels[engagement, slot]), elapsed, self.law)
+        return outline(self.sections.chains, row, float(self.labels[engagement, slot]), elapsed, self.law)
 
     def copy(self) -> SectionStack:
         """Return an independent copy."""
         twin = copy.copy(self)
-        arrays = {name: array.copy() for name, array in self.sections._asdict().items() if name != "rings"}
-        twin.sections = Sections(
-            **arrays, rings=chain_storage.copy_of_rings(self.sections.rings, self.sections.rings.size)
-        )
+        records, rings = self.sections.chains
+        arrays = {name: array.copy() for name, array in self.sections._asdict().items() if name != "chains"}
+        chains = Chains(records.copy(), chain_storage.copy_of_rings(rings, rings.size))
+        twin.sections = Sections(**arrays, chains=chains)
         return twin
 
 
@@ -264,4 +212,4 @@ def outline(section: Chains, row: int, label: float, elapsed: int, law: SectionL
     """Return the vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
     points = chain_storage.working_room()
     time_to_go = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
-    return points[: section_passes.write_outline(*section, row, time_to_go, points)].copy()
+    return points[: section_passes.write_outline(section, row, time_to_go, points)].copy()

@@ -9,7 +9,7 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.engine.guaranteed_miss import GuaranteedMiss
 from infoset.engine.history import History
 from infoset.engine.location import refine_all
-from infoset.engine.replays import workspace
+from infoset.engine.replays import past_of
 from infoset.engine.section_stack import SectionStack
 from infoset.model import SetModel
 
@@ -64,18 +64,9 @@ class SetState:
         """Replace the sections of the wanted engagements by a grid over their living labels, found by replay."""
         stack, history = self.stack, self.history
         stack.make_room_for_new(wanted, sections)
-        spare = refine_all(
-            wanted,
-            sections,
-            history.elapsed,
-            self.lower_label,
-            self.upper_label,
-            history.tapes,
-            history.errors_if_any,
-            stack.sections,
-            stack.table,
-            workspace(len(stack.laws), history.events, stack.labels.shape[1]),
-        )
+        limits = self.lower_label, self.upper_label
+        past = past_of(history, stack.table, stack.labels.shape[1])
+        spare = refine_all(wanted, sections, limits, past, stack.sections)
         stack.note_new(spare)
 
     def copy(self) -> SetState:

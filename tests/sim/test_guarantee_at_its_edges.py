@@ -19,6 +19,7 @@ from infoset.arrays import Floats
 from infoset.engine import section_life
 from infoset.engine.history import LastSight
 from infoset.engine.section_law import BOUND_SLACK, SectionLaw, section_laws
+from infoset.engine.section_life import Rate
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
@@ -157,19 +158,18 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     if abs(v) + size + law.disturbance * time > 300.0 or abs(z_then) > 1e4:
         return
     middle = 0.5 * (near + far) - e * step * elapsed
-    lower, upper = rate_band(label, near, far, elapsed, omega, rate_error, sight, law)
+    rate = Rate(omega, rate_error, sight, near, far)
+    lower, upper = rate_band(label, elapsed, rate, law)
     value = z + v_now * middle / e
     rounding = 1e-9 * (abs(value) + abs(lower) + abs(upper) + 1.0)
     assert lower - rounding <= value <= upper + rounding
-    bounds = np.array(
-        [rate_band(each, near, far, elapsed, omega, rate_error, sight, law) for each in np.linspace(near, far, 9)]
-    )
+    bounds = np.array([rate_band(each, elapsed, rate, law) for each in np.linspace(near, far, 9)])
     bend = np.diff(bounds, n=2, axis=0)
     assert (bend[:, 0] >= -rounding).all()
     assert (bend[:, 1] <= rounding).all()
     if ago == 0:
         # A window of one label has nothing but the rate itself: its band is as wide as the sensor's error.
-        alone = rate_band(label, label, label, elapsed, omega, rate_error, sight, law)
+        alone = rate_band(label, elapsed, rate._replace(nearest=label, farthest=label), law)
         assert alone[1] - alone[0] <= 1.01 * 2.0 * (abs(omega) * 0.01 + rate_error) * x**2 / e
 
 

@@ -29,7 +29,7 @@ import infoset.engine.chain_storage
 import infoset.engine.chains
 from infoset.arrays import Floats
 from infoset.engine.chain_storage import FIRST_RING, TAKEN
-from infoset.engine.chains import CAPACITY
+from infoset.engine.chains import CAPACITY, SectionView
 from tests.infoset.geometry.test_polygon_oracle import AXES, Exact, dot, exact_clip, hull, outside_by
 from tests.kernels import callable_kernels
 from tests.rationals import Fraction
@@ -101,7 +101,7 @@ class Section:
         self.chains = chain_storage.empty_sections(3, room)
         self.chains.rings[FIRST_RING:] = 0.0
         self.tau = tau
-        chains.start(*self.parts, tau, bottom, top)
+        chains.start(self.view, tau, bottom, top)
 
     @property
     def sides(self) -> tuple[Any, Any]:
@@ -109,27 +109,27 @@ class Section:
         return self.chains.records[2 * ROW], self.chains.records[2 * ROW + 1]
 
     @property
-    def parts(self) -> tuple[Any, Any, Floats]:
-        return *self.sides, self.chains.rings
+    def view(self) -> SectionView:
+        return SectionView(*self.sides, self.chains.rings, 0.0)
 
     def turn(self, tau: float) -> None:
         self.tau = tau
-        chains.turn(*self.parts, tau)
+        chains.turn(self.view, tau)
 
     def spread(self, half_v: float) -> None:
-        chains.spread(*self.sides, self.tau, half_v)
+        chains.spread(self.view, self.tau, half_v)
 
     def shift(self, v: float) -> None:
-        chains.shift(*self.sides, self.tau, v)
+        chains.shift(self.view, self.tau, v)
 
     def cut(self, lower: float, upper: float) -> Any:
-        return chains.cut(*self.parts, self.tau, lower, upper)
+        return chains.cut(self.view, self.tau, lower, upper)
 
     def cut_misses(self, lower: float, upper: float) -> Any:
-        return chains.cut_misses(*self.parts, self.tau, 0.0, lower, upper, chain_storage.working_room())
+        return chains.cut_misses(self.view, self.tau, 0.0, lower, upper, chain_storage.working_room())
 
     def reduce(self) -> None:
-        chains.reduce_outward(*self.parts, self.tau, chain_storage.working_room())
+        chains.reduce_outward(self.view, self.tau, chain_storage.working_room())
 
     @property
     def reach(self) -> float:
@@ -137,14 +137,14 @@ class Section:
 
     @property
     def count(self) -> int:
-        return int(chains.count_of(*self.sides))
+        return int(chains.count_of(self.view))
 
     def heights(self) -> Any:
-        return chains.heights(*self.parts, self.tau)
+        return chains.heights(self.view, self.tau)
 
     def outline(self) -> Floats:
         out: Floats = chain_storage.working_room()
-        return out[: chains.outline(*self.parts, self.tau, out)].copy()
+        return out[: chains.outline(self.view, self.tau, out)].copy()
 
     def corners(self) -> list[Exact]:
         """The outline, as (V, m)."""
@@ -546,7 +546,7 @@ def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
     """A section that has grown until it may have no room for another step; its exact polygon is taken from there."""
     life = Life(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
     section = life.section
-    while not chains.is_crowded(*section.sides):
+    while not chains.is_crowded(section.view):
         before = section.count
         section.turn(section.tau * fall)
         section.spread(0.01 * size_v)
@@ -625,7 +625,7 @@ def test_moving_to_wider_rings_keeps_everything(start: Start, before: list[Step]
         assert tell(life, step) == tell(twin, step)
     rings = chain_storage.with_room(life.section.chains.rings, 4 * CAPACITY)
     life.section.chains = life.section.chains._replace(rings=rings)
-    chain_storage.widen_rings(*life.section.parts, CAPACITY)
+    chain_storage.widen_rings(life.section.view, CAPACITY)
     assert rings[TAKEN] <= rings.size
     for i in range(len(after) + 1):
         for side in (RIGHT, LEFT):
