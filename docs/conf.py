@@ -61,6 +61,7 @@ nitpick_ignore = [
         "experiments.pareto.file": ("ParetoProblem",),
         "experiments.pursuit.file": ("PursuitProblem",),
         "experiments.reachability.file": ("Rendezvous",),
+        "experiments.reachability.system_file": ("ReachableSystem",),
         "guidance.predictive": ("ManoeuvreState",),
         "guidance.proportional_navigation": ("PulseState",),
         "infoset.observer.sets": ("Polygons", "Polytopes"),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from experiments.pursuit.figures import draw_distance
     from experiments.pursuit.file import load_pursuit
     from experiments.pursuit.map_figure import draw_map
-    from experiments.reachability.file import load_rendezvous
+    from experiments.reachability.file import load_rendezvous, load_system
 
 _NAMES = {
     "interception.scenario_file": ("load_scenario",),
@@ -37,7 +37,7 @@ _NAMES = {
     "pareto.file": ("load_pareto",),
     "pareto.figures": ("draw_trajectories",),
     "multipoint.file": ("load_multipoint",),
-    "reachability.file": ("load_rendezvous",),
+    "reachability.file": ("load_rendezvous", "load_system"),
     "pursuit.file": ("load_pursuit",),
     "pursuit.figures": ("draw_distance",),
     "pursuit.map_figure": ("draw_map",),
@@ -60,6 +60,7 @@ __all__ = [
     "load_record",
     "load_rendezvous",
     "load_scenario",
+    "load_system",
     "lower_bound",
     "plot",
     "save",

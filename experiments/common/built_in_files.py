@@ -25,6 +25,7 @@ PROBLEMS = {
     "pareto-encounter": ProblemKind("pareto", "pareto", "load_pareto"),
     "multipoint": ProblemKind("multipoint", "multipoint", "load_multipoint"),
     "reachable-rendezvous": ProblemKind("reach", "reachability", "load_rendezvous"),
+    "reachable-system": ProblemKind("reach", "reachability", "load_system"),
     "pursuit-evasion": ProblemKind("pursuit", "pursuit", "load_pursuit"),
     "observer": ProblemKind("observe", "observer", "load_observer"),
 }

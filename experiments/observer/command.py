@@ -39,10 +39,16 @@ class Observe(FileOptions):
         typer.Option(
             "--data",
             metavar="FILE.csv",
-            help="Measurements: one row for each step, columns y1, y2, .. and u1, u2, ..; an empty cell of y is a "
-            "missing measurement. The u of a row acts after its measurement.",
+            help="Measurements: one row for each step, columns y1, y2, .. and u1, u2, ..; an empty cell of y, or NaN, "
+            "is a missing measurement. The u of a row acts after its measurement.",
         ),
     ] = None
+    columns: Annotated[
+        str,
+        typer.Option(
+            "--columns", metavar="NAME=COLUMN,..", help="Columns of --data with other names, for example y1=range_m."
+        ),
+    ] = ""
     errors: Annotated[
         Errors,
         typer.Option(

@@ -11,7 +11,7 @@ import numpy as np
 
 from experiments.common.errors import InputError, shown
 from experiments.common.input_file import read_input
-from experiments.observer.command import MAX_STEPS, Errors
+from experiments.observer.command import MAX_STEPS, Errors, Observe
 from experiments.observer.file import ObserverProblem
 from infoset import Zonotope
 from infoset.arrays import Floats
@@ -36,17 +36,17 @@ class Data:
     origin: str
 
 
-def data_of(problem: ObserverProblem, file: Path | None, errors: Errors, seed: int) -> Data:
+def data_of(problem: ObserverProblem, options: Observe) -> Data:
     """Return the measurements of a CSV file, else those of the problem, else simulated ones.
 
     Raise `InputError` if the file cannot be read, or does not fit the system.
     """
-    if file is not None:
-        return read_csv(file, len(problem.system.C), problem.system.inputs)
+    if options.data is not None:
+        return read_csv(options.data, problem, options.columns)
     if problem.measured is not None:
         inputs = _padded(problem.inputs, len(problem.measured), problem.system.inputs)
         return Data(problem.measured, inputs, None, f"measurements of {problem.name}")
-    return simulate(problem, errors, seed)
+    return simulate(problem, options.errors, options.seed)
 
 
 def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
@@ -57,7 +57,7 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
     states = [_point(problem.initial.shape, errors, generator)]
     for step, u in enumerate(inputs[:-1], start=1):
         w = _point(problem.disturbance_set, errors, generator)
-        states.append(a @ states[-1] + b @ u + (system.offset or 0.0) + w)
+        states.append(a @ states[-1] + b @ u + (system.c or 0.0) + w)
         need_size(f"{problem.name}: simulation, step {step}", states[-1])
     true = np.array(states)
     measured = true @ c.T + _signs(errors, (len(true), len(c)), generator) * problem.noise.half_width
@@ -98,34 +98,50 @@ def _padded(inputs: Floats | None, steps: int, size: int) -> Floats:
     return padded
 
 
-def read_csv(file: Path, outputs: int, inputs: int) -> Data:
-    """Read measurements and inputs from a CSV file with a row for each step.
+def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
+    """Read measurements and inputs from a CSV file with a row for each step; `columns` renames some of its columns.
 
-    Raise `InputError` if the file cannot be read, its header is another one, or a cell is not a number.
+    Raise `InputError` if the file cannot be read, a column is missing, or a cell is not a number.
     """
+    outputs, inputs = len(problem.system.C), problem.system.inputs
     names = [f"y{number}" for number in range(1, outputs + 1)] + [f"u{number}" for number in range(1, inputs + 1)]
-    form = f"the header must be {','.join(names)}, and each row has their numbers; an empty cell of y is missing"
+    wanted = _renamed(names, columns)
     content = read_input(file, MAX_CSV_BYTES)
     try:
-        table = list(csv.reader(content.decode("utf-8-sig").rstrip().splitlines()))
+        header, *table = list(csv.reader(content.decode("utf-8-sig").rstrip().splitlines())) or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"--data: {file}: is not a CSV file in UTF-8: {error}") from None
-    if not table or [cell.strip() for cell in table[0]] != names:
-        raise InputError(f"--data: {file}: {form}; found the header {shown(','.join(table[0]) if table else '')}")
-    if not 2 <= len(table) <= MAX_STEPS + 1:
-        raise InputError(f"--data: {file}: has {len(table) - 1} steps; 1 to {MAX_STEPS} are possible")
-    rows = []
-    for line, cells in enumerate(table[1:], start=2):
+    header = [cell.strip() for cell in header]
+    if any(header.count(name) != 1 for name in wanted):
+        raise InputError(
+            f"--data: {file}: the header must have each of {','.join(wanted)} once (see --columns); found the header "
+            f"{shown(','.join(header))}"
+        )
+    if not 1 <= len(table) <= MAX_STEPS:
+        raise InputError(f"--data: {file}: has {len(table)} steps; 1 to {MAX_STEPS} are possible")
+    places, rows = [header.index(name) for name in wanted], []
+    for line, cells in enumerate(table, start=2):
+        full = cells or [""]  # a file of one column has empty lines
         try:
-            row = [float(cell.strip() or "nan") for cell in cells or [""]]  # a file of one column has empty lines
+            row = [float(full[place].strip() or "nan") for place in places if len(full) == len(header)]
         except ValueError:
             row = []
-        too_large = any(abs(value) > MAXIMUM for value in row)
-        if len(row) != len(names) or too_large or any(map(math.isnan, row[outputs:])):
+        if not row or any(abs(value) > MAXIMUM for value in row) or any(map(math.isnan, row[outputs:])):
             raise InputError(
-                f"--data: {file}: line {line}: must have {len(names)} numbers of at most {MAXIMUM:g} in size, found "
-                f"{shown(','.join(cells))}; only a cell of y may be empty"
+                f"--data: {file}: line {line}: {','.join(wanted)} must be numbers of at most {MAXIMUM:g} in size, and "
+                f"only measurements may be empty or NaN; found {shown(','.join(cells))}"
             )
         rows.append(row)
     values = np.array(rows)
     return Data(values[:, :outputs], values[:, outputs:], None, f"measurements of {file.name}")
+
+
+def _renamed(names: list[str], columns: str) -> list[str]:
+    """Return the columns of a file that have some names; `columns` is NAME=COLUMN,NAME=COLUMN."""
+    wanted = {name: name for name in names}
+    for part in columns.split(",") if columns else ():
+        name, _, column = (text.strip() for text in part.partition("="))
+        if name not in wanted or not column:
+            raise InputError(f"--columns: {shown(part)}: must be NAME=COLUMN with a name of {', '.join(names)}")
+        wanted[name] = column
+    return list(wanted.values())

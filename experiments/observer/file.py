@@ -25,12 +25,12 @@ Rows = tuple[Row, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class SystemTable:
-    """[system]: x+ = A x + B u + offset + w, y = C x + v, every `step_s`; `states` are names for figures."""
+    """[system]: x+ = A x + B u + c + w, y = C x + v, every `step_s`; `states` are names for figures."""
 
     A: Rows
     B: Rows = ()
     C: Rows
-    offset: Row = ()
+    c: Row = ()
     step_s: Positive | None = None
     states: tuple[Annotated[str, Line(40)], ...] = ()
 
@@ -161,7 +161,7 @@ class ObserverProblem:
             noise=self.noise.half_width,
             disturbance=self.disturbance_set,
             input_matrix=self.system.B or None,
-            offset=self.system.offset or None,
+            offset=self.system.c or None,
             runs=runs,
         )
 

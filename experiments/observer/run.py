@@ -14,7 +14,7 @@ from experiments.observer.report import Report, report_csv, report_json, report_
 
 def solve(problem: ObserverProblem, options: Observe, begin: BeginProgress) -> Report:
     """Return the set of each step."""
-    data, progress = data_of(problem, options.data, options.errors, options.seed), begin("sets")
+    data, progress = data_of(problem, options), begin("sets")
     observer, estimates = problem.observer(), []
     try:
         for k, measurement in enumerate(data.measured):

@@ -12,11 +12,11 @@ from experiments.common.options import FileOptions, Html, ProblemName, Seed, Set
 
 @dataclass(frozen=True)
 class Reach(FileOptions):
-    """Compute reachable sets and optimal controls of a rendezvous.
+    """Compute reachable sets and optimal controls of a rendezvous, or of a linear system of your own.
 
-    The rendezvous has constraints. The results are the minimum terminal norm, the forward sets, the tube of all optimal
-    trajectories, and the set of all optimal controls. Selected optimal controls are simulated on the linear and on the
-    nonlinear model. Without --out, --json, --csv or --html no file is written.
+    The problem has constraints. The results are the minimum terminal norm, the forward sets, the tube of all optimal
+    trajectories, and the set of all optimal controls. Selected optimal controls are simulated, those of a rendezvous
+    on the linear and on the nonlinear model. Without --out, --json, --csv or --html no file is written.
 
     Axes: x radially outward, y along the motion, z along the orbit's normal (Hill's), at the passive craft.
     """

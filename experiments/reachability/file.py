@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field
 
 from experiments.common.input_file import read_file
 from experiments.common.orbit_checks import check_angle, check_orbit
+from experiments.reachability.system_file import ReachableSystem
 from infoset.arrays import Floats
 from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive
 from rendezvous.reachability import (
@@ -265,3 +266,8 @@ class Rendezvous:
 def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Rendezvous:
     """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
     return read_file(Rendezvous, name_or_path, settings)
+
+
+def load_system(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> ReachableSystem:
+    """Read a built-in linear system or such a file, as `experiments.common.input_file.read_file`."""
+    return read_file(ReachableSystem, name_or_path, settings)

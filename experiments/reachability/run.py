@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from experiments.common.errors import InputError, input_errors
-from experiments.common.options import choice
+from experiments.common.built_in_files import kind_of
+from experiments.common.errors import InputError
+from experiments.common.input_file import parse, source_of
 from experiments.common.problem_command import ProblemCommand
 from experiments.common.screen import BeginProgress
 from experiments.reachability.command import Reach
 from experiments.reachability.file import Rendezvous
 from experiments.reachability.page import reachability_page
 from experiments.reachability.report import Member, Report, Robustness, report_json, report_lines, trajectories
+from experiments.reachability.selection import select_controls, selection
+from experiments.reachability.system import COMMAND as SYSTEM_COMMAND
+from experiments.reachability.system_file import ReachableSystem
 from infoset.arrays import Floats
-from infoset.geometry.polytope import UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
     Flight,
@@ -24,41 +28,20 @@ from rendezvous.reachability import (
     NoRobustPlanError,
     Route,
     SetKind,
-    Solution,
-    TooManyVerticesError,
-    analytic_centre,
-    chebyshev_centre,
     feedback_plan,
     min_periods,
-    minimum_energy,
-    minimum_l1,
-    minimum_norms,
-    minimum_peak,
     replan,
-    samples,
     solve,
     tightened,
-    vertices,
 )
 
-SINGLE = {
-    "energy": minimum_energy,
-    "l1": minimum_l1,
-    "norms": minimum_norms,
-    "peak": minimum_peak,
-    "chebyshev": chebyshev_centre,
-    "analytic": analytic_centre,
-}
-"""Selections of one control each: minimum sum of squares, of absolute values, of Euclidean norms, and so on."""
-VERTICES, SAMPLES = "vertices", "samples"
-MAX_SAMPLES = 1000
 NOISY_FLIGHTS = 10
 """Number of simulations in closed loop with navigation errors."""
 
 
 def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgress) -> Report:
     """Return the sets, the selected optimal controls with their trajectories, and the simulations in closed loop."""
-    names, count = _selection(options.select)
+    selection(options.select)  # a mistake is found before anything is computed
     progress = begin(rendezvous.name)
     solution = solve(rendezvous.problem)
     progress(0.2)
@@ -68,7 +51,7 @@ def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgres
     forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))
     progress(0.5)
     ranges = solution.optimal.ranges()
-    controls = _controls(solution, names, count, options.seed)
+    controls = select_controls(solution, options)
     members = fly_members(rendezvous, [*controls], np.array([*controls.values()]))
     progress(0.7)
     flight, noisy = None, []
@@ -94,39 +77,6 @@ def solve_rendezvous(rendezvous: Rendezvous, options: Reach, begin: BeginProgres
         tuple(noisy),
         robustness,
     )
-
-
-def _selection(text: str) -> tuple[list[str], int]:
-    """Return the names of the selection, and the number of samples."""
-    names, count = [], 0
-    for part in text.split(","):
-        name, _, digits = part.strip().partition(":")
-        name = choice("--select", name, [*SINGLE, VERTICES, SAMPLES])
-        if name == SAMPLES:
-            with input_errors(f"--select {SAMPLES}"):
-                count = int(digits)
-            if not 1 <= count <= MAX_SAMPLES:
-                raise InputError(f"--select {SAMPLES}: must be between 1 and {MAX_SAMPLES}, found {count}")
-        names.append(name)
-    return names, count
-
-
-def _controls(solution: Solution, names: Sequence[str], count: int, seed: int) -> dict[str, Floats]:
-    """Return the selected optimal controls, each of shape (T, 3), by name."""
-    controls: dict[str, Floats] = {}
-    for name in names:
-        if name in SINGLE:
-            controls[name] = SINGLE[name](solution.optimal)
-        elif name == VERTICES:
-            try:
-                several = vertices(solution.optimal)
-            except (TooManyVerticesError, UncertainHullError) as error:
-                raise InputError(f"--select vertices: {error}; choose for example --select samples:20") from None
-            controls |= {f"vertex {number}": control for number, control in enumerate(several, start=1)}
-        else:
-            several = samples(solution.optimal, count, np.random.default_rng(seed))
-            controls |= {f"sample {number}": control for number, control in enumerate(several, start=1)}
-    return controls
 
 
 def fly_members(
@@ -185,4 +135,12 @@ COMMAND = ProblemCommand(
     figures="experiments.reachability.figures",
     figure_names=("figure-positions", "figure-velocities", "figure-planes", "figure-controls"),
 )
-run = COMMAND.run
+
+
+def run(options: Reach) -> None:
+    """Solve a rendezvous, or a problem of a linear system."""
+    text, source = source_of(options.problem, [Rendezvous.kind, ReachableSystem.kind])
+    command: ProblemCommand[Any, Any] = COMMAND
+    if kind_of(parse(text, source)) == ReachableSystem.kind:
+        command = SYSTEM_COMMAND
+    command.run(options)

@@ -20,6 +20,7 @@ COMMANDS = {
     "pareto.run": ("pareto", "pareto-2008"),
     "multipoint.run": ("multipoint", "service-2"),
     "reachability.run": ("reach", "rendezvous-2021", "--select", "energy"),
+    "reachability.system": ("reach", "double-integrator"),
     "pursuit.run": ("pursuit", "leo-pursuit", "--feedback", "coast"),
     "pursuit.map": ("pursuit-map", "geo-pursuit", *SMALL_MAP),
     "observer.run": ("observe", "vehicle", "--smooth"),

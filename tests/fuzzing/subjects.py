@@ -20,7 +20,8 @@ from experiments.multipoint.file import MultipointProblem, load_multipoint
 from experiments.observer.file import ObserverProblem, load_observer
 from experiments.pareto.file import ParetoProblem, load_pareto
 from experiments.pursuit.file import PursuitProblem, load_pursuit
-from experiments.reachability.file import Rendezvous, load_rendezvous
+from experiments.reachability.file import Rendezvous, load_rendezvous, load_system
+from experiments.reachability.system_file import ReachableSystem
 from sim import Record, Scenario, fly_one
 
 Found = TypeVar("Found")
@@ -60,6 +61,7 @@ def text_files() -> Mapping[str, TextFile]:
         "observer": (ObserverProblem, load_observer),
         "pursuit-evasion": (PursuitProblem, load_pursuit),
         "reachable-rendezvous": (Rendezvous, load_rendezvous),
+        "reachable-system": (ReachableSystem, load_system),
     }
     return {
         kind: TextFile(owner, tuple(each.text for each in built_in_files().values() if each.kind == kind), load)

@@ -72,8 +72,10 @@ def test_a_csv_file_gives_the_same_as_the_problem_file(infoset: Command) -> None
     ("content", "told"),
     [
         (b"y1,u1\n", "has 0 steps"),
-        (b"y1,u1\n1,1\n\n1,1\n", "line 3: must have 2 numbers"),
-        (b"y1,u1\n1,1\nfast,1\n", 'line 3: must have 2 numbers of at most 1e+60 in size, found "fast,1"'),
+        (b"y1,u1\n1,1\n\n1,1\n", "line 3: y1,u1 must be numbers"),
+        (b"y1,u1\n1,1\nfast,1\n", 'only measurements may be empty or NaN; found "fast,1"'),
+        (b"y1,u1\n1,nan\n", 'found "1,nan"'),
+        (b"y1,thrust\n1,1\n", "the header must have each of y1,u1 once (see --columns)"),
         (b"\xff\xfe\x00", "is not a CSV file in UTF-8"),
     ],
 )
@@ -85,6 +87,11 @@ def test_wrong_data_are_refused(content: bytes, told: str, infoset: Command) -> 
 def test_an_empty_cell_is_a_missing_measurement(infoset: Command) -> None:
     Path("data.csv").write_text("y1,u1\n0.0,1.0\n ,0.5\n12.0,0\n")
     results = infoset.json("observe", "vehicle", "--data", "data.csv")
+    Path("other.csv").write_text("thrust,time_s,range_m\n1,0,0\n0.5,0.5,NaN\n0,1,12\n")
+    columns = "--columns", "y1=range_m,u1=thrust"
+    assert infoset.json("observe", "vehicle", "--data", "other.csv", *columns)["steps"] == results["steps"]
+    told = infoset.refused("observe", "vehicle", "--data", "other.csv", "--columns", "y2=range_m")
+    assert '--columns: "y2=range_m": must be NAME=COLUMN with a name of y1, u1' in told
     first, second, third = results["steps"]
     assert first["upper"][0] == pytest.approx(3.0)
     # Without a measurement: from 0 to 20 m/s, 1 m/s^2 and the disturbance.
@@ -106,7 +113,7 @@ def changed(old: str, new: str, name: str = "vehicle") -> str:
     [
         ("system.A=[[1, 2], [3]]", "state_matrix must be an array, its rows of equal length"),
         ("system.A=[[1, 2, 3], [3, 4, 5]]", "state_matrix must have the shape (n, n)"),
-        ("system.offset=[1]", "offset must have the shape (2,)"),
+        ("system.c=[1]", "offset must have the shape (2,)"),
         ("noise.half_width=[3, 1]", "noise must"),
         ("initial.center=[0, 0]", "initial: must have lower and upper, or center and generators, or vertices"),
         ("initial.lower=[11, 0]", "initial: the box is reversed"),

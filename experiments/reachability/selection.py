@@ -1,0 +1,69 @@
+"""Selection of optimal controls by the option --select."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from experiments.common.errors import InputError, input_errors
+from experiments.common.options import choice
+from experiments.reachability.command import Reach
+from infoset.arrays import Floats
+from infoset.geometry.polytope import UncertainHullError
+from rendezvous.reachability import (
+    Solution,
+    TooManyVerticesError,
+    analytic_centre,
+    chebyshev_centre,
+    minimum_energy,
+    minimum_l1,
+    minimum_norms,
+    minimum_peak,
+    samples,
+    vertices,
+)
+
+SINGLE = {
+    "energy": minimum_energy,
+    "l1": minimum_l1,
+    "norms": minimum_norms,
+    "peak": minimum_peak,
+    "chebyshev": chebyshev_centre,
+    "analytic": analytic_centre,
+}
+"""Selections of one control each: minimum sum of squares, of absolute values, of Euclidean norms, and so on."""
+VERTICES, SAMPLES = "vertices", "samples"
+MAX_SAMPLES = 1000
+
+
+def selection(text: str) -> tuple[list[str], int]:
+    """Return the names of the selection, and the number of samples."""
+    names, count = [], 0
+    for part in text.split(","):
+        name, _, digits = part.strip().partition(":")
+        name = choice("--select", name, [*SINGLE, VERTICES, SAMPLES])
+        if name == SAMPLES:
+            with input_errors(f"--select {SAMPLES}"):
+                count = int(digits)
+            if not 1 <= count <= MAX_SAMPLES:
+                raise InputError(f"--select {SAMPLES}: must be between 1 and {MAX_SAMPLES}, found {count}")
+        names.append(name)
+    return names, count
+
+
+def select_controls(solution: Solution, options: Reach) -> dict[str, Floats]:
+    """Return the selected optimal controls, each of shape (T, m), by name."""
+    names, count = selection(options.select)
+    controls: dict[str, Floats] = {}
+    for name in names:
+        if name in SINGLE:
+            controls[name] = SINGLE[name](solution.optimal)
+        elif name == VERTICES:
+            try:
+                several = vertices(solution.optimal)
+            except (TooManyVerticesError, UncertainHullError) as error:
+                raise InputError(f"--select vertices: {error}; choose for example --select samples:20") from None
+            controls |= {f"vertex {number}": control for number, control in enumerate(several, start=1)}
+        else:
+            several = samples(solution.optimal, count, np.random.default_rng(options.seed))
+            controls |= {f"sample {number}": control for number, control in enumerate(several, start=1)}
+    return controls

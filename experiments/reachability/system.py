@@ -1,0 +1,133 @@
+"""`infoset reach` for a linear system of the user: computation and results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.common.errors import InputError
+from experiments.common.output import Cell, to_csv
+from experiments.common.problem_command import ProblemCommand
+from experiments.common.screen import BeginProgress, Part, number, number_table
+from experiments.reachability.command import Reach
+from experiments.reachability.selection import select_controls, selection
+from experiments.reachability.system_file import ReachableSystem
+from infoset.arrays import Floats
+from rendezvous.reachability import SetKind, Solution, min_periods, solve
+
+_ZERO = 1e-10
+"""Part of a bound below which a state is shown as zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """Results of one command: sets, shape (T + 1, n, 2), controls, (T, m), and their states, (T + 1, n), by name."""
+
+    system: ReachableSystem
+    solution: Solution
+    min_periods: int | None
+    forward: Floats
+    tube: Floats
+    ranges: Floats
+    controls: dict[str, Floats]
+    states: dict[str, Floats]
+
+
+def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) -> Report:
+    """Return the sets and the selected optimal controls with their motions."""
+    if options.replan or options.html is not None:
+        raise InputError("--replan and --html: need a problem of kind reachable-rendezvous")
+    selection(options.select)  # a mistake is found before anything is computed
+    progress = begin(system.name)
+    problem, path = system.problem, system.path
+    solution = solve(problem)
+    progress(0.5)
+    controls = select_controls(solution, options)
+    forward, tube = (solution.sets.bounds(kind) + path[..., None] for kind in (SetKind.FORWARD, SetKind.TUBE))
+    states = {name: problem.run(control) + path for name, control in controls.items()}
+    still = not np.ptp(path, axis=0).any()  # otherwise another number of periods has another target
+    least = min_periods(problem) if still else None
+    progress(1.0)
+    return Report(system, solution, least, forward, tube, solution.optimal.ranges(), controls, states)
+
+
+def report_json(report: Report) -> dict[str, object]:
+    """Return the results for `experiments.common.output.to_json`."""
+    solution = report.solution
+    sets = [
+        {
+            "period": t,
+            **{
+                kind.value: {"min": bounds[t, :, 0], "max": bounds[t, :, 1], **_counts(solution, kind, t)}
+                for kind, bounds in ((SetKind.FORWARD, report.forward), (SetKind.TUBE, report.tube))
+            },
+        }
+        for t in range(1, solution.problem.periods + 1)
+    ]
+    return {
+        "states": report.system.names,
+        "route": solution.route,
+        "route_reason": solution.reason,
+        "optimal_miss": solution.optimal.miss,
+        "optimal_dimension": solution.optimal.dimension,
+        "min_periods": report.min_periods,
+        "sets": sets,
+        "controls": [
+            {"name": name, "controls": control, "states": report.states[name]}
+            for name, control in report.controls.items()
+        ],
+        "control_ranges": report.ranges,
+    }
+
+
+def _counts(solution: Solution, kind: SetKind, time: int) -> dict[str, object]:
+    counts = solution.sets.counts(kind, time)
+    return {key: counts and getattr(counts, key) for key in ("vertices", "facets", "dimension")}
+
+
+def motions_csv(report: Report) -> str:
+    """Return the motions under the selected controls as CSV; a control acts after its row."""
+    n, m = len(report.system.names), len(report.system.bounds.controls)
+    columns = ["control", "period", *(f"x{i + 1}" for i in range(n)), *(f"u{j + 1}" for j in range(m))]
+    rows: list[list[Cell]] = [
+        [name, t, *states[t].tolist(), *(control[t].tolist() if t < len(control) else [None] * m)]
+        for name, control in report.controls.items()
+        for states in [report.states[name]]
+        for t in range(len(states))
+    ]
+    return to_csv(columns, rows)
+
+
+def report_lines(report: Report) -> Iterator[Part]:
+    """Yield the minimum norm, the tube and the selected controls, for the screen."""
+    solution, minimum = report.solution, report.min_periods
+    least = "" if minimum is None else f"; norm 0 needs at least {minimum} period{'s' if minimum > 1 else ''}"
+    yield f"{report.system.name}: minimum distance from the target {solution.optimal.miss:.9g}{least}"
+    yield f"route: {solution.route.value} ({solution.reason})"
+    dimension = solution.optimal.dimension
+    yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
+    table = number_table("period", *(f"{name}\nof the tube" for name in report.system.names))
+    for t, row in enumerate(report.tube):
+        shown = np.where(np.abs(row) < _ZERO * np.array(report.system.bounds.states)[:, None], 0.0, row)
+        table.add_row(str(t), *(f"{low:.6g} .. {high:.6g}" for low, high in shown))
+    yield from ("", table)
+    members = number_table("control", "energy\nu^2", "sum of |u|", "peak\n|u|")
+    for name, control in report.controls.items():
+        size = np.abs(control)
+        members.add_row(name, *map(number, ((size**2).sum(), size.sum(), size.max())))
+    if report.controls:
+        yield from ("", members)
+
+
+COMMAND = ProblemCommand(
+    owner=ReachableSystem,
+    solve=solve_system,
+    to_json=report_json,
+    to_csv=motions_csv,
+    lines=report_lines,
+    csv_name="motions.csv",
+    figures="experiments.reachability.system_figures",
+    figure_names=("figure-states", "figure-controls"),
+)

@@ -1,0 +1,57 @@
+"""Figures of a linear system: the bounds of its states and of its controls against the period."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from experiments.common.figure_style import LINE_LOOKS, SET_EDGE, SET_FILL, legend_below, plain, style, subplots
+from experiments.reachability.system import Report
+
+_MAX_MEMBERS = 4
+
+
+def draw_all(report: Report) -> Iterator[Figure]:
+    """Draw the figures of a report, one after the other."""
+    yield draw_states(report)
+    yield draw_controls(report)
+
+
+@style()
+def draw_states(report: Report) -> Figure:
+    """Draw the reachable states, the tube of all optimal motions, and some of these."""
+    names = report.system.names
+    figure, grid = subplots(30.0 + 40.0 * len(names), len(names), 1, sharex=True)
+    for i, (name, (axes,)) in enumerate(zip(map(plain, names), grid, strict=True)):
+        periods = np.arange(len(report.tube))
+        axes.fill_between(periods, *report.forward[:, i].T, color="#eeeeee", label="reachable states")
+        axes.fill_between(periods, *report.tube[:, i].T, color=SET_FILL, label="states of all optimal controls")
+        for look, states in zip(LINE_LOOKS, report.states.items(), strict=False):
+            axes.plot(states[1][:, i], label=states[0], **look | {"linewidth": 1.0})
+        axes.set_ylabel(name)
+        axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+    grid[-1, 0].set_xlabel("period")
+    legend_below(figure, 3)
+    return figure
+
+
+@style()
+def draw_controls(report: Report) -> Figure:
+    """Draw the range of each control over all optimal ones, and some of these."""
+    count, periods = report.ranges.shape[1], len(report.ranges)
+    figure, grid = subplots(30.0 + 40.0 * count, count, 1, sharex=True)
+    for j, (axes,) in enumerate(grid):
+        low, high = report.ranges[:, j].T
+        band: dict[str, Any] = {"width": 1.0, "color": SET_FILL, "edgecolor": SET_EDGE, "label": "all optimal controls"}
+        axes.bar(np.arange(periods) + 0.5, high - low, bottom=low, **band)
+        for look, (name, control) in zip(LINE_LOOKS, report.controls.items(), strict=False):
+            line: dict[str, Any] = {"color": look["color"], "linestyle": look["linestyle"], "label": name}
+            axes.stairs(control[:, j], np.arange(periods + 1), baseline=None, **line)
+        axes.set_ylabel(f"u{j + 1}")
+    grid[-1, 0].set_xlabel("period")
+    legend_below(figure, 3)
+    return figure
