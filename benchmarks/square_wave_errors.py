@@ -34,7 +34,7 @@ def worst(scenario: Scenario, name: str, runs: int, seed: int) -> tuple[NDArray[
     for half_period in HALF_PERIODS:
         wave = np.where(np.arange(steps) // half_period % 2 == 0, 1.0, -1.0)
         for sign in (1.0, -1.0):
-            noise = ScriptedNoise({"angle": np.tile(sign * wave, (runs, 1))})
+            noise = ScriptedNoise({"angle": np.tile(sign * wave, (1, runs, 1))})
             flight = Engagements(scenario, draws, make_strategy(name), noise=noise)
             while flight.flying:
                 flight.advance()

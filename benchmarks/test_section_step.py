@@ -82,7 +82,7 @@ def flight(curve: Scenario) -> Flight:
         information=information,
         alpha_rad=alpha_rad,
         stretch=stretch,
-        polygons=[Polygon(section.polygon.polygon()) for _, section in sections],
+        polygons=[Polygon(section.polygons[0].polygon()) for _, section in sections],
         range_m=range_m,
         centre_m=alpha_rad[[b for b, _ in sections]] * range_m,
         half_width_m=bound * range_m,

@@ -17,11 +17,11 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
 
     Parameters
     ----------
-    range_m : ndarray, shape (B,) or (B, S)
+    range_m : ndarray, shape (..., B, S)
         Ranges of hypotheses.
     """
     thruster, e, step_s = situation.thruster, situation.closing_speed_m_s, situation.step_s
-    budget = situation.budget_left_m_s.reshape(-1, *(1,) * (range_m.ndim - 1))
+    budget = situation.budget_left_m_s[:, None]
     if situation.later_times_s is not None:
         return _correctable_at_m(situation.later_times_s - situation.time_s, thruster, budget, range_m / e)
     to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e

@@ -1,4 +1,4 @@
-"""Estimates of the motion along one lateral axis, as guidance uses them."""
+"""Estimates of the motion along the lateral axes, as guidance uses them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class MissEstimate:
 
     Parameters
     ----------
-    miss_m, deviation_m : ndarray, shape (B,)
+    miss_m, deviation_m : ndarray, shape (C, B)
         Signed miss and its standard deviation, m. Pending impulses count as given.
-    to_go_s : ndarray, shape (B,)
+    to_go_s : ndarray, shape (C, B)
         Time from the impulse that is decided now to the closest approach, s; not negative.
 
     Notes
@@ -35,14 +35,14 @@ class MissEstimate:
     def correction_m_s(self, dead_zone_m: Floats | float = 0.0) -> Floats:
         """Return the impulse that corrects the part of the miss outside a dead zone, m/s; zero at the closest approach.
 
-        `dead_zone_m` is the half-width of the zone, a number or shape (B,).
+        `dead_zone_m` is the half-width of the zone, a number or shape (C, B).
         """
         outside_m = self.miss_m - np.clip(self.miss_m, -dead_zone_m, dead_zone_m)
         return np.divide(outside_m, self.to_go_s, out=np.zeros_like(outside_m), where=self.to_go_s > 0.0)
 
 
 class Estimator(Protocol):
-    """A filter for a batch of engagements along one lateral axis."""
+    """A filter for a batch of engagements along each of C lateral axes."""
 
     def update(self, situation: Situation) -> None:
         """Use the impulse of the previous step and the measurements of this one; call it once a step."""
@@ -51,5 +51,5 @@ class Estimator(Protocol):
         """Return the estimate after `update` of the same step."""
 
 
-EstimatorKind = Callable[[int, bool], Estimator]
-"""Makes an estimator from the number of engagements and whether it estimates the acceleration of the target."""
+EstimatorKind = Callable[[tuple[int, int], bool], Estimator]
+"""Makes an estimator from the shape (C, B) of impulses and whether it estimates the acceleration of the target."""

@@ -22,13 +22,13 @@ class GameNoise:
     ----------
     tie : TieRule
         Which extreme is kept when both are equal in modulus, as they are at almost every step under U_s.
-    tie_draws : ndarray, shape (B, steps), or (2, B, steps) in space
+    tie_draws : ndarray, shape (C, B, steps)
         Uniform in [-1, 1], used by `TieRule.RANDOM`: the upper extreme where the draw is not negative.
-    shift_m : ndarray, shape (steps,), or (2, steps) in space, or None
+    shift_m : ndarray, shape (C, steps), or None
         Shift of the measured position across x in each step with `TieRule.UPPER`, m, limited by the error bound; the
         last one holds for later steps. With `TieRule.LOWER` it has the other sign. These two rules then do not choose
         the angle by the set. None is no shift.
-    target_side : ndarray, shape (B,), or (2, B) in space, or None
+    target_side : ndarray, shape (C, B), or None
         Sign of the acceleration of each target, 1 or -1, if it is constant. The shift of these two rules then has the
         other sign along each axis, which is worse: errors and target move the true state to the same side.
 
@@ -43,7 +43,7 @@ class GameNoise:
     set. Before a cut-off, errors that change from one bound to the other are worse: the true state is then at an end of
     the set (`sim.closed_form.worst_shift_m`).
 
-    In space, each axis has its own extremes and its own worse one; the measured angles are chosen for each axis. The
+    Each axis has its own extremes and its own worse one; the measured angles are chosen for each axis. In space, the
     range has the rule of the plane, for the corner (worse extreme of y, worse extreme of z) of the rectangle of
     predicted misses of each section: the point to keep is in the section where this corner has the maximum modulus,
     the other extreme in that of the opposite corner.
@@ -82,7 +82,7 @@ class GameNoise:
 
     @property
     def truth_side(self) -> Floats:
-        """Side to which the shift moves the true state, shape (), (B,) or (2, B): 1 or -1, 0 for no shift."""
+        """Side to which the shift moves the true state, shape () or (C, B): 1 or -1, 0 for no shift."""
         sides = {} if self.shift_m is None else {TieRule.UPPER: -1.0, TieRule.LOWER: 1.0}
         side = np.array(sides.get(self.tie, 0.0))
         return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
@@ -92,7 +92,7 @@ class GameNoise:
         if self.shift_m is None:
             return chosen
         side = self.truth_side
-        shift_m = self.shift_m[..., min(sight.step, self.shift_m.shape[-1] - 1), None]
+        shift_m = self.shift_m[:, min(sight.step, self.shift_m.shape[1] - 1), None]
         shifted = sensor.nearest(sight, sight.alpha_rad - side * shift_m / sight.range_m)
         return np.where(side == 0.0, chosen, shifted)
 
@@ -137,10 +137,10 @@ def _range(
     sensor: RangeSensor, sight: LineOfSight, predicted: InformationSetView, miss: PredictedMiss, upper_is_worse: Flags
 ) -> Floats:
     upper, lower, error = miss.upper_point.range_m, miss.lower_point.range_m, sensor.relative_error
-    worst = np.where(upper_is_worse, upper, lower)
-    other = np.where(upper_is_worse, lower, upper)
-    if upper_is_worse.ndim > 1:
+    if len(upper_is_worse) > 1:
         worst, other = _ranges_of_corners(predicted, upper_is_worse)
+    else:  # the corners of an interval are its ends
+        worst, other = np.where(upper_is_worse, upper, lower)[0], np.where(upper_is_worse, lower, upper)[0]
     minimum, maximum = predicted.stored_range_interval_m()
     return keep_point(
         worst >= other,

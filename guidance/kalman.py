@@ -18,10 +18,12 @@ Z, VZ, X, SPEED, ACCELERATION = range(5)
 
 
 class KalmanBank:
-    """A bank of M extended Kalman filters for each engagement, one for each interval of the possible ranges.
+    """A bank of M extended Kalman filters for each engagement and lateral axis, one for each interval of the ranges.
 
     Parameters
     ----------
+    shape : tuple of int
+        Numbers (C, B) of lateral axes and engagements.
     is_augmented : bool
         Estimate the lateral acceleration of the target.
     members : int
@@ -31,9 +33,9 @@ class KalmanBank:
 
     Attributes
     ----------
-    mean, covariance : ndarray, shape (B, M, n) and (B, M, n, n)
+    mean, covariance : ndarray, shape (C, B, M, n) and (C, B, M, n, n)
         Estimates of (z, V_z, x, closing speed), m and m/s, and of the acceleration, m/s^2, if n is 5.
-    log_weight : ndarray, shape (B, M)
+    log_weight : ndarray, shape (C, B, M)
         Logarithms of the probabilities of the intervals, up to a constant.
 
     Notes
@@ -44,7 +46,7 @@ class KalmanBank:
     is poor for a wide prior of the range. Therefore each filter of the bank has an interval of the range, and its
     weight is the likelihood of its measurements (a range-parameterised filter). The estimated miss is the one whose
     correction minimises the expected square of the miss over the bank: E[m tau]/E[tau^2] times E[tau], with the time to
-    go tau from the impulse. Cost: about 30 NumPy operations on B M stacked n x n matrices per step. Libraries such as
+    go tau from the impulse. Cost: about 30 NumPy operations on C B M stacked n x n matrices per step. Libraries such as
     filterpy run one filter at a time, in a Python loop.
 
     The acceleration a has a uniform prior within the bound nu of the set's model, and changes by a random walk with the
@@ -63,11 +65,13 @@ class KalmanBank:
 
     name: ClassVar[str] = "kalman"
 
-    def __init__(self, batch: int, is_augmented: bool = False, members: int = 9, process_noise: float = 1.0) -> None:
+    def __init__(
+        self, shape: tuple[int, int], is_augmented: bool = False, members: int = 9, process_noise: float = 1.0
+    ) -> None:
         size = 5 if is_augmented else 4
-        self.mean = np.zeros((batch, members, size))
-        self.covariance = np.zeros((batch, members, size, size))
-        self.log_weight = np.zeros((batch, members))
+        self.mean = np.zeros((*shape, members, size))
+        self.covariance = np.zeros((*shape, members, size, size))
+        self.log_weight = np.zeros((*shape, members))
         self._process_noise = process_noise
 
     def update(self, situation: Situation) -> None:
@@ -95,8 +99,8 @@ class KalmanBank:
     def estimate(self, situation: Situation) -> MissEstimate:
         """Return the estimated miss over the bank."""
         ahead = self.mean[..., X] > 0.0
-        weight = np.where(ahead, np.exp(self.log_weight - self.log_weight.max(axis=1, keepdims=True)), 0.0)
-        total = weight.sum(axis=1, keepdims=True)
+        weight = np.where(ahead, np.exp(self.log_weight - self.log_weight.max(axis=-1, keepdims=True)), 0.0)
+        total = weight.sum(axis=-1, keepdims=True)
         weight = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0.0)
         speed, velocity = self.mean[..., SPEED], self.mean[..., VZ]
         to_go = np.maximum(self.mean[..., X], 0.0) / speed
@@ -110,17 +114,17 @@ class KalmanBank:
         if self._is_augmented:
             gradient.append(0.5 * to_go**2)
         by_state = np.stack(gradient, axis=-1)
-        variance = np.einsum("bmi,bmij,bmj->bm", by_state, self.covariance, by_state)
+        variance = np.einsum("...i,...ij,...j->...", by_state, self.covariance, by_state)
         for time_s, impulse in situation.pending:
-            miss = miss - impulse[:, None] * np.maximum(to_go - time_s, 0.0)
-        mean = (weight * miss).sum(axis=1)
+            miss = miss - impulse[..., None] * np.maximum(to_go - time_s, 0.0)
+        mean = (weight * miss).sum(axis=-1)
         # Rounding may leave a small variance just below zero.
-        spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[:, None]) ** 2)).sum(axis=1)
+        spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[..., None]) ** 2)).sum(axis=-1)
         deviation = np.sqrt(spread + _constant_error_m(situation.information.model.angle_sensor) ** 2 / 3.0)
         lever = np.maximum(to_go - situation.lead_s, 0.0)
-        square = (weight * lever**2).sum(axis=1)
-        best = np.divide((weight * miss * lever).sum(axis=1), square, out=np.zeros_like(mean), where=square > 0.0)
-        lever = (weight * lever).sum(axis=1)
+        square = (weight * lever**2).sum(axis=-1)
+        best = np.divide((weight * miss * lever).sum(axis=-1), square, out=np.zeros_like(mean), where=square > 0.0)
+        lever = (weight * lever).sum(axis=-1)
         return MissEstimate(best * lever, deviation, lever)
 
     @property
@@ -128,63 +132,69 @@ class KalmanBank:
         return self.mean.shape[-1] > ACCELERATION
 
     def _set_prior(self, situation: Situation) -> None:
-        model, members = situation.information.model, self.mean.shape[1]
+        model, members = situation.information.model, self.mean.shape[2]
         bounds = model.bounds
         edges = np.linspace(*bounds.x_m, members + 1)
         stretch = (bounds.x_m[1] - bounds.x_m[0]) / members
-        self.mean[..., Z] = 0.5 * (bounds.z_m[0] + bounds.z_m[1])
-        self.mean[..., VZ] = 0.5 * (bounds.vz_m_s[0] + bounds.vz_m_s[1])
         self.mean[..., X] = 0.5 * (edges[:-1] + edges[1:])
         self.mean[..., SPEED] = -0.5 * (bounds.vx_m_s[0] + bounds.vx_m_s[1])
-        widths = [np.ptp(bounds.z_m), np.ptp(bounds.vz_m_s), stretch, np.ptp(bounds.vx_m_s)]
-        if self._is_augmented:
-            widths.append(2.0 * model.acceleration_m_s2)
-        self.covariance[:] = np.diag(np.square(widths) / 12.0)
+        for axis, plane in enumerate(map(model.axis, model.axes)):
+            z_m, vz_m_s = plane.bounds.z_m, plane.bounds.vz_m_s
+            self.mean[axis, ..., Z], self.mean[axis, ..., VZ] = 0.5 * (z_m[0] + z_m[1]), 0.5 * (vz_m_s[0] + vz_m_s[1])
+            widths = [np.ptp(z_m), np.ptp(vz_m_s), stretch, np.ptp(bounds.vx_m_s), 2.0 * plane.acceleration_m_s2]
+            self.covariance[axis] = np.diag(np.square(widths[: self.mean.shape[-1]]) / 12.0)
 
     def _predict(self, situation: Situation) -> None:
         step_s, model, size = situation.step_s, situation.information.model, self.mean.shape[-1]
-        self.mean[..., VZ] -= situation.last_impulse_m_s[:, None]
+        self.mean[..., VZ] -= situation.last_impulse_m_s[..., None]
         motion = np.eye(size)
         motion[Z, VZ], motion[X, SPEED] = step_s, -step_s
         push = np.array([0.5 * step_s**2, step_s, 0.0, 0.0])
-        variance = (self._process_noise * model.acceleration_m_s2) ** 2 / 3.0
+        accelerations = np.array([model.axis(name).acceleration_m_s2 for name in model.axes])
+        variance = (self._process_noise * accelerations) ** 2 / 3.0
         if self._is_augmented:
             motion[Z, ACCELERATION], motion[VZ, ACCELERATION] = push[:2]
             push = np.array([*push, 1.0])
             variance *= step_s * situation.closing_speed_m_s / model.bounds.x_m[1]
         if situation.thruster.execution_error_relative > 0.0:
             error = situation.thruster.execution_error_relative * situation.last_impulse_m_s
-            self.covariance[..., VZ, VZ] += error[:, None] ** 2 / 3.0
+            self.covariance[..., VZ, VZ] += error[..., None] ** 2 / 3.0
         self.mean = self.mean @ motion.T
         self.covariance = motion @ self.covariance @ motion.T
-        self.covariance += variance * np.outer(push, push)
+        self.covariance += variance[:, None, None, None, None] * np.outer(push, push)
 
     def _measure(self, situation: Situation, sensor: str, expected: Floats, gradient: Floats, variance: Floats) -> None:
         """Update each filter with one scalar measurement, in Joseph's form, and its weight."""
         new = situation.is_new(sensor)
-        innovation = np.where(new, situation.measured[sensor], 0.0)[:, None] - expected
-        spread = np.einsum("bmij,bmj->bmi", self.covariance, gradient)
+        innovation = np.where(new, situation.measured[sensor], 0.0)[..., None] - expected
+        new = new[:, None]
+        spread = np.einsum("...ij,...j->...i", self.covariance, gradient)
         # Rounding may leave a negative value where angles have reduced a variance by twenty decades.
-        total = np.maximum(np.einsum("bmi,bmi->bm", gradient, spread), 0.0) + variance
-        gain = np.where(new[:, None, None], spread / total[..., None], 0.0)
+        total = np.maximum(np.einsum("...i,...i->...", gradient, spread), 0.0) + variance
+        gain = np.where(new[..., None], spread / total[..., None], 0.0)
         self.mean = self.mean + gain * innovation[..., None]
         keep = np.eye(self.mean.shape[-1]) - gain[..., :, None] * gradient[..., None, :]
         self.covariance = keep @ self.covariance @ np.swapaxes(keep, -1, -2)
         self.covariance += variance[..., None, None] * gain[..., :, None] * gain[..., None, :]
         likelihood = 0.5 * (innovation**2 / total + np.log(total))
-        self.log_weight = self.log_weight - np.where(new[:, None], likelihood, 0.0)
+        self.log_weight = self.log_weight - np.where(new, likelihood, 0.0)
 
 
 def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
-    """Return the bound of the part of an angle error that is independent between measurements, rad.
+    """Return the bound of the part of an angle error that is independent between measurements, rad, shape (C, B, M).
 
     A line that falls with the range is positive up to the maximum possible distance, and an estimate can be beyond it.
     The bound is therefore at least half of that at the maximum distance.
     """
-    sensor = model.angle_sensor
-    if sensor.bias is Bias.CONSTANT:
-        return np.full_like(range_m, sensor.constant_error_rad)
-    return np.maximum(sensor.error_bound(range_m), 0.5 * sensor.error_bound(model.bounds.farthest_m))
+    bound = np.empty_like(range_m)
+    for axis, plane in enumerate(map(model.axis, model.axes)):
+        sensor = plane.angle_sensor
+        bound[axis] = (
+            sensor.constant_error_rad
+            if sensor.bias is Bias.CONSTANT
+            else np.maximum(sensor.error_bound(range_m[axis]), 0.5 * sensor.error_bound(plane.bounds.farthest_m))
+        )
+    return bound
 
 
 def _constant_error_m(sensor: AngleSensor) -> float:
@@ -228,9 +238,9 @@ class Kalman(Checked):
 
     name: ClassVar[str] = "kalman"
 
-    def start(self, batch: int) -> KalmanBank:
+    def start(self, shape: tuple[int, int]) -> KalmanBank:
         """Start with empty filters; the first step sets their prior."""
-        return KalmanBank(batch, members=self.members, process_noise=self.process_noise)
+        return KalmanBank(shape, members=self.members, process_noise=self.process_noise)
 
     def decide(self, situation: Situation, state: KalmanBank) -> Floats:
         """Update the filters with the measurements of this step, and return the impulses, m/s."""

@@ -48,7 +48,7 @@ class LeastEffort:
 
     name = "least-effort"
 
-    def start(self, batch: int) -> None:
+    def start(self, shape: tuple[int, int]) -> None:
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
@@ -63,7 +63,7 @@ class LeastEffort:
         fastest = max(e, *(-vx for vx in view.model.bounds.vx_m_s)) / e
         authority = correctable_later_m(situation, ranges) / fastest
         to_go_s = range_at_impulse(ranges, e, situation.lead_s) / e
-        share, reference = 1.0 / np.maximum(authority, MIN_AUTHORITY_M), unavoidable_m(situation)
+        share, reference = 1.0 / np.maximum(authority, MIN_AUTHORITY_M), unavoidable_m(situation)[:, None, None]
         impulse, effort = balanced((upper - reference) * share, (-lower - reference) * share, to_go_s * share, most)
         if (effort > 1.0).any():
             urgent, _ = balanced(upper - authority, -lower - authority, to_go_s, most)
@@ -71,43 +71,54 @@ class LeastEffort:
         return impulse
 
 
-def unavoidable_m(situation: Situation) -> float:
-    """Return the reference of `LeastEffort`, m: a miss that errors of the angles can force; zero with a schedule.
+def unavoidable_m(situation: Situation) -> Floats:
+    """Return the reference of `LeastEffort`, m, shape (C,): a miss that errors of the angles can force.
+
+    It is zero with a schedule.
 
     Two motions that differ by the sum of the error bounds at the first image, at the range x0, and at the range e tau
     look alike until then. They arrive 2 e tau (h(e tau) + h(x0))/(1 - e tau/x0) apart, less if the first image and the
     bounds of the velocity are nearer. Half of it, less what the impulses after tau can correct, is a miss of one of
     the two.
     """
-    model, thruster, e = situation.information.model, situation.thruster, situation.closing_speed_m_s
+    whole, thruster, e = situation.information.model, situation.thruster, situation.closing_speed_m_s
+    reference_m = np.zeros(len(whole.axes))
     if situation.later_times_s is not None:
-        return 0.0
-    box, x0 = model.bounds, model.bounds.x_m[0]
-    to_go_s: Floats = model.step_s * np.arange(1.0, math.ceil(x0 / (e * model.step_s)))
-    h = model.angle_sensor.error_bound
-    apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
-    widest_m = 0.5 * (min(np.ptp(box.z_m), 2.0 * h(x0) * x0) + np.ptp(box.vz_m_s) * x0 / e)
+        return reference_m
+    x0 = whole.bounds.x_m[0]
+    to_go_s: Floats = whole.step_s * np.arange(1.0, math.ceil(x0 / (e * whole.step_s)))
     correctable_m = thruster.max_impulse_m_s * (np.cumsum(to_go_s) - to_go_s)
-    return float((np.minimum(apart_m, widest_m) - correctable_m).max(initial=0.0))
+    for axis, model in enumerate(map(whole.axis, whole.axes)):
+        box, h = model.bounds, model.angle_sensor.error_bound
+        apart_m = e * to_go_s * (h(e * to_go_s) + h(x0)) / (1.0 - e * to_go_s / x0)
+        widest_m = 0.5 * (min(np.ptp(box.z_m), 2.0 * h(x0) * x0) + np.ptp(box.vz_m_s) * x0 / e)
+        reference_m[axis] = (np.minimum(apart_m, widest_m) - correctable_m).max(initial=0.0)
+    return reference_m
 
 
 def _between(values: Floats) -> Floats:
-    """Return values of sections, shape (B, S), with `PARTS` - 1 interpolated ones between neighbours."""
+    """Return values of sections, shape (..., B, S), with `PARTS` - 1 interpolated ones between neighbours."""
     share = np.arange(PARTS) / PARTS
-    inner = values[:, :-1, None] * (1.0 - share) + values[:, 1:, None] * share
-    return np.concatenate([inner.reshape(len(values), -1), values[:, -1:]], axis=1)
+    inner = values[..., :-1, None] * (1.0 - share) + values[..., 1:, None] * share
+    return np.concatenate([inner.reshape(*values.shape[:-1], -1), values[..., -1:]], axis=-1)
 
 
 def balanced(falling: Floats, rising: Floats, slopes: Floats, most: float) -> tuple[Floats, Floats]:
-    """Return the u, |u| <= most, where the maximum of falling - slopes u and rising + slopes u is smallest, and it."""
-    at, value = np.zeros((2, len(falling)))
-    balance_all(falling, rising, slopes, float(most), at, value)
+    """Return the u, |u| <= most, where the maximum of falling - slopes u and rising + slopes u is smallest, and it.
+
+    `falling` and `rising` have the shape (C, B, S), `slopes` (B, S), and the results (C, B).
+    """
+    at, value = np.zeros((2, *falling.shape[:2]))
+    for axis in range(len(at)):
+        balance_all(falling[axis], rising[axis], slopes, float(most), at[axis], value[axis])
     return at, value
 
 
 @entry
 def balance_all(falling: Floats, rising: Floats, slopes: Floats, most: float, at: Floats, value: Floats) -> None:
-    """Write the results of `balanced`: at the minimum the maximum falling and rising lines are equal, or it is an end.
+    """Write the results of `balanced` for one axis.
+
+    At the minimum the maximum falling and rising lines are equal, or it is an end.
 
     The next trial is where the two lines that are largest now intersect, or the middle of the interval that is left.
     """

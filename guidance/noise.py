@@ -37,15 +37,14 @@ class LineOfSight:
 
     Parameters
     ----------
-    alpha_rad, omega_rad_s : ndarray, shape (B,)
-        True line-of-sight angle (rad) and its rate (rad/s). In space, shape (2, B): the angles atan2(y, x) and
-        atan2(z, x).
+    alpha_rad, omega_rad_s : ndarray, shape (C, B)
+        True line-of-sight angles atan2(z, x), in space atan2(y, x) and atan2(z, x), rad, and their rates, rad/s.
     range_m : ndarray, shape (B,)
         True distance, m.
     sensors : mapping of str to Sensor
         Sensors that measure in this step, by name: "angle", "range", "rate".
     pending : sequence of (float, ndarray)
-        Impulses that are decided and not given yet: time from now, s, and impulse, m/s.
+        Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (C, B).
     """
 
     step: int
@@ -87,9 +86,9 @@ def checked_measurements(measured: Measurements, sight: LineOfSight, noise: obje
 
 
 def need_draws(name: str, draws: Floats) -> None:
-    """Raise ValueError if errors, in units of their bounds, are not within [-1, 1] or not of shape ([2,] B, steps)."""
-    if not isinstance(draws, np.ndarray) or draws.shape[:-2] not in ((), (2,)) or draws.ndim < 2:
-        raise ValueError(f"{name} must have the shape (B, steps), or (2, B, steps) in space: got {np.shape(draws)}")
+    """Raise ValueError if errors, in units of their bounds, are not in [-1, 1], or not of shape ([C,] B, steps)."""
+    if not isinstance(draws, np.ndarray) or draws.ndim not in (2, 3):
+        raise ValueError(f"{name} must have the shape (C, B, steps), or (B, steps) for ranges: got {np.shape(draws)}")
     if not (np.abs(real_values(name, draws)) <= 1.0).all():  # refuses NaN as well
         raise ValueError(f"{name} must lie within [-1, 1], in units of the bound")
 
@@ -117,7 +116,7 @@ class MeasurementNoise(Protocol):
 
         Returns
         -------
-        mapping of str to ndarray, shape (B,)
-            Measured values by sensor, rad, m or rad/s. A sensor that is left out gives no measurement in this step. In
-            space, angles and rates have shape (2, B).
+        mapping of str to ndarray
+            Measured values by sensor: angles (rad) and rates (rad/s), shape (C, B), ranges (m), shape (B,). A sensor
+            that is left out gives no measurement in this step.
         """

@@ -54,7 +54,7 @@ class Patient:
             raise ValueError(f"share must lie from 0 to 1: got {share}")
         self.share = share
 
-    def start(self, batch: int) -> None:
+    def start(self, shape: tuple[int, int]) -> None:
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
@@ -63,8 +63,11 @@ class Patient:
         symmetric = symmetric_impulse(miss, e, lead_s)
         if situation.last_s <= lead_s + LAST_SECONDS_S:
             return symmetric
-        above = np.maximum(miss.upper_m - self.share * correctable_later_m(situation, miss.upper_point.range_m), 0.0)
-        below = np.minimum(miss.lower_m + self.share * correctable_later_m(situation, miss.lower_point.range_m), 0.0)
+        later_m = correctable_later_m(
+            situation, np.stack([miss.lower_point.range_m, miss.upper_point.range_m], axis=-1)
+        )
+        above = np.maximum(miss.upper_m - self.share * later_m[..., 1], 0.0)
+        below = np.minimum(miss.lower_m + self.share * later_m[..., 0], 0.0)
         upper_range = range_at_impulse(miss.upper_point.range_m, e, lead_s)
         lower_range = range_at_impulse(miss.lower_point.range_m, e, lead_s)
         certain = _impulse(np.maximum(miss.lower_m, 0.0), lower_range, e) + _impulse(

@@ -18,7 +18,7 @@ from infoset.limits import Checked, Limits
 class ManoeuvreState:
     """State of predictive guidance.
 
-    `due_s`, shape (B,), is the time to go at which the next manoeuvre begins, s; infinite before the first estimate.
+    `due_s`, shape (C, B), is the time to go at which the next manoeuvre begins, s; infinite before the first estimate.
     """
 
     estimator: Estimator
@@ -32,8 +32,8 @@ class Predictive(Checked):
     Parameters
     ----------
     estimator : callable
-        `KalmanBank`, or another function of the number of engagements and of whether it estimates the acceleration of
-        the target; it returns an `Estimator`.
+        `KalmanBank`, or another function of the shape (C, B) of impulses and of whether it estimates the acceleration
+        of the target; it returns an `Estimator`.
     spacing : float
         The ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has no scheduled times.
 
@@ -63,9 +63,9 @@ class Predictive(Checked):
     estimator: EstimatorKind = KalmanBank
     spacing: Annotated[float, Limits(above=1.0)] = 1.5
 
-    def start(self, batch: int) -> ManoeuvreState:
+    def start(self, shape: tuple[int, int]) -> ManoeuvreState:
         """Start before the first manoeuvre."""
-        return ManoeuvreState(self.estimator(batch, False), np.full(batch, np.inf))
+        return ManoeuvreState(self.estimator(shape, False), np.full(shape, np.inf))
 
     def decide(self, situation: Situation, state: ManoeuvreState) -> Floats:
         """Update the estimate, and return the impulses of a manoeuvre if one is due, m/s."""

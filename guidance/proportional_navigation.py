@@ -29,8 +29,8 @@ class ProportionalNavigation(Checked):
     Parameters
     ----------
     estimator : callable
-        `KalmanBank`, or another function of the number of engagements and of whether it estimates the acceleration of
-        the target; it returns an `Estimator`.
+        `KalmanBank`, or another function of the shape (C, B) of impulses and of whether it estimates the acceleration
+        of the target; it returns an `Estimator`.
     is_augmented : bool
         Estimate the lateral acceleration of the target, and compensate for it (augmented proportional navigation).
     ratio : float
@@ -68,9 +68,9 @@ class ProportionalNavigation(Checked):
     ratio: Annotated[float, Limits(above=2.0)] = 3.0
     dead_band_m_s: NotNegative | None = None
 
-    def start(self, batch: int) -> PulseState:
+    def start(self, shape: tuple[int, int]) -> PulseState:
         """Start without commands."""
-        return PulseState(self.estimator(batch, self.is_augmented), np.zeros(batch))
+        return PulseState(self.estimator(shape, self.is_augmented), np.zeros(shape))
 
     def decide(self, situation: Situation, state: PulseState) -> Floats:
         """Update the estimate, and return the accumulated commands beyond the dead band, m/s."""

@@ -18,9 +18,9 @@ class ScriptedNoise:
 
     Parameters
     ----------
-    errors : mapping of str to ndarray, shape (B, steps)
+    errors : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
         Errors by sensor, within [-1, 1]: an angle alpha + u h(d), a range d (1 + u b). A sensor without errors measures
-        the true value. In space, errors of angles and rates have shape (2, B, steps).
+        the true value.
 
     Raises
     ------
@@ -69,10 +69,9 @@ class RandomNoise(ScriptedNoise):
 
     Parameters
     ----------
-    errors : mapping of str to ndarray, shape (B, steps)
-        Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound. In space, draws of angles and rates
-        have shape (2, B, steps).
-    bias : ndarray, shape (B,), or (2, B) in space, or None
+    errors : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
+        Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound.
+    bias : ndarray, shape (C, B), or None
         Constant errors of the centroid part of a camera's bound, in units of that part; `errors` are then those of the
         pixel part. None draws errors of the whole bound.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,15 +12,14 @@ from guidance.thruster import Thruster
 from infoset import InformationSetView, PredictedMiss
 from infoset.arrays import Flags, Floats
 from infoset.sensor import Measurements, Sensor
-from infoset.sensors import AngleSensor
 
 
 @dataclass(frozen=True)
 class Situation:
     """Everything known on board at one step, for a batch of B engagements.
 
-    In space, predicted misses, measured angles, rates and impulses have shape (2, B), along y and z. `axis` gives the
-    planar situation of x and one of them.
+    Predicted misses, measured angles, rates and impulses have the shape (C, B), for C lateral axes: z in a plane, y and
+    z in space.
 
     Parameters
     ----------
@@ -32,10 +31,10 @@ class Situation:
         Limits of the engine; they are applied to what the strategy returns.
     closing_speed_m_s : float
         The nominal closing speed e, m/s.
-    measured : mapping of str to ndarray, shape (B,)
-        Last measured values by sensor, "angle" (rad), "range" (m) and "rate" (rad/s); a sensor that has not measured
-        yet is missing, and NaN is the value of an engagement without a measurement so far.
-    last_impulse_m_s : ndarray, shape (B,)
+    measured : mapping of str to ndarray
+        Last measured values by sensor, "angle" (rad) and "rate" (rad/s), shape (C, B), and "range" (m), shape (B,); a
+        sensor that has not measured yet is missing, and NaN is the value of an engagement without a measurement so far.
+    last_impulse_m_s : ndarray, shape (C, B)
         Impulses of the previous step, m/s.
     information : InformationSetView
         The information set itself, read-only.
@@ -52,7 +51,7 @@ class Situation:
     later_times_s : ndarray, shape (n,), or None
         Times since the start at which impulses of later decisions can be given, s; None is every later step.
     pending : tuple of (float, ndarray)
-        Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (B,). `predicted_miss`
+        Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (C, B). `predicted_miss`
         contains their effect, and `information` does not.
     """
 
@@ -94,40 +93,18 @@ class Situation:
         return float(self.later_times_s[-1]) - self.time_s if self.later_times_s.size else self.lead_s
 
     def pending_m(self, time_to_go_s: Floats) -> Floats:
-        """Return the changes of a predicted miss by the pending impulses, m, which are to be subtracted from it.
+        """Return the changes of predicted misses by the pending impulses, m, which are to be subtracted from them.
 
         Parameters
         ----------
-        time_to_go_s : ndarray, shape (B,) or (B, S)
+        time_to_go_s : ndarray, shape (B, S) or (C, B, S)
             Time to x = 0 of the predicted misses.
+
+        Returns
+        -------
+        ndarray, shape (C, B, S)
         """
-        change = np.zeros(time_to_go_s.shape)
+        change = np.zeros((len(self.last_impulse_m_s), *time_to_go_s.shape[-2:]))
         for time_s, impulse in self.pending:
-            change += (impulse.T * np.maximum(time_to_go_s - time_s, 0.0).T).T
+            change += impulse[..., None] * np.maximum(time_to_go_s - time_s, 0.0)
         return change
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """Lateral axes: ("z",) in a plane, ("y", "z") in space."""
-        return self.information.model.axes
-
-    def axis(self, name: str) -> Situation:
-        """Return the planar situation of x and one lateral axis, "y" or "z", which is z in it.
-
-        Budget and engine are the whole ones.
-        """
-        if len(self.axes) == 1:
-            return self
-        number = self.axes.index(name)
-        return replace(
-            self,
-            predicted_miss=self.predicted_miss.axis(number),
-            measured={key: values if values.ndim == 1 else values[number] for key, values in self.measured.items()},
-            last_impulse_m_s=self.last_impulse_m_s[number],
-            information=self.information.axis(name),
-            sensors={
-                key: sensor.axis(name) if isinstance(sensor, AngleSensor) else sensor
-                for key, sensor in self.sensors.items()
-            },
-            pending=tuple((time_s, impulse[number]) for time_s, impulse in self.pending),
-        )

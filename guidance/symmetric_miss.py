@@ -19,7 +19,7 @@ class SymmetricMiss:
 
     name = "symmetric-miss"
 
-    def start(self, batch: int) -> None:
+    def start(self, shape: tuple[int, int]) -> None:
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:

@@ -19,7 +19,7 @@ STEP_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Thruster:
-    """An engine that gives impulses across x, along z in a plane, limited in size and in their sum.
+    """An engine that gives impulses across x, limited in size and in their sum.
 
     Parameters
     ----------
@@ -112,16 +112,14 @@ class Thruster:
 
         Parameters
         ----------
-        wanted_m_s : ndarray, shape (B,), or (2, B) in space
-            Impulses of the strategy: signed, or (y, z).
+        wanted_m_s : ndarray, shape (C, B)
+            Impulses of the strategy.
         budget_left_m_s : ndarray, shape (B,)
             Budget n that is left.
         """
         size, limit = modulus(wanted_m_s), np.minimum(self.max_impulse_m_s, budget_left_m_s)
         given, over = wanted_m_s, size > limit
-        if wanted_m_s.ndim == 1:
-            given = np.copysign(np.minimum(size, limit), wanted_m_s)
-        elif over.any():
+        if over.any():
             given = np.where(over, wanted_m_s / np.where(over, size, 1.0) * limit, wanted_m_s)
             # Rounding must not make the modulus greater than the limit.
             while (above := modulus(given) > limit).any():
@@ -134,7 +132,7 @@ class Thruster:
 
         Parameters
         ----------
-        impulse_m_s : ndarray, shape (B,), or (2, B) in space
+        impulse_m_s : ndarray, shape (C, B)
             Commanded impulses.
         size, direction : ndarray, shape (B,), or None
             Errors of the modulus, and of the direction from y toward z, in units of their bounds; None is zero.
@@ -143,11 +141,11 @@ class Thruster:
             impulse_m_s = impulse_m_s * (1.0 + self.execution_error_relative * size)
         if direction is not None:
             sine, cosine = (turn(self.pointing_error_rad * direction) for turn in (np.sin, np.cos))
-            y, z = impulse_m_s
+            y, z = impulse_m_s  # only impulses in space have an error of the direction
             impulse_m_s = np.stack([cosine * y - sine * z, cosine * z + sine * y])
         return impulse_m_s
 
 
 def modulus(lateral: Floats) -> Floats:
-    """Return the moduli, shape (B,), of lateral values of shape (B,) in a plane or (2, B) in space."""
-    return np.abs(lateral) if lateral.ndim == 1 else np.hypot(*lateral)
+    """Return the moduli, shape (B,), of lateral values of shape (C, B)."""
+    return np.asarray(np.hypot.reduce(np.abs(lateral)))

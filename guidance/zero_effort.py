@@ -29,7 +29,7 @@ class ZeroEffortMiss:
 
     name = "zero-effort-miss"
 
-    def start(self, batch: int) -> None:
+    def start(self, shape: tuple[int, int]) -> None:
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
@@ -40,11 +40,11 @@ class ZeroEffortMiss:
         # The addition keeps the weights positive if every section is a single point.
         width = upper - lower + np.finfo(np.float64).tiny
         weight = np.where(living, width, 0.0)
-        weight = weight / np.maximum(weight.max(axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        weight = weight / np.maximum(weight.max(axis=-1, keepdims=True), np.finfo(np.float64).tiny)
         middle = 0.5 * (lower + upper)
         if situation.pending:
             middle = middle - situation.pending_m(ranges / e)
         ranges = range_at_impulse(ranges, e, situation.lead_s)
-        wanted = (weight * middle * ranges).sum(axis=1) * e
-        square = (weight * ranges**2).sum(axis=1)
+        wanted = (weight * middle * ranges).sum(axis=-1) * e
+        square = (weight * ranges**2).sum(axis=-1)
         return np.asarray(np.divide(wanted, square, out=np.zeros_like(wanted), where=square > 0.0))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -14,7 +12,7 @@ from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, RATE, WIDENING, H
 from infoset.engine.section_law import BOUND_SLACK, section_laws
 from infoset.engine.section_stack import SectionStack
 from infoset.engine.set_state import SetState, SetStatus
-from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, real_values, shown
+from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, shown
 from infoset.model import Recovery, SetModel
 from infoset.set_queries import SetQueries
 
@@ -22,27 +20,8 @@ from infoset.set_queries import SetQueries
 class InformationSetView(SetQueries):
     """Read-only view of an information set. It follows the set and cannot change it."""
 
-    def axis(self, name: str) -> InformationSetView:
-        """Return the view of the plane of x and one lateral axis, "y" or "z", with the queries of a planar set."""
-        return self._views[name]
-
-    @cached_property
-    def _views(self) -> dict[str, InformationSetView]:
-        return {name: InformationSetView(self._state, name) for name in self.axes}
-
     def copy(self) -> InformationSet:
-        """Return an independent information set that starts from the state of this one.
-
-        Raises
-        ------
-        TypeError
-            If this is the view of one axis of a set in space.
-        """
-        if self.axes != self._state.model.axes:
-            raise TypeError(
-                "the view of one axis cannot be copied: copy the view of the whole set, which a strategy with "
-                "`spatial = True` gets"
-            )
+        """Return an independent information set that starts from the state of this one."""
         twin = InformationSet.__new__(InformationSet)
         SetQueries.__init__(twin, self._state.copy())
         return twin
@@ -150,7 +129,7 @@ class InformationSet(InformationSetView):
             Bound b, in [0, 1).
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
-        alpha_rad : array_like, shape () or (B,), in space (2,) or (2, B), or None
+        alpha_rad : array_like, shape () or (C, B), or None
             Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
             a measured angle, alpha is bounded by the maximum possible displacement across x.
 
@@ -186,7 +165,7 @@ class InformationSet(InformationSetView):
         """Lower bound of x over the distance, shape (B,): from measured angles, or from the maximum velocity."""
         stack, travelled = self._state.stack, self.model.closing_speed_m_s * self.time_s
         if measured_rad is not None:
-            alpha, steepest = self._spread(measured_rad, "alpha_rad"), np.empty((2, self.batch))
+            alpha, steepest = self._lateral("alpha_rad", measured_rad), np.empty((2, self.batch))
             section_passes.steepest_all(alpha, stack.law.label_max - travelled, stack.table, steepest)
             return np.asarray(np.cos(steepest[0]) * np.cos(steepest[1]))
         box = self.model.bounds
@@ -202,12 +181,12 @@ class InformationSet(InformationSetView):
 
         Parameters
         ----------
-        alpha_rad : array_like, shape () or (B,), in space (2,) or (2, B)
-            Measured angle alpha_m, rad; in space both angles, that of y first.
+        alpha_rad : array_like, shape () or (C, B)
+            Measured angle alpha_m along each lateral axis, rad.
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
         """
-        measured = self._spread(alpha_rad, "alpha_rad")
+        measured = self._lateral("alpha_rad", alpha_rad)
         state, active = self._state, self._active(where)
         event = state.history.record(ANGLE, measured, active)
         before = state.lower_label.copy(), state.upper_label.copy()
@@ -221,8 +200,8 @@ class InformationSet(InformationSetView):
 
         Parameters
         ----------
-        omega_rad_s : array_like, shape () or (B,), in space (2,) or (2, B)
-            Measured rate, rad/s; in space those of both plane angles, that of y first.
+        omega_rad_s : array_like, shape () or (C, B)
+            Measured rate of the plane angle along each lateral axis, rad/s.
         error_rad_s : float
             Error bound of the rate, rad/s.
         where : array_like of bool, shape () or (B,)
@@ -233,7 +212,7 @@ class InformationSet(InformationSetView):
         Kumkov and Patsko (2001).
         """
         NOT_NEGATIVE.need("error_rad_s", error_rad_s)
-        measured = self._spread(omega_rad_s, "omega_rad_s")
+        measured = self._lateral("omega_rad_s", omega_rad_s)
         state, active = self._state, self._active(where)
         error = error_rad_s * (1.0 + BOUND_SLACK)
         event = state.history.record(RATE, measured, active, error)
@@ -247,12 +226,12 @@ class InformationSet(InformationSetView):
 
         Parameters
         ----------
-        impulse_m_s : array_like, shape () or (B,), in space (2,) or (2, B)
-            Impulse k along z, m/s; in space along y and z.
+        impulse_m_s : array_like, shape () or (C, B)
+            Impulse k along each lateral axis, m/s.
         where : array_like of bool, shape () or (B,)
             Engagements with an impulse.
         """
-        impulse = self._spread(impulse_m_s, "impulse_m_s")
+        impulse = self._lateral("impulse_m_s", impulse_m_s)
         state, elapsed = self._state, self._state.history.elapsed
         active = self._computes_phi & flags("where", where, (self.batch,)) & impulse.any(axis=0)
         if state.phi is not None:
@@ -317,19 +296,9 @@ class InformationSet(InformationSetView):
         """Stop the computation in the engagements where `where`, shape () or (B,), is true."""
         self._state.status[flags("where", where, (self.batch,))] = SetStatus.STOPPED.value
 
-    def _spread(self, value: ArrayLike, name: str) -> Floats:
+    def _lateral(self, name: str, value: ArrayLike) -> Floats:
         """Return values along each axis, shape (C, B)."""
-        channels = len(self._state.stack.laws)
-        if channels == 1:
-            return np.ascontiguousarray(real_array(name, value, (self.batch,)).reshape(1, self.batch))
-        values, shape = real_values(name, value), (channels, self.batch)
-        if values.shape == (channels,):
-            values = np.repeat(values[:, None], self.batch, axis=1)
-        if values.shape != shape:
-            raise ValueError(
-                f"{name} must have two values, along y and z, or the shape {shape}: got the shape {values.shape}"
-            )
-        return np.ascontiguousarray(real_array(name, values, shape))
+        return np.ascontiguousarray(real_array(name, value, (len(self.axes), self.batch)))
 
     def _active(self, where: ArrayLike) -> Flags:
         return np.asarray(self.tracking & flags("where", where, (self.batch,)))

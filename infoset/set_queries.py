@@ -38,27 +38,20 @@ class Section:
         Range at t = 0, which is the hypothesis of the section, and range now, m.
     closing_speed_m_s : float
         Nominal closing speed e, m/s.
-    polygon : ConvexPolygons
-        All (V, z) that agree with the history, m/s and m.
-    polygon_y : ConvexPolygons or None
-        All (V_y, y) in space, where the section is the product of both; None in a plane.
+    polygons : ConvexPolygons, shape (C,)
+        Velocities and offsets along each lateral axis that agree with the history, m/s and m: (V, z) in a plane,
+        (V_y, y) and (V, z) in space, where the section is the product of both.
     """
 
     label_m: float
     range_m: float
     closing_speed_m_s: float
-    polygon: ConvexPolygons
-    polygon_y: ConvexPolygons | None = None
+    polygons: ConvexPolygons
 
     @property
     def omega_alpha(self) -> ConvexPolygons:
-        """The section in the (omega, alpha) plane, rad/s and rad."""
-        return to_omega_alpha(self.polygon, self.range_m, self.closing_speed_m_s)
-
-    @property
-    def omega_alpha_y(self) -> ConvexPolygons | None:
-        """The section in the (omega, alpha) plane of the y axis, rad/s and rad; None in a plane."""
-        return None if self.polygon_y is None else to_omega_alpha(self.polygon_y, self.range_m, self.closing_speed_m_s)
+        """The section in the (omega, alpha) plane of each lateral axis, rad/s and rad, shape (C,)."""
+        return to_omega_alpha(self.polygons, self.range_m, self.closing_speed_m_s)
 
 
 def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
@@ -86,33 +79,23 @@ _TRACKING = SetStatus.TRACKING.value
 
 
 class SetQueries:
-    """Queries of B information sets.
+    """Queries of B information sets with C lateral axes: z in a plane, y and z in space.
 
-    The leading axis of a result is the engagement. In space, a result that belongs to a lateral axis has an axis more
-    in front, of length 2: that of y and that of z.
+    Results have the shape (B, ...), or (C, B, ...) if they belong to the lateral axes.
 
     Parameters
     ----------
     state : SetState
         The state to read. It may be shared with the set that changes it.
-    axis : str or None
-        Lateral axis, "y" or "z", whose plane is read as that of a planar set; None is the whole set.
     """
 
-    def __init__(self, state: SetState, axis: str | None = None) -> None:
-        self.model = state.model if axis is None else state.model.axis(axis)
-        self._state = state
-        names = state.model.axes
-        self._channels = [names.index(name) for name in (names if axis is None else (axis,))]
+    def __init__(self, state: SetState) -> None:
+        self.model, self._state = state.model, state
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Lateral axes: ("z",) in a plane, ("y", "z") in space; one of them in the view of an axis."""
-        return tuple(self._state.model.axes[channel] for channel in self._channels)
-
-    def _by_axis(self, values: Floats) -> Floats:
-        """Return the part of values of shape (C, ...) that belongs to the axes, without their axis if it is one."""
-        return values if len(self._channels) > 1 else np.asarray(values[self._channels[0]])
+        """Lateral axes: ("z",) in a plane, ("y", "z") in space."""
+        return self.model.axes
 
     @property
     def batch(self) -> int:
@@ -186,11 +169,10 @@ class SetQueries:
 
         Returns
         -------
-        alpha_min, alpha_max, range_of_min, range_of_max : ndarray, shape (B,), in space (2, B)
+        alpha_min, alpha_max, range_of_min, range_of_max : ndarray, shape (C, B)
             rad and m; zeros where no section lives.
         """
-        extremes = self._state.stack.extreme_angles(self._state.history.elapsed)
-        minimum, maximum, of_min, of_max = (self._by_axis(values) for values in extremes)
+        minimum, maximum, of_min, of_max = self._state.stack.extreme_angles(self._state.history.elapsed)
         return minimum, maximum, of_min, of_max
 
     def predicted_miss(self, pending: Sequence[tuple[float, Floats]] = ()) -> PredictedMiss:
@@ -199,22 +181,19 @@ class SetQueries:
         Parameters
         ----------
         pending : sequence of (float, ndarray)
-            Later impulses that count as given: time from now, s, and impulse, m/s, shape (B,), in space (2, B).
+            Later impulses that count as given: time from now, s, and impulse, m/s, shape (C, B).
 
         References
         ----------
         Kumkov and Patsko (1997), equations (13) and (14).
         """
-        shape = (len(self._state.model.axes), self.batch)
-        impulses = [(time_s, np.reshape(impulse, shape)) for time_s, impulse in pending]
-        exists, ends = self._state.stack.widest(self._state.history.elapsed, impulses)
-        ends = self._by_axis(ends)
+        exists, ends = self._state.stack.widest(self._state.history.elapsed, pending)
         lower, upper = ([ends[..., end, column] for column in range(4)] for end in (0, 1))
         return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum predicted miss of each section, m, each (B, S); zeros if it is empty."""
-        summaries, living = self._by_axis(self._state.stack.summaries), self.living
+        """Return minimum and maximum predicted miss of each section, m, each (C, B, S); zeros if it is empty."""
+        summaries, living = self._state.stack.summaries, self.living
         lower, upper = summaries[..., section_life.LOWER_MISS], summaries[..., section_life.UPPER_MISS]
         return np.where(living, lower, 0.0), np.where(living, upper, 0.0)
 
@@ -225,7 +204,9 @@ class SetQueries:
         labels, ranges = stack.labels[engagement].tolist(), self.ranges_m[engagement].tolist()
         return [
             self._section(
-                labels[s], ranges[s], [stack.polygon(channel, engagement, s, elapsed) for channel in self._channels]
+                labels[s],
+                ranges[s],
+                [stack.polygon(axis, engagement, s, elapsed) for axis in range(len(self.axes))],
             )
             for s in np.flatnonzero(self.living[engagement]).tolist()
         ]
@@ -233,7 +214,7 @@ class SetQueries:
     def _section(self, label_m: float, range_m: float, outlines: list[Floats]) -> Section:
         """Return a section from the vertices along each axis."""
         polygons = [ConvexPolygons.unchecked(vertices, np.array(len(vertices))) for vertices in outlines]
-        return Section(label_m, range_m, self.model.closing_speed_m_s, *polygons[::-1])
+        return Section(label_m, range_m, self.model.closing_speed_m_s, ConvexPolygons.stack(polygons))
 
     def section_at(self, label_m: float, engagement: int = 0) -> Section:
         """Return the section at any label, computed by replaying the history.
@@ -257,9 +238,9 @@ class SetQueries:
         history, stack, label = self._state.history, self._state.stack, float(label_m)
         past = past_of(history, stack.table)
         died = replay_label(label, engagement, past)
-        outlines = [np.empty((0, 2)) for _ in self._channels]
+        outlines = [np.empty((0, 2)) for _ in self.axes]
         if died == section_life.ALIVE:
-            rows = [ROWS * channel + PROBE for channel in self._channels]
+            rows = [ROWS * axis + PROBE for axis in range(len(self.axes))]
             outlines = [outline(past.room.chains, row, label, history.elapsed, stack.law) for row in rows]
         x = label - stack.law.closing_speed * (stack.law.step * history.elapsed)
         return self._section(label, x, outlines)
@@ -269,12 +250,12 @@ class SetQueries:
         if engagement >= self.batch:
             raise IndexError(f"engagement must be less than {self.batch}, the number of engagements: got {engagement}")
 
-    def to_shapely(self, engagement: int = 0) -> list[BaseGeometry]:
+    def to_shapely(self, engagement: int = 0, axis: int = -1) -> list[BaseGeometry]:
         """Return the living sections of one engagement as shapely geometries of (omega, alpha), rad/s and rad.
 
-        Those of a set in space are of the z axis; ``axis("y").to_shapely()`` returns those of y.
+        `axis` is the index of the lateral axis in `axes`; the last one is z.
         """
-        return [section.omega_alpha.to_shapely() for section in self.sections(engagement)]
+        return [section.omega_alpha[axis].to_shapely() for section in self.sections(engagement)]
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.batch} at t = {self.time_s:g} s>"

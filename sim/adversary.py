@@ -80,13 +80,11 @@ class WorstEngagement:
         Whether the true state was inside its section after every measurement.
     position_m, velocity_m_s : ndarray, shape (2,) or (3,)
         Start: (z, x) and (V_z, V_x); (y, z, x) and (V_y, V_z, V_x) in space.
-    errors : mapping of str to ndarray, shape (steps,)
-        Measurement errors by sensor in units of their bounds, zero where nothing was measured; shape (2, steps), along
-        y and z, for a sensor that measures both axes. `ScriptedNoise` with these errors repeats the engagement, bit for
-        bit.
-    accelerations_m_s2 : ndarray, shape (steps,), or None
-        Accelerations of the target, m/s^2; shape (2, steps), along y and z, in space. None if the target is that of the
-        scenario.
+    errors : mapping of str to ndarray, shape (C, steps), for ranges (steps,)
+        Measurement errors by sensor in units of their bounds, zero where nothing was measured. `ScriptedNoise` with
+        these errors repeats the engagement, bit for bit.
+    accelerations_m_s2 : ndarray, shape (C, steps), or None
+        Accelerations of the target, m/s^2. None if the target is that of the scenario.
     max_acceleration_m_s2 : mapping of str to float
         Maximum acceleration of the searched targets by lateral axis, m/s^2; empty if the target is that of the
         scenario.
@@ -95,7 +93,7 @@ class WorstEngagement:
     sets_emptied : int
         Number of simulated engagements whose set became empty. If it is zero, `keep_set` makes no difference.
     lateral_miss_m : mapping of str to float
-        Position at the closest approach by lateral axis, y and z, m; empty in a plane.
+        Position at the closest approach by lateral axis, m.
     history : tuple of (int, float)
         Evaluations and maximum value so far, m, at each increase.
     """
@@ -285,9 +283,7 @@ class _Search:
             changes=int(elite.plans.changes[0]),
             evaluations=self.evaluations,
             sets_emptied=self.sets_emptied,
-            lateral_miss_m=(
-                dict(zip("yz", elite.lateral_miss_m[0].tolist(), strict=True)) if self.scenario.is_spatial else {}
-            ),
+            lateral_miss_m=dict(zip(self.scenario.set_model.axes, elite.lateral_miss_m[0].tolist(), strict=True)),
             history=tuple(self.history),
         )
 
@@ -324,7 +320,7 @@ class _Search:
             outcomes=np.array(results.outcomes, dtype=object),
             set_emptied=results.set_emptied,
             truth_kept=results.truth_kept,
-            lateral_miss_m=results.lateral_miss.filled(np.nan),
+            lateral_miss_m=results.lateral_miss_m,
         )
 
     def _select(self, outcomes: Flown, young: bool) -> None:

@@ -101,7 +101,7 @@ def images_s(scenario: Scenario) -> tuple[float, float]:
 
 
 def worst_shift_m(scenario: Scenario) -> Floats | None:
-    """Return how far game noise shifts the measured position across x in each step, m; in space by axis, (2, steps).
+    """Return how far game noise shifts the measured position across x in each step, m, shape (C, steps).
 
     None without a cut-off or times of impulses, or with fewer than two images before the last decision.
 
@@ -120,7 +120,7 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     if before_s.size < 2:
         return None
     shifts_m = [_worst_shift_along_m(model.axis(name), before_s, scenario.nominal_arrival_s) for name in model.axes]
-    return np.stack(shifts_m) if scenario.is_spatial else shifts_m[0]
+    return np.stack(shifts_m)
 
 
 def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) -> Floats:

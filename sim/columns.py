@@ -8,8 +8,6 @@ from enum import Enum
 from functools import cache
 from typing import Any, TypeVar, cast
 
-import numpy as np
-
 _Owner = TypeVar("_Owner")
 
 
@@ -32,8 +30,8 @@ class Column:
     optional : bool
         Whether CSV and JSON leave the column out if it is unknown in all runs.
     field, component, derived : str, int or None, bool
-        Set by `columns_of`: name of the field, index along the second axis of a field of shape (B, 2), None for a field
-        of shape (B,), and whether the field is computed from others (``init=False``).
+        Set by `columns_of`: name of the field, index from the end along the second axis of a field of shape (B, n),
+        None for a field of shape (B,), and whether the field is computed from others (``init=False``).
     """
 
     name: str
@@ -56,7 +54,12 @@ def columns(*declared: Column) -> dict[str, tuple[Column, ...]]:
 def columns_of(owner: Any) -> tuple[Column, ...]:
     """Return the columns that a dataclass declares, in the order of its fields."""
     return tuple(
-        replace(column, field=field.name, component=index if len(declared) > 1 else None, derived=not field.init)
+        replace(
+            column,
+            field=field.name,
+            component=index - len(declared) if len(declared) > 1 else None,
+            derived=not field.init,
+        )
         for field in fields(owner)
         for declared in [field.metadata.get("columns", ())]
         for index, column in enumerate(declared)
@@ -68,7 +71,7 @@ def columns_with_values(owner: Any) -> tuple[Column, ...]:
     return tuple(
         column
         for column in columns_of(owner.__class__)
-        if not column.optional or not np.ma.getmaskarray(getattr(owner, column.field)).all()
+        if not column.optional or any(value is not None for value in values_of(owner, column))
     )
 
 
@@ -77,7 +80,11 @@ def values_of(owner: object, column: Column) -> list[Any]:
     values: Any = getattr(owner, column.field)
     if isinstance(values, tuple):
         return [value.value for value in values]
-    plain: list[Any] = (values if column.component is None else values[:, column.component]).tolist()
+    if column.component is not None:
+        if -column.component > values.shape[1]:  # in a plane nothing is along y
+            return [None] * len(values)
+        values = values[:, column.component]
+    plain: list[Any] = values.tolist()
     return plain
 
 
@@ -88,12 +95,13 @@ def documented(owner: type[_Owner]) -> type[_Owner]:
     for field in fields(cast("Any", owner)):
         declared: tuple[Column, ...] = field.metadata.get("columns", ())
         if declared:
-            first = declared[0]
-            array = "masked array" if first.nullable else "tuple" if issubclass(first.kind, Enum) else "ndarray"
-            shape = "(B,)" if len(declared) == 1 else f"(B, {len(declared)})"
+            last = declared[-1]
+            array = "masked array" if last.nullable else "tuple" if issubclass(last.kind, Enum) else "ndarray"
+            fewest = sum(not column.optional for column in declared)
+            shape = "(B,)" if len(declared) == 1 else f"(B, {fewest} or {len(declared)})"
             meaning = "; ".join(column.meaning for column in declared)
-            unit = f" Unit: {first.unit}." if first.unit else ""
+            unit = f" Unit: {last.unit}." if last.unit else ""
             lines = parameters if field.init else attributes
-            lines += [f"{field.name} : {array} of {first.kind.__name__}, shape {shape}", f"    {meaning}.{unit}"]
+            lines += [f"{field.name} : {array} of {last.kind.__name__}, shape {shape}", f"    {meaning}.{unit}"]
     owner.__doc__ = "\n".join([inspect.getdoc(owner) or "", *parameters, *attributes])
     return owner

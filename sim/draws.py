@@ -26,18 +26,17 @@ class Draws:
 
     Parameters
     ----------
-    position_m, velocity_m_s : ndarray, shape (B, 2), or (B, 3) in space
+    position_m, velocity_m_s : ndarray, shape (B, C + 1)
         True relative (z, x) and (V_z, V_x) at t = 0; in space (y, z, x) and (V_y, V_z, V_x).
-    errors : mapping of str to ndarray, shape (B, steps), or (2, B, steps) in space
-        Measurement errors by sensor, in [-1, 1], in units of their bounds; in space those of y and z if the sensor
-        measures both axes.
-    tie : ndarray, shape (B, steps), or (2, B, steps) in space
+    errors : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
+        Measurement errors by sensor, in [-1, 1], in units of their bounds.
+    tie : ndarray, shape (C, B, steps)
         Choices between ties, uniform in [-1, 1]; zeros if the scenario does not choose at random.
     execution, pointing : ndarray, shape (B, steps), or None
         Errors of the impulses and of their directions in units of their bounds, uniform in [-1, 1]; None is zero.
-    target : ndarray, shape (B, steps), or (2, B, steps) in space, or None
+    target : ndarray, shape (C, B, steps), or None
         Changes of side of the target, uniform in [-1, 1]; None is zero.
-    bias : ndarray, shape (B,), or (2, B) in space, or None
+    bias : ndarray, shape (C, B), or None
         Constant errors of the centroid of a camera in units of their bound; None for a camera with random errors.
     images : ndarray, shape (B, steps), or None
         Uniform in [0, 1); an image is lost if its number is less than the probability of that. None loses no image.
@@ -63,8 +62,9 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     """Return the random numbers of some runs; run k has the same numbers in every call with the same seed."""
     steps = max_number_of_steps(scenario)
     lower, upper = corners(scenario.dispersion)
+    axes = scenario.set_model.axes
     starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
-    if scenario.is_spatial:
+    if "y" in axes:
         along_y = np.stack([generator(seed, run, START + Y).uniform(size=2) for run in runs])
         starts = np.insert(starts, [0, 2], along_y, axis=1)
     position_m, velocity_m_s = np.split(lower + (upper - lower) * starts, 2, axis=1)
@@ -73,11 +73,9 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=size) for run in runs])
 
     def lateral(stream: int, size: int = steps) -> Floats:
-        if not scenario.is_spatial:
-            return uniform(stream, size)
-        return np.stack([uniform(stream + Y, size), uniform(stream, size)])
+        return np.stack([uniform(stream + Y * (axis == "y"), size) for axis in axes])
 
-    nothing = np.broadcast_to(0.0, (*([2] if scenario.is_spatial else []), len(runs), steps))
+    nothing = np.broadcast_to(0.0, (len(axes), len(runs), steps))
     errors = {
         name: (lateral if sensor.is_lateral else uniform)(sensor.stream) for name, sensor in scenario.sensors.items()
     }

@@ -20,7 +20,7 @@ from guidance import (
 )
 from guidance.least_effort import LeastEffort
 from guidance.noise import checked_measurements
-from guidance.strategy import decide, start
+from guidance.strategy import checked_impulses
 from guidance.thruster import modulus
 from infoset import AngleSensor, InformationSet, InformationSetView, PredictedMiss
 from infoset.arrays import Flags, Floats
@@ -46,14 +46,15 @@ Pending = tuple[tuple[float, Floats], ...]
 class Step:
     """One step of a batch, after the decision and before the impulse.
 
-    In space, angles, rates, predicted misses and impulses have the shape (2, B), along y and z.
+    Angles, rates, predicted misses and impulses have the shape (C, B), for C lateral axes.
 
     Parameters
     ----------
     tracking, flying : ndarray of bool, shape (B,)
         Engagements that still measure and decide, and those before their closest approach.
-    measured : mapping of str to ndarray, shape (B,)
-        Values measured in this step, by sensor; without the sensors that measured in no engagement.
+    measured : mapping of str to ndarray
+        Values measured in this step, by sensor, shape (C, B), of ranges (B,); without the sensors that measured in no
+        engagement.
     predicted_miss : PredictedMiss
         After the measurement, before the impulse.
     impulse_m_s : ndarray, shape (B,)
@@ -104,7 +105,8 @@ class Engagements:
         self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._model = model = on_board_model(scenario)
-        self._states = start(self._strategy, batch, model.axes)
+        lateral = len(model.axes), batch
+        self._state = self._strategy.start(lateral)
         arrival_s = self._truth.arrival_s()
         self._information = InformationSet(model, batch, guarantee=guarantee)
         self._view = self._information.view()
@@ -118,7 +120,6 @@ class Engagements:
         self._arrived = np.zeros(batch, dtype=bool)
         self._tracking = np.ones(batch, dtype=bool)
         self._miss = np.full(batch, np.inf)
-        lateral = batch if len(model.axes) == 1 else (len(model.axes), batch)
         self._lateral_miss = np.zeros(lateral)
         self._budget = np.full(batch, float(scenario.thruster.budget_m_s))
         self._impulse = np.zeros(lateral)
@@ -156,7 +157,7 @@ class Engagements:
         miss = self._information.predicted_miss(pending)
         tracking = self._tracking = self._tracking & self._information.tracking
         situation = self._situation(miss, measured, pending)
-        wanted = decide(self._strategy, situation, self._states, tracking)
+        wanted = checked_impulses(self._strategy.decide(situation, self._state), situation, tracking, self._strategy)
         wanted = np.where(tracking & situation.may_fire, wanted, 0.0)
         spent = self._budget < thruster.min_impulse_m_s
         if spent.any():
@@ -278,7 +279,7 @@ class Engagements:
         return acceleration_m_s2(target, draws, self.step, self.scenario.set_model.step_s, predicted)
 
     def _true_predicted_miss(self, sight: Sight) -> Floats:
-        """Return the signed misses of the true states without further impulses, m, shape (B,), or (2, B) in space."""
+        """Return the signed misses of the true states without further impulses, m, shape (C, B)."""
         left_s = np.maximum(self._arrival_s - self.step * self.scenario.set_model.step_s, 0.0)
         return np.asarray((sight.omega_rad_s * sight.range_m - self._impulse) * left_s)
 
@@ -363,14 +364,10 @@ class Engagements:
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()
         # Without a closest approach within the maximum number of steps, the miss is the present range.
-        miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
+        passed, present = np.isfinite(self._miss), self._truth.position_m.T[:-1]
+        miss = np.where(passed, self._miss, self._truth.sight().range_m)
         radius_m = self.scenario.radius_m
-        start, lateral_miss = np.zeros((2, len(runs), 2))
         not_given = self._not_given + sum(map(modulus, self._queue))
-        if self.scenario.is_spatial:
-            start = np.stack([self._draws.position_m[:, 0], self._draws.velocity_m_s[:, 0]], axis=1)
-            present = self._truth.position_m[:, :-1].T
-            lateral_miss = np.where(np.isfinite(self._miss), self._lateral_miss, present).T
         return Results(
             runs=runs,
             miss_m=miss,
@@ -383,10 +380,9 @@ class Engagements:
             set_emptied=lost,
             hit=np.ma.MaskedArray(miss <= (radius_m or 0.0), mask=radius_m is None),
             truth_margin_m=margin,
-            position_m=self._draws.position_m[:, -2:],
-            velocity_m_s=self._draws.velocity_m_s[:, -2:],
-            lateral_start=np.ma.MaskedArray(start, mask=not self.scenario.is_spatial),
-            lateral_miss=np.ma.MaskedArray(lateral_miss, mask=not self.scenario.is_spatial),
+            position_m=self._draws.position_m,
+            velocity_m_s=self._draws.velocity_m_s,
+            lateral_miss_m=np.where(passed, self._lateral_miss, present).T,
             guarantees=self._model.is_guaranteed,
             burns_m_s=self._burns_m_s if self._number_of_burn else None,
         )

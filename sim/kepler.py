@@ -27,7 +27,7 @@ POSITION, VELOCITY, ACCELERATION, LOST = range(4)
 
 @dataclass(frozen=True)
 class Sight:
-    """True geometry of each engagement, arrays of shape (B,); in space (2, B), for the planes (x, y) and (x, z).
+    """True geometry of B engagements; arrays have the shape (C, B), for the plane of x and each lateral axis.
 
     Parameters
     ----------
@@ -36,8 +36,7 @@ class Sight:
     range_m : ndarray, shape (B,)
         Distance between the centres of mass.
     slope, slope_rate_per_s : ndarray
-        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero. In space y/x and
-        z/x.
+        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero.
     """
 
     alpha_rad: Floats
@@ -57,8 +56,8 @@ class Passage:
         Whether the closest approach lies within the step. Elsewhere the distance is infinite and the others are zero.
     arrival_s : ndarray
         Time from the beginning of the step to x = 0.
-    lateral_m : ndarray, shape (B,), or (2, B) in space
-        z, or (y, z), at the closest approach.
+    lateral_m : ndarray, shape (C, B)
+        Lateral position at the closest approach.
     """
 
     passed: Flags
@@ -70,9 +69,9 @@ class Passage:
 class KeplerMotion:
     """Motion of the object relative to the spacecraft, both in the Sun's gravity, or in free space without a `sun`.
 
-    `position_m` and `velocity_m_s` are the relative (z, x) and (V_z, V_x) at t = 0, shape (B, 2); in space (y, z, x)
-    and (V_y, V_z, V_x), shape (B, 3). The spacecraft's orbit is circular at t = 0, in the plane of the Sun and the x
-    axis and toward +x; it gives the position of the Sun. Impulses change it.
+    `position_m` and `velocity_m_s` are the relative position and velocity at t = 0, shape (B, C + 1), along the lateral
+    axes, z in a plane, y and z in space, and x. The spacecraft's orbit is circular at t = 0, in the plane of the Sun
+    and the x axis and toward +x; it gives the position of the Sun. Impulses change it.
 
     The motion is integrated in leaps of order four (`leap`) on the exact difference of the two accelerations. The error
     of the position at arrival is below 1 mm, or 1e-9 of the miss if that is greater.
@@ -88,8 +87,6 @@ class KeplerMotion:
         self._motion = np.zeros((batch, 4, axes, 2))
         self._motion[:, POSITION, :, RELATIVE] = position_m
         self._motion[:, VELOCITY, :, RELATIVE] = velocity_m_s
-        # An index of one axis and a slice of two: arrays of shape (B,) in a plane, (2, B) in space.
-        self._lateral: int | slice = 0 if axes == 2 else slice(0, 2)
         self._manoeuvre = np.zeros((batch, axes - 1))
         self._scratch = np.empty((3, *self._motion.shape[1:]))
         self._gravitational_parameter = 0.0
@@ -105,12 +102,12 @@ class KeplerMotion:
 
     @property
     def position_m(self) -> Floats:
-        """Relative (z, x), shape (B, 2); in space (y, z, x), shape (B, 3)."""
+        """Relative position along the lateral axes and x, m, shape (B, C + 1)."""
         return self._motion[:, POSITION, :, RELATIVE].copy()
 
     @property
     def velocity_m_s(self) -> Floats:
-        """Relative (V_z, V_x), shape (B, 2); in space (V_y, V_z, V_x), shape (B, 3)."""
+        """Relative velocity along the lateral axes and x, m/s, shape (B, C + 1)."""
         return self._motion[:, VELOCITY, :, RELATIVE].copy()
 
     def bodies(self) -> Floats:
@@ -121,7 +118,7 @@ class KeplerMotion:
     def sight(self) -> Sight:
         """Return the present geometry."""
         position, velocity = self.position_m.T, self.velocity_m_s.T
-        lateral, x, speed, v_x = position[self._lateral], position[X], velocity[self._lateral], velocity[X]
+        lateral, x, speed, v_x = position[:X], position[X], velocity[:X], velocity[X]
         slope = _ratio(lateral, x)
         return Sight(
             alpha_rad=np.arctan2(lateral, x),
@@ -132,9 +129,9 @@ class KeplerMotion:
         )
 
     def fire(self, impulse_m_s: Floats) -> None:
-        """Change the spacecraft's lateral velocity by impulses of shape (B,), or (2, B) in space: V becomes V - k."""
-        self._motion[:, VELOCITY, self._lateral, RELATIVE] -= impulse_m_s.T
-        self._motion[:, VELOCITY, self._lateral, SPACECRAFT] += impulse_m_s.T
+        """Change the spacecraft's lateral velocity by impulses of shape (C, B): V becomes V - k."""
+        self._motion[:, VELOCITY, :X, RELATIVE] -= impulse_m_s.T
+        self._motion[:, VELOCITY, :X, SPACECRAFT] += impulse_m_s.T
 
     def arrival_s(self) -> Floats:
         """Return the times from now to x = 0, shape (B,), s.
@@ -156,11 +153,10 @@ class KeplerMotion:
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         """Advance by one step.
 
-        `manoeuvre_m_s2`, shape (B,), or (2, B) in space, is the lateral acceleration of the object from now on; None
-        leaves it as it is.
+        `manoeuvre_m_s2`, shape (C, B), is the lateral acceleration of the object from now on; None leaves it as it is.
         """
         if manoeuvre_m_s2 is not None:
-            self._manoeuvre = np.ascontiguousarray(np.atleast_2d(manoeuvre_m_s2).T)
+            self._manoeuvre = np.ascontiguousarray(manoeuvre_m_s2.T)
             accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
         batch, _, axes, _ = self._motion.shape
         passed = np.zeros(batch, dtype=bool)
@@ -177,7 +173,7 @@ class KeplerMotion:
             closest,
         )
         minimum = np.where(passed, np.hypot.reduce(closest), np.inf)
-        return Passage(passed, minimum, arrival, closest[self._lateral])
+        return Passage(passed, minimum, arrival, closest[:X])
 
 
 def sun_and_orbit(sun: Sun) -> tuple[Floats, Floats]:

@@ -48,14 +48,14 @@ class LabelEnds:
         return bool((control_is_over > self._is_over).any())
 
     def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
-        """Move the labels that have left and have not arrived by impulses of shape (B,), or (2, B) in space, m/s."""
+        """Move the labels that have left and have not arrived by impulses of shape (C, B), m/s."""
         still = []
         for labels, counts, misses in self._moving:
             to_go_s = np.maximum(labels / self._model.closing_speed_m_s - time_s, 0.0)
             if not (counts & (to_go_s > 0.0)).any():
                 self._settled_m = np.maximum(self._settled_m, self._reached_m(labels, counts, misses))
                 continue
-            impulse = np.where(where, impulse_m_s, 0.0).reshape(len(self._laws), -1)
+            impulse = np.where(where, impulse_m_s, 0.0)
             doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
             misses[0] -= (impulse + doubt)[..., None] * to_go_s
             misses[1] -= (impulse - doubt)[..., None] * to_go_s
@@ -73,17 +73,16 @@ class LabelEnds:
             Engagements in which no further impulse can be given.
         labels_m : ndarray, shape (B, S)
             Labels of the sections, m.
-        misses_m : ndarray, shape (2, B, S), or (2, 2, B, S) in space
-            Minimum and maximum predicted miss of each section, m; in space along y and z.
+        misses_m : ndarray, shape (2, C, B, S)
+            Minimum and maximum predicted miss of each section along each lateral axis, m.
         """
-        misses = misses_m.reshape(2, len(self._laws), *labels_m.shape)
         self.left |= left.any(axis=1)
-        self.published_m = np.maximum(self.published_m, np.where(left, _max(misses), 0.0).max(axis=1))
+        self.published_m = np.maximum(self.published_m, np.where(left, _max(misses_m), 0.0).max(axis=1))
         counts = np.where(control_is_over[:, None], living, left) & ~self._is_over[:, None]
         self._is_over = self._is_over | control_is_over
         if counts.any():
             self._exists |= counts.any(axis=1)
-            self._moving.append((labels_m, counts, misses))
+            self._moving.append((labels_m, counts, misses_m))
 
     def any_state_miss_m(self, results: Results) -> Floats:
         """Return the maximum miss of a state that the set contained when control ended for its label, m, shape (B,).

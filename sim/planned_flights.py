@@ -138,10 +138,10 @@ class PlannedTarget:
         self._increases_any = self._increases.any(axis=(0, 1))
 
     def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
-        """Return the acceleration over a step, m/s^2, shape (B,), or (2, B) in space."""
+        """Return the acceleration over a step, m/s^2, shape (C, B)."""
         chosen = self._planned[:, :, step]
         if self._increases_any[step]:
-            increasing = np.copysign(self.bound_m_s2, np.atleast_2d(predicted_miss_m).T)
+            increasing = np.copysign(self.bound_m_s2, predicted_miss_m.T)
             chosen = np.where(self._increases[:, :, step], increasing, chosen)
         self.accelerations_m_s2[:, :, step] = chosen
         return by_axis(chosen)
@@ -201,12 +201,11 @@ def range_m(start: Floats) -> Floats:
 
 
 def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
-    """Return values of shape (n, axes, ...) as a sensor uses them: (n, ...), or by axis in space, (2, n, ...).
+    """Return values of shape (n, C, ...) as a sensor uses them: (C, n, ...) if it measures by axis, otherwise (n, ...).
 
-    The sensor measures by axis, or does not (`Sensor.is_lateral`); None is the angle sensor.
+    None is the angle sensor.
     """
-    is_lateral = sensor is None or sensor.is_lateral
-    return np.moveaxis(values, 1, 0) if is_lateral and values.shape[1] > 1 else values[:, 0]
+    return np.moveaxis(values, 1, 0) if sensor is None or sensor.is_lateral else values[:, 0]
 
 
 @dataclass(frozen=True)
@@ -223,8 +222,8 @@ class Flown:
         Errors made, in units of their bounds.
     accelerations_m_s2 : ndarray, shape (n, axes, steps)
         Accelerations of the target, m/s^2; zero if the target is that of the scenario.
-    lateral_miss_m : ndarray, shape (n, 2)
-        Position (y, z) at the closest approach, m; without meaning in a plane.
+    lateral_miss_m : ndarray, shape (n, axes)
+        Lateral position at the closest approach, m.
     """
 
     plans: Plans

@@ -11,6 +11,7 @@ from guidance import MeasurementNoise, Strategy
 from infoset import Section
 from infoset.arrays import Floats
 from infoset.limits import WHOLE
+from infoset.sensor import Measurements
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.results import Results, ending
@@ -19,34 +20,20 @@ from sim.target import TargetMotion
 from sim.versions import versions
 
 
-@dataclass(frozen=True)
-class AxisStep:
-    """One step of one engagement along one lateral axis.
-
-    Parameters
-    ----------
-    measured : mapping of str to float
-        Values measured in this step by sensor: "angle" (rad), "rate" (rad/s) and
-        "range" (m), which is the same for both axes.
-    true_angle_rad, true_rate_rad_s : float
-        True line of sight in the plane of x and the axis.
-    predicted_miss_m : tuple of float, or None
-        (pi_*, pi^*) after the measurement and before the impulse; None without a set.
-    """
-
-    measured: Mapping[str, float]
-    true_angle_rad: float
-    true_rate_rad_s: float
-    impulse_m_s: float
-    predicted_miss_m: tuple[float, float] | None
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StepRecord:
-    """One step of one engagement.
+    """One step of one engagement, with values along the C lateral axes of its scenario.
 
     Parameters
     ----------
+    measured : mapping of str to ndarray
+        Values measured in this step by sensor: "angle" (rad) and "rate" (rad/s), shape (C,), "range" (m), shape ().
+    true_angle_rad, true_rate_rad_s : ndarray, shape (C,)
+        True line of sight in the plane of x and each axis.
+    impulse_m_s : ndarray, shape (C,)
+        Impulse of the thruster, before errors of execution.
+    predicted_miss_m : ndarray, shape (C, 2), or None
+        (pi_*, pi^*) after the measurement and before the impulse; None without a set.
     truth_margin_m : float or None
         Signed margin of the true state in its section at the last measurement; None before the first.
     sections : tuple of Section
@@ -54,36 +41,14 @@ class StepRecord:
     """
 
     time_s: float
-    axes: Mapping[str, AxisStep]
+    measured: Measurements
+    true_angle_rad: Floats
+    true_rate_rad_s: Floats
     true_range_m: float
+    impulse_m_s: Floats
+    predicted_miss_m: Floats | None
     truth_margin_m: float | None
     sections: tuple[Section, ...]
-
-    @property
-    def measured(self) -> Mapping[str, float]:
-        """Values measured along z, and the range."""
-        return self.axes["z"].measured
-
-    @property
-    def true_angle_rad(self) -> float:
-        """True angle of the line of sight along z."""
-        return self.axes["z"].true_angle_rad
-
-    @property
-    def true_rate_rad_s(self) -> float:
-        """True rate of the line of sight along z."""
-        return self.axes["z"].true_rate_rad_s
-
-    @property
-    def predicted_miss_m(self) -> tuple[float, float] | None:
-        """Predicted miss along z."""
-        return self.axes["z"].predicted_miss_m
-
-    @property
-    def impulse_m_s(self) -> float:
-        """The impulse along z in a plane, the modulus of the impulse in space."""
-        components = [axis.impulse_m_s for axis in self.axes.values()]
-        return components[0] if len(components) == 1 else float(np.hypot.reduce(components))
 
 
 @dataclass(frozen=True)
@@ -189,30 +154,17 @@ def fly_one(
     flight = Engagements(scenario, draws, own_strategy, noise=noise, target=target)
     recorded: list[StepRecord] = []
 
-    axes = scenario.set_model.axes
-
-    def by_axis(values: Floats) -> list[float]:
-        return list(np.broadcast_to(values, (len(axes), 1))[:, 0].tolist())
-
     def record(step: Step) -> None:
         miss = step.predicted_miss
-        measured = {name: by_axis(values) for name, values in step.measured.items()}
-        angles, rates, impulses = map(by_axis, (step.sight.alpha_rad, step.sight.omega_rad_s, step.impulse_m_s))
-        misses = [*zip(by_axis(miss.lower_m), by_axis(miss.upper_m), strict=True)] if miss.exists[0] else [None] * 2
         recorded.append(
             StepRecord(
                 time_s=step.time_s,
-                axes={
-                    axis: AxisStep(
-                        measured={name: values[i] for name, values in measured.items()},
-                        true_angle_rad=angles[i],
-                        true_rate_rad_s=rates[i],
-                        impulse_m_s=impulses[i],
-                        predicted_miss_m=misses[i],
-                    )
-                    for i, axis in enumerate(axes)
-                },
+                measured={name: values[..., 0] for name, values in step.measured.items()},
+                true_angle_rad=step.sight.alpha_rad[:, 0],
+                true_rate_rad_s=step.sight.omega_rad_s[:, 0],
                 true_range_m=float(step.sight.range_m[0]),
+                impulse_m_s=step.impulse_m_s[:, 0],
+                predicted_miss_m=np.stack([miss.lower_m, miss.upper_m], axis=-1)[:, 0] if miss.exists[0] else None,
                 truth_margin_m=None,
                 sections=tuple(step.information.sections()),
             )

@@ -52,7 +52,7 @@ _EMPTY = "A measurement left the set empty, whatever the outcome is"
 _HIT = "Miss at most the radius of the body; unknown if the body has no size"
 
 
-_spatial = partial(Column, nullable=True, optional=True)
+_along_y = partial(Column, nullable=True, optional=True)
 
 
 @documented
@@ -86,23 +86,23 @@ class Results:
     truth_margin_m: MaskedFloats = field(metadata=columns(Column("truth_margin_m", "m", _MARGIN, nullable=True)))
     phi_held: MaskedFlags = field(init=False, metadata=columns(Column("phi_held", "", _HELD, bool, nullable=True)))
     position_m: Floats = field(
-        metadata=columns(Column("start_z_m", "m", "True z at the start"), Column("start_x_m", "m", "true x"))
+        metadata=columns(
+            _along_y("start_y_m", "m", "True y at the start, only in space"),
+            Column("start_z_m", "m", "True z at the start"),
+            Column("start_x_m", "m", "true x"),
+        )
     )
     velocity_m_s: Floats = field(
         metadata=columns(
-            Column("start_vz_m_s", "m/s", "True V_z at the start"), Column("start_vx_m_s", "m/s", "true V_x")
+            _along_y("start_vy_m_s", "m/s", "True V_y at the start, only in space"),
+            Column("start_vz_m_s", "m/s", "true V_z"),
+            Column("start_vx_m_s", "m/s", "true V_x"),
         )
     )
-    lateral_start: MaskedFloats = field(
+    lateral_miss_m: Floats = field(
         metadata=columns(
-            _spatial("start_y_m", "m", "True y at the start; unknown in a plane"),
-            _spatial("start_vy_m_s", "m/s", "true V_y"),
-        )
-    )
-    lateral_miss: MaskedFloats = field(
-        metadata=columns(
-            _spatial("miss_y_m", "m", "True y at the closest approach; unknown in a plane"),
-            _spatial("miss_z_m", "m", "true z"),
+            _along_y("miss_y_m", "m", "True y at the closest approach, only in space"),
+            Column("miss_z_m", "m", "true z"),
         )
     )
     guarantees: bool = False

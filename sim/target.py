@@ -18,7 +18,7 @@ class TargetMotion(Protocol):
     """Lateral acceleration of the targets of a batch, in place of that of the scenario."""
 
     def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
-        """Return the acceleration over a step, m/s^2, shape (B,), or (2, B) in space; see `acceleration_m_s2`."""
+        """Return the acceleration over a step, m/s^2, shape (C, B); see `acceleration_m_s2`."""
 
 
 @dataclass(frozen=True)
@@ -27,22 +27,22 @@ class GivenTarget:
 
     Parameters
     ----------
-    accelerations_m_s2 : ndarray, shape (B, steps), or (2, B, steps) in space
+    accelerations_m_s2 : ndarray, shape (C, B, steps)
         Lateral acceleration in each step, m/s^2.
     """
 
     accelerations_m_s2: Floats
 
     def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
-        """Return the acceleration over a step, m/s^2, shape (B,), or (2, B) in space."""
-        return np.asarray(self.accelerations_m_s2[..., step])
+        """Return the acceleration over a step, m/s^2, shape (C, B)."""
+        return np.asarray(self.accelerations_m_s2[:, :, step])
 
 
 def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:
-    """Return the lateral acceleration of the targets of a batch over one step, m/s^2, shape (B,), or (2, B) in space.
+    """Return the lateral acceleration of the targets of a batch over one step, m/s^2, shape (C, B).
 
-    `draws`, shape (B, steps), or (2, B, steps) in space, are uniform in [-1, 1]. `predicted_miss_m` is the signed
-    predicted miss z + V_z (time to go) of the true state, and that along y.
+    `draws`, shape (C, B, steps), are uniform in [-1, 1]. `predicted_miss_m`, shape (C, B), is the signed predicted miss
+    z + V_z (time to go) of the true state.
     """
     first = _first_side(draws)
     if target.manoeuvre is Manoeuvre.NONE:
@@ -59,9 +59,7 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
         side = first * (-1.0) ** switches.sum(axis=-1)
     else:
         side = np.where(predicted_miss_m >= 0.0, 1.0, -1.0)
-    if draws.ndim == 2:
-        return np.asarray(target.acceleration_m_s2 * side)
-    return np.asarray(amplitudes_m_s2(target, 2)[:, None] * side)
+    return np.asarray(amplitudes_m_s2(target, len(draws))[:, None] * side)
 
 
 def amplitudes_m_s2(target: Target, axes: int) -> Floats:
@@ -71,7 +69,7 @@ def amplitudes_m_s2(target: Target, axes: int) -> Floats:
 
 
 def constant_side(target: Target | None, draws: Floats | None) -> Floats | None:
-    """Return the sign of the acceleration of targets that keep it, shape (B,), or (2, B) in space; None for others."""
+    """Return the sign of the acceleration of targets that keep it, shape (C, B); None for others."""
     if target is None or draws is None or target.manoeuvre is not Manoeuvre.CONSTANT:
         return None
     return _first_side(draws)

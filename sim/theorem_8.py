@@ -71,8 +71,12 @@ class Theorem8:
         return self.valid & self._started
 
     def decide(self, situation: Situation, wanted_m_s: Floats, given_m_s: Floats, deciding: Flags) -> None:
-        """Add a step: the impulses of the strategy and those of the engine, in the engagements that decide."""
-        angles = situation.measured.get(AngleSensor.name)
+        """Add a step: the impulses of the strategy and those of the engine, in the engagements that decide.
+
+        Impulses have the shape (1, B), because the theorem is that of a plane.
+        """
+        (wanted_m_s,), (given_m_s,) = wanted_m_s, given_m_s
+        angles = situation.measured[AngleSensor.name][0] if AngleSensor.name in situation.measured else None
         seen = deciding & situation.is_new(AngleSensor.name)
         if angles is not None and not self._has_first.all():
             self._look_first(seen & ~self._has_first, situation.time_s, angles)
@@ -82,15 +86,15 @@ class Theorem8:
         self.valid &= ~deciding | (seen & (situation.budget_left_m_s >= situation.thruster.max_impulse_m_s))
         e = self._law.closing_speed
         to_go_s = max(self._label_m / e - situation.time_s, 0.0)
-        later = correctable_later_m(situation, np.full(len(deciding), e * to_go_s))
+        later = correctable_later_m(situation, np.full((len(deciding), 1), e * to_go_s))[:, 0]
         excess = np.maximum(self.excess_m, self.half_width_m(situation.time_s, angles) - later)
         start = deciding & ~self._started
         if start.any():
-            excess[start] = unavoidable_m(situation)
+            excess[start] = unavoidable_m(situation)[0]
         exact = np.flatnonzero(start | (wanted_m_s != given_m_s))
         if exact.size:
             moved, interval = given_m_s[exact] * to_go_s, situation.predicted_miss
-            worst = np.maximum(interval.upper_m[exact] - moved, moved - interval.lower_m[exact]) - later[exact]
+            worst = np.maximum(interval.upper_m[0, exact] - moved, moved - interval.lower_m[0, exact]) - later[exact]
             excess[exact] = np.maximum(excess[exact], worst)
         given = given_m_s if deciding.all() else np.where(deciding, given_m_s, 0.0)
         self.excess_m = np.where(deciding, excess, self.excess_m)

@@ -26,7 +26,7 @@ ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 @dataclass(frozen=True)
 class _Look:
-    """True states of the flights that measure in a step, after some events; in space slopes have the shape (2, B)."""
+    """True states of the flights that measure in a step, after some events; slopes have the shape (C, B)."""
 
     step: int
     events: int
@@ -71,7 +71,7 @@ class TruthSection:
         self._history.record(RATE, omega_rad_s, where, error_rad_s * (1.0 + BOUND_SLACK))
 
     def shift(self, impulse_m_s: Floats, where: Flags) -> None:
-        """Store the impulse of this step, m/s, shape (B,), in space (2, B)."""
+        """Store the impulse of this step, m/s, shape (C, B)."""
         if where.any():
             self._history.record(IMPULSE, impulse_m_s, where)
 

@@ -297,11 +297,11 @@ class Returns:
     def __init__(self, value: Any) -> None:
         self.value = value
 
-    def start(self, batch: int) -> None:
+    def start(self, shape: tuple[int, int]) -> None:
         pass
 
     def decide(self, situation: Any, state: None) -> Any:
-        return np.zeros(1) if situation.step == 0 else self.value
+        return np.zeros((1, 1)) if situation.step == 0 else self.value
 
     def measure(self, sight: Any, predicted: Any) -> Any:
         honest = {"angle": sight.alpha_rad}
@@ -313,19 +313,19 @@ class Returns:
     [
         None,
         0.5,
-        [0.5, 0.5],
-        [[0.5]],
-        [math.nan],
-        [-math.inf],
-        [0.5j],
-        np.ma.masked_array([0.5], [True]),
-        np.ma.masked_array([0.5], [False]),
-        ["0.5"],
-        [True],
+        [0.5],
+        [[0.5, 0.5]],
+        [[math.nan]],
+        [[-math.inf]],
+        [[0.5j]],
+        np.ma.masked_array([[0.5]], [[True]]),
+        np.ma.masked_array([[0.5]], [[False]]),
+        [["0.5"]],
+        [[True]],
     ],
 )
 def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
-    refused(lambda: simulate(brief, 1, strategy=Returns(wanted)), "strategy Returns must return 1 finite impulses")
+    refused(lambda: simulate(brief, 1, strategy=Returns(wanted)), "strategy Returns must return finite impulses")
 
 
 @pytest.mark.parametrize(
@@ -334,10 +334,10 @@ def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
         (None, "must return a mapping"),
         (0.001, "must return a mapping"),
         ({"angle": None}, "angle"),
-        ({"angle": np.array([math.nan])}, "angle"),
-        ({"angle": np.array([0.0, 0.0])}, "angle"),
-        ({"angle": np.array([1j])}, "angle"),
-        ({"angle": np.ma.masked_array([0.0], [True])}, "angle"),
+        ({"angle": np.array([[math.nan]])}, "angle"),
+        ({"angle": np.array([[0.0, 0.0]])}, "angle"),
+        ({"angle": np.array([[1j]])}, "angle"),
+        ({"angle": np.ma.masked_array([[0.0]], [[True]])}, "angle"),
         (lambda sight: {"angle": sight.alpha_rad, "range": sight.range_m}, "sensor 'range' does not measure"),
         (lambda sight: {"angle": sight.alpha_rad, "rate": sight.omega_rad_s}, "sensor 'rate' does not measure"),
     ],

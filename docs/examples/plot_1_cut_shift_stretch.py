@@ -28,7 +28,7 @@ information
 
 def outline(stage):
     """Corners of the middle section, omega in µrad/s and alpha in mrad."""
-    corners = stage[len(stage) // 2].omega_alpha.polygon()
+    corners = stage[len(stage) // 2].omega_alpha[0].polygon()
     return np.vstack([corners, corners[:1]]) * [1e6, 1e3]
 
 
@@ -83,7 +83,7 @@ plt.show()
 # Each section is an independent filter: it depends only on its range and on the history. A section at *any*
 # range can therefore be computed exactly by replaying the measurements and impulses:
 
-information.section_at(label_m=5.7e6).polygon
+information.section_at(label_m=5.7e6).polygons
 
 # %%
 # `The interception of 1997 <../interception.html>`_ describes how the paper uses these sets.

@@ -31,7 +31,7 @@ figure, panels = plt.subplots(1, 2, figsize=(10, 4), sharey=True, layout="constr
 for axes, (title, record) in zip(panels, flights.items(), strict=True):
     known = [step for step in record.steps if step.predicted_miss_m is not None]
     times = [step.time_s for step in known]
-    lower, upper = np.array([step.predicted_miss_m for step in known]).T
+    lower, upper = np.array([step.predicted_miss_m[0] for step in known]).T
     axes.fill_between(times, lower, upper, color="#c6d9ec", edgecolor="#08306b", label="predicted-miss interval")
     axes.axhline(0.0, color="#1a1a1a", linewidth=0.8)
     axes.set_yscale("symlog", linthresh=10.0)

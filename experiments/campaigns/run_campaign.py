@@ -29,7 +29,7 @@ def run(options: Options) -> None:
             options.out,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
-            strategy=own_strategy(options.strategy, scenario),
+            strategy=own_strategy(options.strategy),
             guarantee=options.guarantee,
             chunk=options.chunk,
             until=rule,

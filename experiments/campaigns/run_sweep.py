@@ -47,7 +47,7 @@ def run(options: Options) -> None:
             cells=cells,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
-            strategy=own_strategy(options.strategy, scenario),
+            strategy=own_strategy(options.strategy),
             guarantee=guarantee,
             chunk=options.chunk,
             until=required if options.until else None,

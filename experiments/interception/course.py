@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,7 +78,7 @@ def kept_steps(record: Record) -> list[int]:
     count = len(record.steps)
     if count <= MAX_STEPS:
         return list(range(count))
-    fired = np.flatnonzero([step.impulse_m_s for step in record.steps])
+    fired = np.flatnonzero(moduli(record))
     if len(fired) > MAX_STEPS // 4:
         fired = fired[evenly(np.arange(len(fired)), MAX_STEPS // 4)]
     seen = np.flatnonzero(["angle" in step.measured for step in record.steps])
@@ -108,39 +108,45 @@ def duration_text(seconds: float) -> str:
     return f"{seconds / unit:.3g} {name}"
 
 
-def true_predicted_misses(record: Record) -> dict[str, Floats]:
-    """Return the miss of the true state without further impulses at each step, m, by lateral axis.
+def along(record: Record, field: str) -> Floats:
+    """Return the values of a field of the steps along each lateral axis, shape (C, steps)."""
+    return np.stack([getattr(step, field) for step in record.steps], axis=1)
+
+
+def moduli(record: Record) -> Floats:
+    """Return the modulus of the impulse of each step, m/s, shape (steps,)."""
+    return modulus(along(record, "impulse_m_s"))
+
+
+def true_predicted_misses(record: Record) -> Floats:
+    """Return the miss of the true state without further impulses at each step, m, shape (C, steps).
 
     Notes
     -----
     omega (x^2 + a^2) = V_a x - V_x a for the coordinate a of an axis, and a + V_a x / |V_x| is the miss.
     """
-    slopes = {name: np.tan([step.axes[name].true_angle_rad for step in record.steps]) for name in record.steps[0].axes}
+    slopes, rates = np.tan(along(record, "true_angle_rad")), along(record, "true_rate_rad_s")
     ranges = np.array([step.true_range_m for step in record.steps])
-    x_squared = ranges**2 / (1.0 + sum(slope**2 for slope in slopes.values()))
-    speed = -float(record.result.velocity_m_s[0, 1])
-    rates = {name: np.array([step.axes[name].true_rate_rad_s for step in record.steps]) for name in slopes}
-    return {name: rates[name] * x_squared * (1.0 + slope**2) / speed for name, slope in slopes.items()}
+    x_squared = ranges**2 / (1.0 + (slopes**2).sum(axis=0))
+    speed = -float(record.result.velocity_m_s[0, -1])
+    return np.asarray(rates * x_squared * (1.0 + slopes**2) / speed)
 
 
-def possible_misses(record: Record) -> tuple[Floats, Mapping[str, Floats]]:
-    """Return the indices of steps with a complete set, and the predicted-miss interval of each axis, m, shape (n, 2).
+def possible_misses(record: Record) -> tuple[Integers, Floats]:
+    """Return the indices of steps with a complete set, and their predicted-miss intervals, m, shape (C, n, 2).
 
     A set is complete until its nearest section reaches the range threshold and leaves.
     """
-    known = []
+    known, intervals = [], []
     model = record.scenario.set_model
     min_range_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
     for index, step in enumerate(record.steps):
         if step.predicted_miss_m is not None:
             known.append(index)
+            intervals.append(step.predicted_miss_m)
         if step.sections and step.sections[0].range_m < min_range_m:
             break
-    axes = record.scenario.set_model.axes
-    return np.array(known, dtype=np.int64), {
-        axis: np.array([record.steps[index].axes[axis].predicted_miss_m for index in known]).reshape(-1, 2)
-        for axis in axes
-    }
+    return np.array(known, dtype=np.int64), np.reshape(intervals, (-1, len(model.axes), 2)).swapaxes(0, 1)
 
 
 class Courses:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +13,12 @@ from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
 from experiments.interception.course import (
     Clock,
+    along,
     duration_text,
     kept_steps,
     marks,
     min_to_go_s,
+    moduli,
     outcome_title,
     possible_misses,
     record_titles,
@@ -64,7 +66,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
     scenario = record.scenario
     steps = [record.steps[index] for index in kept]
     thruster, model = scenario.thruster, scenario.set_model
-    moduli = np.abs([step.impulse_m_s for step in record.steps])
+    modulus_m_s = moduli(record)
     stages = list(replayed(record, kept))
     states: list[tuple[Section, ...]] = []
     numbers: list[tuple[int, int, int]] = []
@@ -75,7 +77,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         numbers.append((len(states) - 3, len(states) - 2, len(states) - 1))
     sections = [section for state in states for section in state]
     thinned = f"; the page has {len(kept)} of {len(record.steps)} steps" if len(kept) < len(record.steps) else ""
-    fired = np.flatnonzero(moduli)
+    fired = np.flatnonzero(modulus_m_s)
     return {
         "title": title,
         "outcome": outcome_title(record),
@@ -93,14 +95,14 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "budget_m_s": thruster.budget_m_s,
         "radius_m": scenario.radius_m,
         "time_s": [step.time_s for step in steps],
-        "measured_range_m": [step.measured.get("range") for step in steps],
+        "measured_range_m": [float(step.measured["range"]) if "range" in step.measured else None for step in steps],
         "complete_steps": int(np.searchsorted(kept, possible_misses(record)[0].max(initial=-1), side="right")),
         "true_range_m": [step.true_range_m for step in steps],
         "next_range_m": [record.steps[index].true_range_m for index in _next(record, kept)],
-        "modulus_m_s": moduli[kept].tolist(),
+        "modulus_m_s": modulus_m_s[kept].tolist(),
         "fired_s": [record.steps[index].time_s for index in fired],
-        "fired_modulus_m_s": moduli[fired].tolist(),
-        "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(moduli), 0.0)[kept].tolist(),
+        "fired_modulus_m_s": modulus_m_s[fired].tolist(),
+        "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(modulus_m_s), 0.0)[kept].tolist(),
         "sections": {
             "states": _packed(numbers, "<u4"),
             "starts": _packed(np.concatenate([[0], np.cumsum([len(state) for state in states])]), "<u4"),
@@ -111,16 +113,16 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
             {
                 "along": f" along {axis}" if scenario.is_spatial else "",
                 "measured_name": f"measured angle along {axis}" if scenario.is_spatial else "measured angle",
-                **_axis_data(record, axis, kept),
-                "fired_m_s": [record.steps[index].axes[axis].impulse_m_s for index in fired],
+                **_axis_data(record, number, kept),
+                "fired_m_s": along(record, "impulse_m_s")[number, fired].tolist(),
                 "outlines": {
-                    "predicted_miss_m": _packed(np.concatenate([stages[k].miss_m[axis] for k in kept]), "<f8"),
+                    "predicted_miss_m": _packed(np.concatenate([stages[k].miss_m[number] for k in kept]), "<f8"),
                     **packed_outlines(
-                        [_omega_alpha(section, axis) for section in sections], TOLERANCE if thinned else 0.0
+                        [_omega_alpha(section, number) for section in sections], TOLERANCE if thinned else 0.0
                     ),
                 },
             }
-            for axis in model.axes
+            for number, axis in enumerate(model.axes)
         ],
     }
 
@@ -130,38 +132,47 @@ def _next(record: Record, kept: Sequence[int]) -> list[int]:
     return [min(index + 1, len(record.steps) - 1) for index in kept]
 
 
-def _axis_data(record: Record, axis: str, kept: Sequence[int]) -> dict[str, object]:
+def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, object]:
     """Return what belongs to one lateral axis: the line of sight in its plane with x, impulses and predicted misses."""
-    steps = [record.steps[index].axes[axis] for index in kept]
-    after = [record.steps[index].axes[axis] for index in _next(record, kept)]
-    model = on_board_model(record.scenario).axis(axis)
+    steps, after, name = (
+        [record.steps[index] for index in kept],
+        _next(record, kept),
+        record.scenario.set_model.axes[axis],
+    )
+    model = on_board_model(record.scenario).axis(name)
     misses = true_predicted_misses(record)[axis]
+    angles, rates, impulses = (
+        along(record, field)[axis] for field in ("true_angle_rad", "true_rate_rad_s", "impulse_m_s")
+    )
     return {
-        "axis": axis,
+        "axis": name,
         "angle_error_rad": model.angle_sensor.constant_error_rad,
         "angle_error_slope_rad_m": model.angle_sensor.error_slope_rad_per_m,
         "centroid_error_m": model.angle_sensor.centroid_error_m,
         "disturbance_m_s2": model.disturbance_m_s2,
         **{
-            f"measured_{kind.quantity}": [step.measured.get(kind.name) for step in steps]
+            f"measured_{kind.quantity}": [
+                float(step.measured[kind.name][axis]) if kind.name in step.measured else None for step in steps
+            ]
             for kind in SENSORS
             if kind.is_lateral
         },
-        "true_angle_rad": [step.true_angle_rad for step in steps],
-        "true_rate_rad_s": [step.true_rate_rad_s for step in steps],
+        "true_angle_rad": angles[kept].tolist(),
+        "true_rate_rad_s": rates[kept].tolist(),
         "true_predicted_miss_m": misses[kept].tolist(),
-        "next_angle_rad": [step.true_angle_rad for step in after],
-        "next_rate_rad_s": [step.true_rate_rad_s for step in after],
-        "next_predicted_miss_m": misses[_next(record, kept)].tolist(),
-        "predicted_miss_m": [step.predicted_miss_m for step in steps],
-        "impulse_m_s": [step.impulse_m_s for step in steps],
+        "next_angle_rad": angles[after].tolist(),
+        "next_rate_rad_s": rates[after].tolist(),
+        "next_predicted_miss_m": misses[after].tolist(),
+        "predicted_miss_m": [
+            None if step.predicted_miss_m is None else step.predicted_miss_m[axis].tolist() for step in steps
+        ],
+        "impulse_m_s": impulses[kept].tolist(),
     }
 
 
-def _omega_alpha(section: Section, axis: str) -> Floats:
+def _omega_alpha(section: Section, axis: int) -> Floats:
     """Vertices of a section in (omega, alpha), as `Section.omega_alpha` but without its checks."""
-    polygon = section.polygon if axis == "z" or section.polygon_y is None else section.polygon_y
-    v, z = polygon.vertices[: int(polygon.counts)].T
+    v, z = section.polygons[axis].polygon().T
     alpha = z / section.range_m
     return np.stack([(v + section.closing_speed_m_s * alpha) / section.range_m, alpha], axis=1)
 
@@ -170,12 +181,12 @@ def _omega_alpha(section: Section, axis: str) -> Floats:
 class Stages:
     """The sections of one step predicted from the step before, and after its measurement, equal to the recorded ones.
 
-    `miss_m` is the predicted-miss interval of each measured section, m, shape (sections, 2), for each lateral axis.
+    `miss_m` is the predicted-miss interval of each measured section, m, shape (C, sections, 2).
     """
 
     before: tuple[Section, ...]
     measured: tuple[Section, ...]
-    miss_m: Mapping[str, Floats]
+    miss_m: Floats
 
 
 def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stages]:
@@ -190,18 +201,13 @@ def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stag
     After the impulse k a section is the measured one with V reduced by k; after the prediction it is `before` of the
     next step. Two of the four stages are therefore enough. The cost is that of the steps of the set, a few ms.
     """
-    scenario, axes = record.scenario, record.scenario.set_model.axes
+    scenario = record.scenario
     information = InformationSet(on_board_model(scenario))
     wanted = set(range(len(record.steps)) if kept is None else kept)
-    empty = dict.fromkeys(axes, np.empty((0, 2)))
+    empty = np.empty((len(information.axes), 0, 2))
     for number, step in enumerate(record.steps):
-        along = [step.axes[axis] for axis in axes]
         before = tuple(information.sections()) if {number - 1, number} & wanted else ()
-        values = {
-            name: _of_batch([each.measured[name] for each in along[: len(axes) if sensor.is_lateral else 1]])
-            for name, sensor in scenario.sensors.items()
-            if name in step.measured
-        }
+        values = {name: step.measured[name][..., None] for name in scenario.sensors if name in step.measured}
         for name, sensor in scenario.sensors.items():
             if name in values:
                 sensor.cut(information, values, np.array([True]))
@@ -213,20 +219,14 @@ def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stag
                     f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; it was "
                     f"made with {made}: make it again with `infoset engage --record FILE.npz`"
                 )
-            intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)[..., information.living[0], :]
-            by_axis = intervals.reshape(len(axes), -1, 2)
-            yield Stages(before, measured, dict(zip(axes, by_axis, strict=True)))
+            intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)[:, 0, information.living[0]]
+            yield Stages(before, measured, intervals)
         else:
             yield Stages(before, (), empty)
-        information.shift(_of_batch([each.impulse_m_s for each in along]))
+        information.shift(step.impulse_m_s[:, None])
         information.drop_below_threshold()
         information.predict()
     yield Stages(tuple(information.sections()), (), empty)
-
-
-def _of_batch(values: Sequence[float]) -> Floats:
-    """Return values of a batch of one: along several axes with shape (axes, 1), else with shape (1,)."""
-    return np.array(values).reshape((-1, 1) if len(values) > 1 else -1)
 
 
 def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:

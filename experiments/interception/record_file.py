@@ -27,7 +27,7 @@ from infoset import ConvexPolygons, Section
 from infoset.limits import MAXIMUM
 from infoset.sensors import SENSORS
 from infoset.set_queries import MIN_RANGE_M
-from sim import AxisStep, Inconsistency, Outcome, Record, Results, Scenario, StepRecord
+from sim import Inconsistency, Outcome, Record, Results, Scenario, StepRecord
 from sim.columns import columns_of
 from sim.gravity import on_board_model
 from sim.storage.codec import from_json, to_json
@@ -48,12 +48,13 @@ class Member(NamedTuple):
     minimum: float = -MAXIMUM
 
 
-_MEASURED = {f"measured_{sensor.quantity}": sensor.name for sensor in SENSORS}
+_MEASURED = {f"measured_{kind.quantity}": kind for kind in SENSORS}
 _OF_AXIS = ("true_angle_rad", "true_rate_rad_s", "impulse_m_s")
 _RESULT = {
     f"result_{each.field}": each for each in columns_of(Results) if not each.derived and each.kind in (float, bool)
 }
 """The last column of each field of a result that is an array of numbers or flags."""
+_BY_AXIS = {"position_m": ("axes + 1",), "velocity_m_s": ("axes + 1",), "lateral_miss_m": ("axes",)}
 _OF_HEADER = ("scenario", "versions", "seed", "run", "strategy", "noise", "inconsistency")
 MEMBERS = {
     "header": Member(("bytes",), "|u1"),
@@ -61,8 +62,10 @@ MEMBERS = {
     "true_range_m": Member(("steps",), minimum=0.0),
     "truth_margin_m": Member(("steps",), nullable=True),
     **{
-        name: Member(("steps", "axes"), nullable=True, minimum=0.0 if sensor == "range" else -MAXIMUM)
-        for name, sensor in _MEASURED.items()
+        name: Member(("steps", "axes"), nullable=True)
+        if kind.is_lateral
+        else Member(("steps",), nullable=True, minimum=0.0)
+        for name, kind in _MEASURED.items()
     },
     **dict.fromkeys(_OF_AXIS, Member(("steps", "axes"))),
     "predicted_miss_m": Member(("steps", "axes", 2), nullable=True),
@@ -72,8 +75,7 @@ MEMBERS = {
     "vertex_offsets": Member(("polygons + 1",), "<i8"),
     "vertices": Member(("vertices", 2)),
     **{
-        name: Member((1,) if column.component is None else (1, 2), nullable=column.nullable)
-        for name, column in _RESULT.items()
+        name: Member((1, *_BY_AXIS.get(column.field, ())), nullable=column.nullable) for name, column in _RESULT.items()
     },
 }
 
@@ -139,17 +141,20 @@ def load_record(path: str | os.PathLike[str]) -> Record:
 
 def _to_arrays(record: Record) -> Arrays:
     steps, axes = record.steps, record.scenario.set_model.axes
-    along = [[step.axes[axis] for axis in axes] for step in steps]
+    unknown = np.full(len(axes), np.nan)
     sections = [section for step in steps for section in step.sections]
-    pairs = [(section.polygon_y, section.polygon) for section in sections]
-    polygons = [polygon.polygon() for pair in pairs for polygon in pair if polygon is not None]
+    polygons = [polygon.polygon() for section in sections for polygon in section.polygons]
     arrays: dict[str, Any] = {
         **{name: [getattr(step, name) for step in steps] for name in ("time_s", "true_range_m", "truth_margin_m")},
         **{
-            name: [[axis.measured.get(sensor) for axis in step] for step in along] for name, sensor in _MEASURED.items()
+            name: [step.measured.get(kind.name, unknown if kind.is_lateral else np.nan) for step in steps]
+            for name, kind in _MEASURED.items()
         },
-        **{name: [[getattr(axis, name) for axis in step] for step in along] for name in _OF_AXIS},
-        "predicted_miss_m": [[axis.predicted_miss_m or (None, None) for axis in step] for step in along],
+        **{name: [getattr(step, name) for step in steps] for name in _OF_AXIS},
+        "predicted_miss_m": [
+            np.full((len(axes), 2), np.nan) if step.predicted_miss_m is None else step.predicted_miss_m
+            for step in steps
+        ],
         "section_offsets": np.cumsum([0, *(len(step.sections) for step in steps)]),
         "section_label_m": [section.label_m for section in sections],
         "section_range_m": [section.range_m for section in sections],
@@ -188,6 +193,7 @@ def _check(arrays: Arrays, axes: Sequence[str]) -> None:
     """Raise ValueError if arrays do not have their declared types, shapes and values, or offsets do not increase."""
     steps, sections, vertices = (arrays[name].size for name in ("time_s", "section_label_m", "vertices"))
     sizes: dict[str | int, int] = {"steps": steps, "axes": len(axes), "sections": sections, "vertices": vertices // 2}
+    sizes["axes + 1"] = len(axes) + 1
     sizes |= {"steps + 1": steps + 1, "polygons + 1": len(axes) * sections + 1, "bytes": arrays["header"].size}
     for name, member in MEMBERS.items():
         values, shape = arrays[name], tuple(sizes.get(size, size) for size in member.shape)
@@ -199,7 +205,7 @@ def _check(arrays: Arrays, axes: Sequence[str]) -> None:
                 raise ValueError(f"{name} has a number outside {member.minimum:g} to {MAXIMUM:g}")
     if steps == 0 or (np.diff(arrays["time_s"]) <= 0.0).any():
         raise ValueError("time_s does not increase")
-    if arrays["result_velocity_m_s"][0, 1] >= 0.0:
+    if arrays["result_velocity_m_s"][0, -1] >= 0.0:
         raise ValueError("result_velocity_m_s does not approach")
     for name, rows, min_rows in (("section_offsets", sections, 0), ("vertex_offsets", vertices // 2, 1)):
         offsets = arrays[name]
@@ -217,18 +223,18 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
     ]
     places = zip(arrays["section_label_m"].tolist(), arrays["section_range_m"].tolist(), strict=True)
     sections = [
-        # The polygon of z, the last axis, is the first argument.
-        Section(label_m, range_m, model.closing_speed_m_s, *polygons[count * index : count * (index + 1)][::-1])
+        Section(
+            label_m,
+            range_m,
+            model.closing_speed_m_s,
+            ConvexPolygons.stack(polygons[count * index : count * (index + 1)]),
+        )
         for index, (label_m, range_m) in enumerate(places)
     ]
-    columns = {name: _known(arrays[name]) for name, member in MEMBERS.items() if member.shape[0] == "steps"}
-    steps = []
-    for index, (start, end) in enumerate(pairwise(arrays["section_offsets"].tolist())):
-        row = {name: values[index] for name, values in columns.items()}
-        axes = {axis: _axis_step(row, place) for place, axis in enumerate(model.axes)}
-        steps.append(
-            StepRecord(row["time_s"], axes, row["true_range_m"], row["truth_margin_m"], tuple(sections[start:end]))
-        )
+    steps = tuple(
+        _step_of(arrays, index, tuple(sections[start:end]))
+        for index, (start, end) in enumerate(pairwise(arrays["section_offsets"].tolist()))
+    )
     first = header.inconsistency
     if first is not None and not (0 <= first.step < len(steps) and abs(first.label_m) <= MAXIMUM):
         raise ValueError("inconsistency is not at a step of the record")
@@ -238,18 +244,23 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)
         fields[column.field] = np.ma.MaskedArray(values, mask=unknown) if column.nullable else values
     result = Results(**fields, guarantees=model.is_guaranteed)
-    return Record(**{name: getattr(header, name) for name in _OF_HEADER}, result=result, steps=tuple(steps))
+    return Record(**{name: getattr(header, name) for name in _OF_HEADER}, result=result, steps=steps)
 
 
-def _known(values: NDArray[np.float64]) -> list[Any]:
-    """Return the values of each step; None for a step with an unknown value."""
-    return [value if np.isfinite(row).all() else None for row, value in zip(values, values.tolist(), strict=True)]
-
-
-def _axis_step(row: Mapping[str, Any], axis: int) -> AxisStep:
-    miss_m = row["predicted_miss_m"]
-    return AxisStep(
-        measured={sensor: row[name][axis] for name, sensor in _MEASURED.items() if row[name] is not None},
-        **{name: row[name][axis] for name in _OF_AXIS},
-        predicted_miss_m=None if miss_m is None else tuple(miss_m[axis]),
+def _step_of(arrays: Arrays, index: int, sections: tuple[Section, ...]) -> StepRecord:
+    """Return one step; a value that is NaN along some axis is unknown."""
+    known: dict[str, Any] = {
+        name: None if np.isnan(arrays[name][index]).any() else arrays[name][index]
+        for name, member in MEMBERS.items()
+        if member.shape[0] == "steps"
+    }
+    margin_m = known["truth_margin_m"]
+    return StepRecord(
+        time_s=float(arrays["time_s"][index]),
+        measured={kind.name: known[name] for name, kind in _MEASURED.items() if known[name] is not None},
+        **{name: arrays[name][index] for name in _OF_AXIS},
+        true_range_m=float(arrays["true_range_m"][index]),
+        predicted_miss_m=known["predicted_miss_m"],
+        truth_margin_m=None if margin_m is None else float(margin_m),
+        sections=sections,
     )

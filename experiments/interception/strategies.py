@@ -12,10 +12,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.common.errors import InputError, input_errors, shown
+from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
 from guidance import Situation, Strategy, strategy_names
-from guidance.strategy import check_axes, checked_impulses
+from guidance.strategy import checked_impulses
 from sim import Scenario
 from sim.scenario import strategy_name
 
@@ -25,17 +25,12 @@ def is_own_strategy(text: str) -> bool:
     return ":" in text or text.endswith(".py")
 
 
-def own_strategy(text: str | None, scenario: Scenario, option: str = "--strategy") -> Strategy | None:
+def own_strategy(text: str | None, option: str = "--strategy") -> Strategy | None:
     """Return the strategy of a Python file that an option names; None for a built-in name.
 
-    `InputError` if the file has no such strategy, or it decides for both lateral axes and the scenario is in a plane.
+    `InputError` if the file has no such strategy.
     """
-    if text is None or not is_own_strategy(text):
-        return None
-    own = load_strategy(text, option)
-    with input_errors(f"{option}: {text}"):
-        check_axes(own, scenario.set_model.axes)
-    return own
+    return None if text is None or not is_own_strategy(text) else load_strategy(text, option)
 
 
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
@@ -46,7 +41,7 @@ def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Str
     valid = strategy_names()
     chosen: dict[str, Strategy | None] = {}
     for text in valid if names is None else [part.strip() for part in names.split(",")]:
-        own = own_strategy(text, scenario, "--strategies")
+        own = own_strategy(text, "--strategies")
         name = choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)
         if name in chosen:
             raise InputError(f"--strategies: {name} is named twice; name each strategy once")
@@ -93,9 +88,9 @@ def _reporting(kind: Any, file: Path, option: str, digest: str) -> Any:
         def __reduce__(self) -> tuple[Any, ...]:
             return load_strategy, (f"{file}:{kind.__name__}", option, self.version)
 
-        def start(self, batch: int) -> Any:
+        def start(self, shape: tuple[int, int]) -> Any:
             with _errors_of(file, option):
-                return super().start(batch)
+                return super().start(shape)
 
         def decide(self, situation: Situation, state: Any) -> Any:
             with _errors_of(file, option):

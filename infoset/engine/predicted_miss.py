@@ -9,21 +9,17 @@ from infoset.arrays import Flags, Floats
 
 @dataclass(frozen=True)
 class ExtremePoints:
-    """States that reach an end of the predicted-miss interval, one for each engagement.
+    """States that reach an end of the predicted-miss interval, one for each engagement and lateral axis.
 
     Parameters
     ----------
-    alpha_rad, omega_rad_s, range_m : ndarray, shape (B,)
-        Line-of-sight angle, its rate, and range: rad, rad/s, m. Shape (2, B) in space, along y and z.
+    alpha_rad, omega_rad_s, range_m : ndarray, shape (C, B)
+        Line-of-sight angle, its rate, and range: rad, rad/s, m.
     """
 
     alpha_rad: Floats
     omega_rad_s: Floats
     range_m: Floats
-
-    def axis(self, number: int) -> ExtremePoints:
-        """Return the points of one lateral axis in space."""
-        return ExtremePoints(self.alpha_rad[number], self.omega_rad_s[number], self.range_m[number])
 
 
 @dataclass(frozen=True)
@@ -34,8 +30,8 @@ class PredictedMiss:
     ----------
     exists : ndarray of bool, shape (B,)
         Whether the set has a living section; the other fields are zero where it has none.
-    lower_m, upper_m : ndarray, shape (B,)
-        Ends pi_* and pi^* of the interval, signed, m. Shape (2, B) in space, along y and z.
+    lower_m, upper_m : ndarray, shape (C, B)
+        Ends pi_* and pi^* of the interval along each lateral axis, signed, m.
     lower_point, upper_point : ExtremePoints
         States that reach the ends.
 
@@ -49,13 +45,3 @@ class PredictedMiss:
     upper_m: Floats
     lower_point: ExtremePoints
     upper_point: ExtremePoints
-
-    def axis(self, number: int) -> PredictedMiss:
-        """Return the interval of one lateral axis in space; `number` is 0 for y and 1 for z."""
-        return PredictedMiss(
-            self.exists,
-            self.lower_m[number],
-            self.upper_m[number],
-            self.lower_point.axis(number),
-            self.upper_point.axis(number),
-        )

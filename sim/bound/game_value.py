@@ -136,7 +136,7 @@ def _course(scenario: Scenario) -> _Course:
             break  # below the minimum range of a camera, where the set has no label and impulses are not counted
         if measured[i]:
             widest.measure_angle(0.0)
-        half_width_m[i] = widest.predicted_miss().upper_m[0]
+        half_width_m[i] = widest.predicted_miss().upper_m[0, 0]
         widest.drop_below_threshold()
         widest.predict()
     given = scenario.impulse_steps

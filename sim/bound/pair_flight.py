@@ -63,7 +63,7 @@ def middle(values: Floats) -> Floats:
 class PairFlight:
     """Outcome of the flight of a pair.
 
-    Impulses at each step have the shape (steps, 2) or (steps, 2, 2), along y and z in space: step, axis, motion.
+    Impulses have the shape (steps, C, 2): step, lateral axis, motion.
     `max_error_share` is the maximum error of a common measurement, in units of its bound.
     """
 

@@ -258,7 +258,7 @@ class Approach:
             1.0 / math.hypot(1.0, slope),
             np.column_stack([positions, np.full(2, self.label_m)]),
             np.column_stack([velocities, np.full(2, self.vx_m_s)]),
-            pushes if self.scenario.is_spatial else pushes[0],
+            pushes,
         )
 
     def _admissible_share(

@@ -44,10 +44,9 @@ def test_both_planes_show_the_sections_of_the_record(open_page: Open, page: str,
         assert f"Sections of the set: line-of-sight rate ω and angle α along {axis}" in captions
         found = opened.page.evaluate(f"columns[{column}].sections.map((section) => section.points)")
         sections = space[1].steps[STEP].sections
-        polygons = [section.omega_alpha if axis == "z" else section.omega_alpha_y for section in sections]
+        polygons = [section.omega_alpha[column] for section in sections]
         assert len(found) == len(polygons)
         for outline, polygon in zip(found, polygons, strict=True):
-            assert polygon is not None
             wanted = polygon.polygon()
             np.testing.assert_allclose(outline, wanted, rtol=0.0, atol=1e-5 * np.ptp(wanted, axis=0).max())
 
@@ -60,7 +59,8 @@ def test_the_b_plane_shows_the_predicted_misses_of_the_record(open_page: Open, p
     step = space[1].steps[STEP]
     assert len(boxes) == len(step.sections)
     bounding = [*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)]
-    ends = np.array([step.axes[axis].predicted_miss_m for axis in AXES])
+    ends = step.predicted_miss_m
+    assert ends is not None
     assert bounding == ends.T.ravel().tolist()
     path = opened.page.evaluate(f"{panel}.path")
     assert path[STEP] == pytest.approx(ends.mean(axis=1).tolist(), rel=1e-12, abs=1e-9)
@@ -92,7 +92,7 @@ def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screensh
     record = long_flight
     html = interception_page([record])
     kept = kept_steps(record)
-    fired = [index for index, step in enumerate(record.steps) if step.impulse_m_s != 0.0]
+    fired = [index for index, step in enumerate(record.steps) if step.impulse_m_s.any()]
     assert len(record.steps) > 1000
     assert len(kept) <= MAX_STEPS
     assert {0, len(record.steps) - 1, *fired} <= set(kept)
@@ -111,14 +111,14 @@ def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screensh
     page.evaluate(f"player.show({4 * number + 2})")
     assert opened.shown_at().endswith("before arrival), after the impulse")
     said = rows_of(opened)
-    assert numbers(said["impulse modulus"]) == pytest.approx([step.impulse_m_s], rel=SIX_DIGITS)
+    assert numbers(said["impulse modulus"]) == pytest.approx([np.hypot(*step.impulse_m_s)], rel=SIX_DIGITS)
     page.wait_for_timeout(50)
     page.screenshot(path=screenshots / "space-long.png", full_page=True)
     page.evaluate(f"player.show({4 * number + 3})")
     labels = page.evaluate("columns[0].sections.map(({ label }) => label)")
     assert {section.label_m for section in after.sections} <= set(labels)
     truth = [page.evaluate(f"columns[{k}].truth.angle") for k in (0, 1)]
-    assert truth == [after.axes[axis].true_angle_rad for axis in AXES]
+    assert truth == after.true_angle_rad.tolist()
 
 
 def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Record) -> None:
@@ -130,24 +130,21 @@ def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Rec
     kept = [steps[number] for number in known]
     assert len(kept) > 0.8 * len(steps)
     found = opened.page.evaluate("engagements[0].corridor")
-    intervals = np.array([[step.axes[axis].predicted_miss_m for axis in AXES] for step in kept])
+    intervals = np.array([step.predicted_miss_m for step in kept])
     assert len(found["maximum"]) == len(steps)
     assert [number for number, value in enumerate(found["maximum"]) if value is not None] == known
     found["maximum"], found["centred"] = ([found[name][number] for number in known] for name in ("maximum", "centred"))
     np.testing.assert_allclose(found["maximum"], np.hypot(*np.abs(intervals).max(axis=2).T))
     np.testing.assert_allclose(found["centred"], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
     np.testing.assert_allclose(found["truth"][-1], float(record.result.miss_m[0]), atol=0.05)
-    for number, axis in enumerate(AXES):
+    for number in range(len(AXES)):
         places, truth, extents = (
             opened.page.evaluate(f"engagements[0].projections[{number}].{name}")
             for name in ("places", "truth", "extents")
         )
         np.testing.assert_allclose(10.0 ** -np.array(places), [step.true_range_m for step in steps])
         truth, extents = ([values[number] for number in known] for values in (truth, extents))
-        sections = [
-            [section.polygon if axis == "z" else section.polygon_y for section in step.sections] for step in kept
-        ]
-        heights = [[polygon.polygon()[:, 1] for polygon in polygons if polygon is not None] for polygons in sections]
+        heights = [[section.polygons[number].polygon()[:, 1] for section in step.sections] for step in kept]
         ends = [(min(map(np.min, each)), max(map(np.max, each))) for each in heights]
         np.testing.assert_allclose(extents, ends, rtol=1e-6)
         inside = [low <= value <= high for value, (low, high) in zip(truth, ends, strict=True)]

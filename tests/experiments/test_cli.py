@@ -32,7 +32,7 @@ pytestmark = pytest.mark.usefixtures("unrendered")
 
 CURVE_KEYS = [
     *("published_curve", "noise", "range_sensor", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome"),
-    *("set_emptied", "truth_kept", "truth_margin_m", "phi_held"),
+    *("set_emptied", "truth_kept", "truth_margin_m", "phi_held", "miss_z_m"),
 ]
 OUTCOMES = {"arrived", "set-empty", "budget-spent", "diverged"}
 
@@ -165,17 +165,17 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     assert found["outcome"] in OUTCOMES
     steps = found["steps"]
     columns = [
-        *("step", "time_s", "measured_angle_rad", "measured_range_m", "measured_rate_rad_s", "true_angle_rad"),
-        *("true_rate_rad_s", "true_range_m", "impulse_m_s", "predicted_miss_lower_m", "predicted_miss_upper_m"),
-        *("truth_margin_m", "sections"),
+        *("step", "time_s", "true_range_m", "measured_range_m", "impulse_m_s", "measured_angle_z_rad"),
+        *("measured_rate_z_rad_s", "true_angle_z_rad", "true_rate_z_rad_s", "impulse_z_m_s"),
+        *("predicted_miss_z_lower_m", "predicted_miss_z_upper_m", "truth_margin_m", "sections"),
     ]
     assert all(list(step) == columns for step in steps)
     assert [step["time_s"] for step in steps[:3]] == [0.0, 0.5, 1.0]
     first, last = steps[0], steps[-1]
-    assert first["predicted_miss_lower_m"] < first["predicted_miss_upper_m"]
+    assert first["predicted_miss_z_lower_m"] < first["predicted_miss_z_upper_m"]
     assert last["time_s"] == 0.5 * (len(steps) - 1)
-    assert all((step["predicted_miss_lower_m"] is None) == (step["sections"] == 0) for step in steps)
-    assert math.isclose(sum(abs(step["impulse_m_s"]) for step in steps), found["impulse_m_s"])
+    assert all((step["predicted_miss_z_lower_m"] is None) == (step["sections"] == 0) for step in steps)
+    assert math.isclose(sum(step["impulse_m_s"] for step in steps), found["impulse_m_s"])
     assert names_in(tmp_path) == []
 
 

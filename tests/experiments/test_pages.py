@@ -87,13 +87,11 @@ def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
     for each, step in zip(stages, record.steps, strict=False):
         for found, recorded in zip(each.measured, step.sections, strict=True):
             assert (found.label_m, found.range_m) == (recorded.label_m, recorded.range_m)
-            np.testing.assert_array_equal(found.polygon.polygon(), recorded.polygon.polygon())
-            if recorded.polygon_y is not None and found.polygon_y is not None:
-                np.testing.assert_array_equal(found.polygon_y.polygon(), recorded.polygon_y.polygon())
-        for axis, along in step.axes.items():
-            ends = each.miss_m[axis]
-            assert (along.predicted_miss_m is None) == (not ends.size)
-            assert along.predicted_miss_m is None or (ends.min(), ends.max()) == along.predicted_miss_m
+            np.testing.assert_array_equal(found.polygons.vertices, recorded.polygons.vertices)
+        assert (step.predicted_miss_m is None) == (not each.miss_m.size)
+        if step.predicted_miss_m is not None:
+            ends = np.stack([each.miss_m[..., 0].min(axis=1), each.miss_m[..., 1].max(axis=1)], axis=1)
+            np.testing.assert_array_equal(step.predicted_miss_m, ends)
 
 
 def test_a_record_of_another_librarys_sets_is_refused(record: Record) -> None:
@@ -110,10 +108,10 @@ def test_what_was_before_holds_what_is_after(kind: Model) -> None:
     model = replace(scenario.set_model, model=kind, initial_set=initial)
     flown = fly_one(replace(scenario, **of_model(model)))
     for each in list(replayed(flown))[:-1:20]:
-        before = {section.label_m: section.polygon for section in each.before}
+        before = {section.label_m: section.polygons[0] for section in each.before}
         for section in each.measured:
             if section.label_m in before:
-                points = section.polygon.polygon()
+                points = section.polygons[0].polygon()
                 scale = np.abs(points).max()
                 assert all(before[section.label_m].margin(point) >= -1e-9 * scale for point in points)
 

@@ -104,7 +104,7 @@ def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
     steps = max_number_of_steps(scenario)
     minimum, maximum = corners(scenario.dispersion)
 
-    shape = (2, batch, steps) if scenario.is_spatial else (batch, steps)
+    shape = (len(scenario.set_model.axes), batch, steps)
 
     def uniform(shape: tuple[int, ...] = shape) -> Floats:
         return np.clip(generator.uniform(-2.0, 2.0, shape), -1.0, 1.0)

@@ -109,8 +109,8 @@ def test_the_predicted_miss_covers_the_section() -> None:
         (section,) = step.information.sections(2)
         tau = section.range_m / section.closing_speed_m_s
         drift = 0.5 * scenario.set_model.disturbance_m_s2 * tau**2
-        reach = float(section.polygon.support_function((-tau, -1.0)))
-        minimum.append((float(step.predicted_miss.lower_m[2]), -reach - drift))
+        reach = float(section.polygons[0].support_function((-tau, -1.0)))
+        minimum.append((float(step.predicted_miss.lower_m[0, 2]), -reach - drift))
 
     flight = Engagements(scenario, draws)
     while flight.step < 25:

@@ -92,7 +92,7 @@ def tell(model: SetModel, events: list[tuple[float, float, float]], *, sign: flo
 def section(information: InformationSet, label: float) -> ConvexPolygons:
     """In lengths, V counted as V x/e: what rounding does is alike along both axes then."""
     found = information.section_at(label)
-    return found.polygon.linear_map([[found.range_m / E, 0.0], [0.0, 1.0]])
+    return found.polygons[0].linear_map([[found.range_m / E, 0.0], [0.0, 1.0]])
 
 
 HAIR = 1e-9 * 1e4
@@ -182,10 +182,10 @@ def test_impulses_add_and_move_the_predicted_miss(
     other.shift(first + second)
     assert lies_in(section(one, label), section(other, label), HAIR)
     assert lies_in(section(other, label), section(one, label), HAIR)
-    after = other.section_at(label).polygon
-    assume(not before.polygon.is_empty)
-    assert float(after.area()) == pytest.approx(float(before.polygon.area()), rel=1e-9, abs=1e-9)
-    moved = before.polygon.translate((-(first + second), 0.0))
+    after = other.section_at(label).polygons[0]
+    assume(not before.polygons[0].is_empty)
+    assert float(after.area()) == pytest.approx(float(before.polygons[0].area()), rel=1e-9, abs=1e-9)
+    moved = before.polygons[0].translate((-(first + second), 0.0))
     assert lies_in(after, moved, HAIR)
     assert lies_in(moved, after, HAIR)
 
@@ -195,19 +195,21 @@ def test_impulses_add_and_move_the_predicted_miss(
 def test_prediction_is_a_shear_and_a_segment(events: list[tuple[float, float, float]], label: float) -> None:
     """It keeps areas where there is no disturbance, and adds the width across the segment where there is one."""
     information = tell(PAPER, events)
-    before = information.section_at(label).polygon
+    before = information.section_at(label).polygons[0]
     assume(not before.is_empty)
     information.predict()
     after = information.section_at(label)
     nu = PAPER.disturbance_m_s2
     half = np.array([nu * STEP, 0.5 * nu * STEP**2])
     wanted = before.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment(half)
-    assert lies_in(after.polygon, wanted, HAIR)
-    assert lies_in(wanted, after.polygon, HAIR)
+    assert lies_in(after.polygons[0], wanted, HAIR)
+    assert lies_in(wanted, after.polygons[0], HAIR)
     width = float(wanted.support_function((-half[1], half[0]))) + float(wanted.support_function((half[1], -half[0])))
     area = float(before.area()) + 2.0 * width
-    assert float(after.polygon.area()) == pytest.approx(area, rel=1e-9, abs=HAIR)
-    assert float(after.omega_alpha.area()) * after.range_m**2 == pytest.approx(float(after.polygon.area()), rel=1e-9)
+    assert float(after.polygons[0].area()) == pytest.approx(area, rel=1e-9, abs=HAIR)
+    assert float(after.omega_alpha[0].area()) * after.range_m**2 == pytest.approx(
+        float(after.polygons[0].area()), rel=1e-9
+    )
     still = tell(replace(PAPER, disturbance_m_s2=0.0), events)
     misses = [still.predicted_miss()]
     still.predict()
@@ -221,7 +223,7 @@ def test_prediction_is_a_shear_and_a_segment(events: list[tuple[float, float, fl
 def test_sections_are_concave_in_the_label(events: list[tuple[float, float, float]], one: float, other: float) -> None:
     """Half of the sum of two sections lies in the section between: the whole set is convex."""
     information = tell(SOUND, [(error, impulse, -1.0) for error, impulse, _ in events])
-    low, high, middle = (information.section_at(label).polygon for label in (one, other, 0.5 * (one + other)))
+    low, high, middle = (information.section_at(label).polygons[0] for label in (one, other, 0.5 * (one + other)))
     assume(not (low.is_empty or high.is_empty))
     assert lies_in(low.minkowski_sum(high).linear_map(0.5 * np.eye(2)), middle, HAIR)
 
@@ -262,8 +264,8 @@ def test_lengths_a_power_of_two_as_long_give_the_same_digits(
         other.measure_angle(z / x + error * float(SENSOR.error_bound(x)))
         other.shift(unit * impulse)
         other.predict()
-    assert (unit * plain.section_at(label).polygon.polygon()).tolist() == (
-        other.section_at(unit * label).polygon.polygon().tolist()
+    assert (unit * plain.section_at(label).polygons[0].polygon()).tolist() == (
+        other.section_at(unit * label).polygons[0].polygon().tolist()
     )
     assert (unit * plain.predicted_miss().upper_m).tolist() == other.predicted_miss().upper_m.tolist()
     assert (unit * plain.ranges_m).tolist() == other.ranges_m.tolist()

@@ -67,7 +67,7 @@ def situation(model: SetModel = MODEL, batch: int = 1, step: int = 0, step_s: fl
         thruster=ENGINE,
         closing_speed_m_s=E,
         measured={},
-        last_impulse_m_s=np.zeros(batch),
+        last_impulse_m_s=np.zeros((1, batch)),
         information=view,
     )
 
@@ -90,12 +90,14 @@ class Truth:
         self.v += self.a * step_s
         self.to_go_s -= step_s
 
-    def estimator(self, errors_m: Callable[[float], float] = lambda to_go_s: 0.0) -> Callable[[int, bool], Estimator]:
+    def estimator(
+        self, errors_m: Callable[[float], float] = lambda to_go_s: 0.0
+    ) -> Callable[[tuple[int, int], bool], Estimator]:
         """An estimator that knows the motion, but for an error of the miss; only if augmented it knows `a`."""
         truth = self
 
         class Known:
-            def __init__(self, batch: int, is_augmented: bool) -> None:
+            def __init__(self, shape: tuple[int, int], is_augmented: bool) -> None:
                 self.a = truth.a if is_augmented else 0.0
 
             def update(self, situation: Situation) -> None:
@@ -104,7 +106,7 @@ class Truth:
             def estimate(self, situation: Situation) -> MissEstimate:
                 to_go = truth.to_go_s
                 miss = truth.z + truth.v * to_go + 0.5 * self.a * to_go**2 + errors_m(to_go)
-                one = np.ones(1)
+                one = np.ones((1, 1))
                 return MissEstimate(miss * one, 0.0 * one, max(to_go - situation.lead_s, 0.0) * one)
 
         return Known
@@ -121,7 +123,7 @@ class Flight:
 
 def fly(strategy: Strategy, truth: Truth, steps: int, burns: Sequence[int] | None = None) -> Flight:
     """Fly to the arrival with an engine that gives all that is wanted, at all steps or at some."""
-    state, rows = strategy.start(1), []
+    state, rows = strategy.start((1, 1)), []
     schedule = () if burns is None else tuple(T - burn * T / steps for burn in burns)
     now = replace(situation(step_s=T / steps), thruster=replace(ENGINE, impulses_s=schedule))
     for step in range(steps):
@@ -133,7 +135,7 @@ def fly(strategy: Strategy, truth: Truth, steps: int, burns: Sequence[int] | Non
             may_fire=burns is None or step in burns,
             later_times_s=times,
         )
-        (impulse,) = strategy.decide(now, state)
+        impulse = strategy.decide(now, state).item()
         rows.append((truth.to_go_s, impulse, truth.miss_m))
         truth.v -= impulse
         truth.advance(T / steps)
@@ -203,15 +205,15 @@ def test_pulses_are_no_smaller_than_the_dead_band_and_follow_the_commands() -> N
 def test_the_dead_band_is_the_min_impulse_by_default_and_old_commands_are_not_given() -> None:
     truth = Truth(0.0, 1.0)
     strategy = ProportionalNavigation(truth.estimator())
-    state, engine = strategy.start(1), Thruster(1e9, 0.05, 1e9)
+    state, engine = strategy.start((1, 1)), Thruster(1e9, 0.05, 1e9)
     now = replace(situation(), thruster=engine)
-    assert strategy.decide(now, state)[0] == 0.0  # 1 (1 - 0.99^3) = 0.0297
-    assert state.accumulated_m_s[0] == pytest.approx(1.0 - 0.99**3)
-    assert strategy.decide(now, state)[0] == pytest.approx(2.0 * (1.0 - 0.99**3))
+    assert strategy.decide(now, state)[0, 0] == 0.0  # 1 (1 - 0.99^3) = 0.0297
+    assert state.accumulated_m_s[0, 0] == pytest.approx(1.0 - 0.99**3)
+    assert strategy.decide(now, state)[0, 0] == pytest.approx(2.0 * (1.0 - 0.99**3))
     strategy.decide(now, state)
     truth.v = 0.0
-    assert strategy.decide(now, state)[0] == 0.0
-    assert state.accumulated_m_s[0] == 0.0
+    assert strategy.decide(now, state)[0, 0] == 0.0
+    assert state.accumulated_m_s[0, 0] == 0.0
 
 
 def test_predictive_guidance_leaves_the_error_of_its_last_estimate() -> None:
@@ -239,12 +241,12 @@ def test_the_divisor_is_the_time_from_the_impulse(make: Callable[..., Strategy])
     truth = Truth(0.0, 2.0, to_go_s=300.0)
     strategy = make(truth.estimator())
     now = replace(situation(), lead_s=100.0, later_times_s=np.empty(0))
-    assert strategy.decide(now, strategy.start(1))[0] == pytest.approx(600.0 / 200.0)
-    assert strategy.decide(replace(now, may_fire=False), strategy.start(1))[0] == 0.0
+    assert strategy.decide(now, strategy.start((1, 1)))[0, 0] == pytest.approx(600.0 / 200.0)
+    assert strategy.decide(replace(now, may_fire=False), strategy.start((1, 1)))[0, 0] == 0.0
 
 
 def measured(
-    kind: Callable[[int, bool], Estimator],
+    kind: Callable[[tuple[int, int], bool], Estimator],
     model: SetModel,
     truth: Truth,
     steps: int,
@@ -253,10 +255,11 @@ def measured(
     **others: Any,
 ) -> tuple[Any, Situation]:
     """Return an estimator after angles along a motion with no impulse, and its last situation."""
-    estimator, (batch, _) = kind(1 if seen is None else len(seen), False), (1, 0) if seen is None else seen.shape
+    batch = 1 if seen is None else len(seen)
+    estimator = kind((1, batch), False)
     sensors = others.pop("sensors", {})
     for step in range(steps):
-        angle = np.full(batch, np.arctan2(truth.z, E * truth.to_go_s))
+        angle = np.full((1, batch), np.arctan2(truth.z, E * truth.to_go_s))
         values = {"angle": angle + (0.0 if errors_rad is None else errors_rad[step])}
         if "range" in sensors:
             values["range"] = np.full(batch, np.hypot(truth.z, E * truth.to_go_s))
@@ -297,9 +300,9 @@ def test_deviations_with_a_camera_are_those_of_a_line_through_the_positions(cent
     if bias is Bias.CONSTANT:
         expected = float(np.hypot(expected, centroid_m / np.sqrt(3.0)))
     estimate = estimator.estimate(now)
-    assert estimate.deviation_m[0] == pytest.approx(expected, rel=1e-4)
-    assert estimate.miss_m[0] == pytest.approx(0.0, abs=1e-9)
-    assert estimate.to_go_s[0] == pytest.approx(T - 590.0)
+    assert estimate.deviation_m[0, 0] == pytest.approx(expected, rel=1e-4)
+    assert estimate.miss_m[0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert estimate.to_go_s[0, 0] == pytest.approx(T - 590.0)
 
 
 def test_lost_images_change_nothing_in_the_engagement_that_lost_them() -> None:
@@ -311,28 +314,28 @@ def test_lost_images_change_nothing_in_the_engagement_that_lost_them() -> None:
     estimate = estimator.estimate(now)
     for number in range(3):
         steps = np.flatnonzero(seen[number]).astype(float)
-        assert estimate.deviation_m[number] == pytest.approx(deviation_m(lambda x: 0.0 * x + 1e-5, steps), rel=1e-3)
+        assert estimate.deviation_m[0, number] == pytest.approx(deviation_m(lambda x: 0.0 * x + 1e-5, steps), rel=1e-3)
         single, last = measured(KalmanBank, MODEL, Truth(500.0, -2.0), 60, seen[number : number + 1], errors)
-        np.testing.assert_allclose(single.estimate(last).miss_m, estimate.miss_m[number], rtol=1e-9)
-    assert len(set(estimate.miss_m.tolist())) == 3
+        np.testing.assert_allclose(single.estimate(last).miss_m, estimate.miss_m[0, number], rtol=1e-9)
+    assert len(set(estimate.miss_m[0].tolist())) == 3
 
 
 def test_the_dead_zone_ends_at_the_last_allowed_time() -> None:
-    now = replace(situation(), measured={"angle": np.array([1e-4])}, new=frozenset({"angle"}))
+    now = replace(situation(), measured={"angle": np.array([[1e-4]])}, new=frozenset({"angle"}))
     strategy = Kalman()
-    assert strategy.decide(now, strategy.start(1))[0] == 0.0
+    assert strategy.decide(now, strategy.start((1, 1)))[0, 0] == 0.0
     for others in ({"later_times_s": np.empty(0)}, {"later_times_s": np.array([2.0])}):
-        assert strategy.decide(replace(now, **others), strategy.start(1))[0] != 0.0
-    assert strategy.decide(replace(now, later_times_s=np.array([20.0])), strategy.start(1))[0] == 0.0
-    assert strategy.decide(replace(now, later_times_s=np.empty(0), may_fire=False), strategy.start(1))[0] == 0.0
+        assert strategy.decide(replace(now, **others), strategy.start((1, 1)))[0, 0] != 0.0
+    assert strategy.decide(replace(now, later_times_s=np.array([20.0])), strategy.start((1, 1)))[0, 0] == 0.0
+    assert strategy.decide(replace(now, later_times_s=np.empty(0), may_fire=False), strategy.start((1, 1)))[0, 0] == 0.0
 
 
 def test_augmented_estimators_find_the_acceleration_of_the_target() -> None:
     model = set_model(AngleSensor.camera(10.0, 1e-6), nu=0.01)
     truth = Truth(500.0, -2.0, a=0.006)
-    estimator, now = measured(lambda batch, _: KalmanBank(batch, True), model, truth, 60)
-    assert estimator.estimate(now).miss_m[0] == pytest.approx(truth.miss_m, rel=0.02)
-    assert estimator.mean[0, 0, 4] == pytest.approx(0.006, rel=0.02)
+    estimator, now = measured(lambda shape, _: KalmanBank(shape, True), model, truth, 60)
+    assert estimator.estimate(now).miss_m[0, 0] == pytest.approx(truth.miss_m, rel=0.02)
+    assert estimator.mean[0, 0, 0, 4] == pytest.approx(0.006, rel=0.02)
 
 
 @pytest.mark.parametrize("name", BASELINES)

@@ -34,12 +34,12 @@ def array(*values: float | list[float]) -> np.ndarray:
     ],
 )
 def test_the_thruster_follows_the_papers_rules(wanted: float, left: float, given_impulse: float) -> None:
-    assert THRUSTER.give(array(wanted), array(left))[0] == given_impulse
+    assert THRUSTER.give(array([wanted]), array(left)).item() == given_impulse
 
 
 @given(st.floats(-1e6, 1e6), st.floats(0.0, 1000.0))
 def test_an_impulse_is_zero_or_within_the_limits_and_the_budget(wanted: float, left: float) -> None:
-    given_impulse = float(THRUSTER.give(array(wanted), array(left))[0])
+    given_impulse = THRUSTER.give(array([wanted]), array(left)).item()
     assert given_impulse == 0.0 or 0.25 <= abs(given_impulse) <= min(7.5, left)
     assert given_impulse * wanted >= 0.0
 
@@ -82,17 +82,17 @@ def test_errors_of_execution_change_the_modulus_and_turn_the_impulse() -> None:
     turned = np.arctan2(executed[1, 3], executed[0, 3]) - np.arctan2(-2.0, 1.0)
     assert turned == pytest.approx(-0.1, rel=1e-14)
     np.testing.assert_array_equal(thruster.executed(impulse, None, None), impulse)
-    np.testing.assert_array_equal(thruster.executed(impulse[1], size, None), impulse[1] * (1.0 + 0.1 * size))
+    np.testing.assert_array_equal(thruster.executed(impulse[1:], size, None), impulse[1:] * (1.0 + 0.1 * size))
 
 
 def interval(lower: float, upper: float, lower_range: float, upper_range: float, exists: bool = True) -> PredictedMiss:
-    zero = array(0.0)
+    zero = array([0.0])
     return PredictedMiss(
         np.array([exists]),
-        array(lower),
-        array(upper),
-        ExtremePoints(zero, zero, array(lower_range)),
-        ExtremePoints(zero, zero, array(upper_range)),
+        array([lower]),
+        array([upper]),
+        ExtremePoints(zero, zero, array([lower_range])),
+        ExtremePoints(zero, zero, array([upper_range])),
     )
 
 
@@ -101,7 +101,7 @@ def test_the_symmetric_impulse_makes_the_ends_opposite(
     lower: float, width: float, lower_range: float, upper_range: float, e: float
 ) -> None:
     """Equation (15): pi^* - k x^*/e = -(pi_* - k x_*/e)."""
-    k = float(symmetric_impulse(interval(lower, lower + width, lower_range, upper_range), e)[0])
+    k = symmetric_impulse(interval(lower, lower + width, lower_range, upper_range), e).item()
     upper_after, lower_after = lower + width - k * upper_range / e, lower - k * lower_range / e
     assert upper_after == pytest.approx(-lower_after, rel=1e-9, abs=1e-9 * (abs(lower) + width + 1.0))
 

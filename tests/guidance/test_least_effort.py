@@ -35,7 +35,7 @@ def guaranteed() -> Scenario:
 @given(LINES)
 def test_lines_are_balanced_as_by_a_linear_program(lines: list[tuple[float, float, float]]) -> None:
     falling, rising, slopes = (np.array(each)[None] for each in zip(*lines, strict=True))
-    at, value = balanced(falling, rising, slopes, 7.5)
+    (at,), (value,) = balanced(falling[None], rising[None], slopes, 7.5)
     rows = np.concatenate(
         [np.stack([-slopes[0], -np.ones(len(lines))], 1), np.stack([slopes[0], -np.ones(len(lines))], 1)]
     )
@@ -60,19 +60,20 @@ class Checked(LeastEffort):
         if situation.step % 7 or not living.any():
             return impulse
         # Between two sections the misses are interpolated at three labels.
-        known = (*view.predicted_miss_by_section_m(), ranges)
+        (lower_m,), (upper_m,) = view.predicted_miss_by_section_m()
+        known = (lower_m, upper_m, ranges)
         number = np.arange(4 * int(living.sum()) - 3) / 4.0
         lower, upper, x = (np.interp(number, np.arange(living.sum()), each[0, living]) for each in known)
         to_go_s, authority = x / e, correctable_later_m(situation, x[None])[0] / (59.0 / 58.0)
 
         def worst(u: Floats) -> tuple[float, float]:
             misses = np.maximum(upper[:, None] - u * to_go_s[:, None], u * to_go_s[:, None] - lower[:, None])
-            effort = (misses - unavoidable_m(situation)) / np.maximum(authority, 1e-9)[:, None]
+            effort = (misses - unavoidable_m(situation)[0]) / np.maximum(authority, 1e-9)[:, None]
             excess = misses - authority[:, None]
             return float(effort.max(axis=0).min()), float(excess.max(axis=0).min())
 
         decided, best = (
-            worst(impulse[:1]),
+            worst(impulse[0, :1]),
             worst(np.linspace(-1.0, 1.0, 3001) * situation.thruster.max_impulse_m_s),
         )
         is_urgent = best[0] > 1.0 + 1e-6
@@ -104,7 +105,7 @@ def test_the_reference_is_a_miss_that_no_strategy_prevents(guaranteed: Scenario)
 
     class Read(LeastEffort):
         def decide(self, situation: Situation, state: None) -> Floats:
-            found.append(unavoidable_m(situation))
+            found.append(unavoidable_m(situation).item())
             return super().decide(situation, state)
 
     simulate(guaranteed, 1, strategy=Read(), guarantee=False)

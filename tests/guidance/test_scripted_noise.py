@@ -31,13 +31,13 @@ errors = st.floats(-1.0, 1.0)
 
 
 def sight(alpha: Any, distance: Any, step: int = 0, ranging: bool = True, rating: bool = True) -> LineOfSight:
-    alpha = np.atleast_1d(np.asarray(alpha, dtype=np.float64))
+    alpha = np.atleast_2d(np.asarray(alpha, dtype=np.float64))
     sensors: dict[str, Sensor] = {"angle": SENSOR}
     if ranging:
         sensors["range"] = RangeSensor(0.5, 0.05)
     if rating:
         sensors["rate"] = RateSensor(0.5, 1e-6)
-    distance = np.broadcast_to(np.float64(distance), alpha.shape).copy()
+    distance = np.broadcast_to(np.float64(distance), alpha.shape[1:]).copy()
     return LineOfSight(step, alpha, 0.1 * alpha, distance, sensors)
 
 
@@ -54,12 +54,12 @@ def test_what_is_measured_stays_within_the_bounds_to_rounding(
     alpha: float, distance: float, angle: float, far: float, fast: float
 ) -> None:
     seen = sight(alpha, distance)
-    script = {name: np.array([[error]]) for name, error in (("angle", angle), ("range", far), ("rate", fast))}
+    script = {"angle": np.array([[[angle]]]), "range": np.array([[far]]), "rate": np.array([[[fast]]])}
     found = ScriptedNoise(script).measure(seen, looked_at())
     bound = SENSOR.error_bound(distance)
-    assert abs(found["angle"][0] - alpha) <= bound + ROUNDING * (abs(alpha) + bound)
+    assert abs(found["angle"].item() - alpha) <= bound + ROUNDING * (abs(alpha) + bound)
     assert abs(found["range"][0] - distance) <= 0.05 * distance * (1.0 + 20.0 * ROUNDING)
-    assert abs(found["rate"][0] - 0.1 * alpha) <= 1e-6 + ROUNDING * (abs(alpha) + 1e-6)
+    assert abs(found["rate"].item() - 0.1 * alpha) <= 1e-6 + ROUNDING * (abs(alpha) + 1e-6)
 
 
 @given(st.floats(-0.01, 0.01), st.floats(1e3, 7e6), errors, errors, errors)
@@ -80,25 +80,25 @@ def test_extremal_errors_are_the_ends_of_what_the_truth_allows() -> None:
     seen = sight([0.001, -0.002], 3e6)
     for end in (-1.0, 1.0):
         script = np.full((2, 1), end)
-        found = ScriptedNoise({"angle": script, "range": script}).measure(seen, looked_at())
+        found = ScriptedNoise({"angle": script[None], "range": script}).measure(seen, looked_at())
         assert same(found["angle"], seen.alpha_rad + end * SENSOR.error_bound(3e6))
         assert same(found["range"], seen.range_m * (1.0 + 0.05 * end))
 
 
 def test_each_step_and_engagement_has_its_own_error() -> None:
     script = np.array([[0.0, 0.25, -1.0], [1.0, -0.5, 0.125]])
-    noise = ScriptedNoise({"angle": script})
+    noise = ScriptedNoise({"angle": script[None]})
     for step in range(3):
         seen = sight([0.0, 0.0], 3e6, step=step)
         found = noise.measure(seen, looked_at())
-        assert same(found["angle"], SENSOR.error_bound(3e6) * script[:, step])
+        assert same(found["angle"], SENSOR.error_bound(3e6) * script[None, :, step])
         assert same(found["range"], seen.range_m)
         assert same(found["rate"], seen.omega_rad_s)
 
 
 def test_a_script_that_ends_before_the_flight_is_refused() -> None:
     with pytest.raises(ValueError, match=r"errors\['angle'\] has 3 steps, none for step 3"):
-        ScriptedNoise({"angle": np.zeros((1, 3))}).measure(sight(0.0, 3e6, step=3), looked_at())
+        ScriptedNoise({"angle": np.zeros((1, 1, 3))}).measure(sight(0.0, 3e6, step=3), looked_at())
 
 
 def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad_and_keeps_its_order_elsewhere() -> None:
@@ -106,10 +106,10 @@ def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad_and_kee
     seen = sight(0.0, 5801.3e3, ranging=False, rating=False)
 
     def measured(noise: GameNoise) -> float:
-        return float(noise.measure(seen, information.view())["angle"][0])
+        return noise.measure(seen, information.view())["angle"].item()
 
-    upper, lower = (SwitchingNoise(TieRule.RANDOM, np.array([[sign]])) for sign in (1.0, -1.0))
-    unused = np.zeros((1, 1))
+    upper, lower = (SwitchingNoise(TieRule.RANDOM, np.array([[[sign]]])) for sign in (1.0, -1.0))
+    unused = np.zeros((1, 1, 1))
     assert measured(upper) == measured(GameNoise(TieRule.UPPER, unused))
     assert measured(lower) == measured(GameNoise(TieRule.LOWER, unused))
     assert abs(measured(upper) - measured(lower)) == pytest.approx(2.0 * SENSOR.error_bound(5801.3e3), rel=1e-12)

@@ -50,8 +50,8 @@ def of_axis(whole: LineOfSight, number: int) -> LineOfSight:
     """The planar line of sight of one axis."""
     return replace(
         whole,
-        alpha_rad=whole.alpha_rad[number],
-        omega_rad_s=whole.omega_rad_s[number],
+        alpha_rad=whole.alpha_rad[number : number + 1],
+        omega_rad_s=whole.omega_rad_s[number : number + 1],
         sensors={
             name: sensor.axis("yz"[number]) if isinstance(sensor, AngleSensor) else sensor
             for name, sensor in whole.sensors.items()
@@ -59,12 +59,13 @@ def of_axis(whole: LineOfSight, number: int) -> LineOfSight:
     )
 
 
-def moved(model: SetModel = MODEL, seed: int = 1, exchanged: bool = False) -> InformationSetView:
-    """A set after a few steps with impulses."""
-    information, random = InformationSet(model, BATCH), np.random.default_rng(seed)
+def moved(model: SetModel = MODEL, seed: int = 1, axis: int | None = None) -> InformationSetView:
+    """A set after a few steps with impulses, or that of the plane of one axis."""
+    planar = model if axis is None else model.axis("yz"[axis])
+    information, random = InformationSet(planar, BATCH), np.random.default_rng(seed)
     for _ in range(3):
         impulse = random.uniform(-5.0, 5.0, (2, BATCH))
-        information.shift(impulse[::-1] if exchanged else impulse)
+        information.shift(impulse if axis is None else impulse[[axis]])
         information.predict()
     return information.view()
 
@@ -85,9 +86,10 @@ def test_the_game_of_each_axis_is_that_of_the_plane(tie: TieRule, at_tie: bool) 
         seen = sight({"angle": SENSOR, "rate": RATE}, step=step)
         measured = GameNoise(tie, draws()).measure(seen, view)
         for number, name in enumerate("yz"):
-            planar = GameNoise(tie, draws()[number]).measure(of_axis(seen, number), view.axis(name))
+            plane = InformationSet(MODEL.axis(name), BATCH).view() if at_tie else moved(axis=number)
+            planar = GameNoise(tie, draws()[[number]]).measure(of_axis(seen, number), plane)
             for key in planar:
-                assert np.array_equal(measured[key][number], planar[key])
+                assert np.array_equal(measured[key][number], planar[key][0])
 
 
 def test_tie_rules_differ() -> None:
@@ -99,7 +101,7 @@ def test_tie_rules_differ() -> None:
 def test_a_shift_along_one_axis_keeps_the_errors_possible() -> None:
     seen, view = sight({"angle": SENSOR}), moved()
     for rule in TieRule:
-        measured = GameNoise(rule, draws(), np.array([1e9])).measure(seen, view)["angle"]
+        measured = GameNoise(rule, draws(), np.array([[1e9]])).measure(seen, view)["angle"]
         assert np.abs(SENSOR.error(seen, measured)).max() <= 1.0 + 1e-9
 
 
@@ -108,9 +110,10 @@ def test_bounds_by_axis_are_used_by_the_game() -> None:
     model = replace(MODEL, angle_sensor=angle)
     seen, view = sight({"angle": angle}), moved(model)
     measured = GameNoise(TieRule.UPPER, draws()).measure(seen, view)["angle"]
-    for number, name in enumerate("yz"):
-        planar = GameNoise(TieRule.UPPER, draws()[number]).measure(of_axis(seen, number), view.axis(name))["angle"]
-        assert np.array_equal(measured[number], planar)
+    for number in range(2):
+        plane = moved(model, axis=number)
+        planar = GameNoise(TieRule.UPPER, draws()[[number]]).measure(of_axis(seen, number), plane)["angle"]
+        assert np.array_equal(measured[number], planar[0])
 
 
 @pytest.mark.parametrize("make", [GameNoise, SwitchingNoise])
@@ -133,7 +136,7 @@ def test_the_game_is_possible(make: type[GameNoise]) -> None:
 
 
 class Misses:
-    """The part of a view that the game's rule for ranges reads, with misses by section, shape (2, B, S) or (B, S)."""
+    """The part of a view that the game's rule for ranges reads, with misses by section, shape (2, B, S)."""
 
     def __init__(self, lower: Floats, upper: Floats, ranges: Floats) -> None:
         self.lower, self.upper, self.ranges_m = lower, upper, ranges
@@ -152,9 +155,8 @@ class Misses:
         return PredictedMiss(exists, self.lower.min(axis=-1), self.upper.max(axis=-1), *points)
 
 
-def ranged(noise: GameNoise, misses: Any, distance: float, axes: int = 2) -> float:
-    shape = (1,) if axes == 1 else (2, 1)
-    seen = LineOfSight(0, np.zeros(shape), np.zeros(shape), np.array([distance]), {"range": METER})
+def ranged(noise: GameNoise, misses: Any, distance: float) -> float:
+    seen = LineOfSight(0, np.zeros((2, 1)), np.zeros((2, 1)), np.array([distance]), {"range": METER})
     return float(noise.measure(seen, misses)["range"][0])
 
 

@@ -21,6 +21,7 @@ from guidance import (
 )
 from guidance.authority import correctable_later_m
 from infoset import AngleSensor, ExtremePoints, InformationSet, Model, PredictedMiss, RangeSensor, SetModel, StateBox
+from infoset.arrays import Floats
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
@@ -43,26 +44,26 @@ def situation(
     """One engagement with this predicted-miss interval, reached at ranges that are so many seconds away."""
 
     def point(to_go_s: float) -> ExtremePoints:
-        return ExtremePoints(np.zeros(1), np.zeros(1), np.array([E * to_go_s]))
+        return ExtremePoints(np.zeros((1, 1)), np.zeros((1, 1)), np.array([[E * to_go_s]]))
 
     return Situation(
         time_s=0.0,
         step=0,
         step_s=0.5,
         predicted_miss=PredictedMiss(
-            np.array([True]), np.array([lower]), np.array([upper]), point(lower_to_go_s), point(upper_to_go_s)
+            np.array([True]), np.array([[lower]]), np.array([[upper]]), point(lower_to_go_s), point(upper_to_go_s)
         ),
         budget_left_m_s=np.array([budget]),
         thruster=THRUSTER,
         closing_speed_m_s=E,
         measured={},
-        last_impulse_m_s=np.zeros(1),
+        last_impulse_m_s=np.zeros((1, 1)),
         information=InformationSet(MODEL).view(),
     )
 
 
 def wanted(now: Situation, share: float = 0.5) -> float:
-    return float(Patient(share).decide(now, None)[0])
+    return Patient(share).decide(now, None).item()
 
 
 @pytest.mark.parametrize("budget", [0.0, 7.0, 100.0, 1000.0])
@@ -73,7 +74,7 @@ def test_what_can_be_corrected_later_is_the_sum_over_the_steps(to_go_s: float, b
     while ahead > 1e-9 and left >= 7.5:
         expected, left, ahead = expected + 7.5 * ahead, left - 7.5, ahead - 0.5
     now = situation(-1.0, 1.0, to_go_s, to_go_s, budget)
-    assert correctable_later_m(now, np.array([E * to_go_s]))[0] == pytest.approx(expected, abs=1e-9)
+    assert correctable_later_m(now, np.array([[E * to_go_s]])).item() == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +92,7 @@ def test_patient_corrects_only_what_is_certain(lower: float, upper: float, expec
 
 def test_patient_corrects_what_could_not_be_corrected_later() -> None:
     # With 10 s to go the 19 impulses to come can correct 7.5 (9.5 + ... + 0.5) = 712.5 m.
-    assert correctable_later_m(situation(0.0, 0.0), np.array([10.0 * E]))[0] == pytest.approx(712.5)
+    assert correctable_later_m(situation(0.0, 0.0), np.array([[10.0 * E]])).item() == pytest.approx(712.5)
     assert wanted(situation(-100.0, 356.0, 10.0, 10.0)) == 0.0
     assert wanted(situation(-100.0, 356.25 + 30.0, 10.0, 10.0)) == pytest.approx(3.0)
     assert wanted(situation(-356.25 - 30.0, 100.0, 10.0, 10.0)) == pytest.approx(-3.0)
@@ -127,14 +128,14 @@ SENSOR = RangeSensor(period_s=2.0, relative_error=0.05)
 
 def guide(strategy: Strategy, truth: Straight, meter: bool, sign: float = 1.0) -> tuple[Straight, list[float]]:
     """Guide along straight motion with measurements that do not err; the impulses given."""
-    state, given, impulses = strategy.start(1), 0.0, []
-    measured: dict[str, np.ndarray[tuple[int], np.dtype[np.float64]]] = {}
+    state, given, impulses = strategy.start((1, 1)), 0.0, []
+    measured: dict[str, Floats] = {}
     view = InformationSet(MODEL).view()
     nothing = situation(0.0, 0.0)
     step = 0
     while truth.x > 0.0:
         ranging = meter and step % 4 == 0
-        new = {"angle": np.array([np.arctan2(sign * truth.z, truth.x)])}
+        new = {"angle": np.array([[np.arctan2(sign * truth.z, truth.x)]])}
         if ranging:
             new["range"] = np.array([np.hypot(truth.z, truth.x)])
         measured = measured | new
@@ -143,12 +144,12 @@ def guide(strategy: Strategy, truth: Straight, meter: bool, sign: float = 1.0) -
             time_s=0.5 * step,
             step=step,
             measured=measured,
-            last_impulse_m_s=np.array([given]),
+            last_impulse_m_s=np.array([[given]]),
             information=view,
             new=frozenset(new),
             sensors={"range": SENSOR} if meter else {},
         )
-        given = float(THRUSTER.give(strategy.decide(now, state), np.array([1000.0]))[0])
+        given = THRUSTER.give(strategy.decide(now, state), np.array([1000.0])).item()
         impulses.append(given)
         truth.fire(sign * given)
         truth.advance(0.5)
@@ -166,7 +167,7 @@ def test_the_filters_hit_without_noise(meter: bool) -> None:
 def test_the_filters_find_the_motion_without_noise() -> None:
     """Driven past by a known push, the estimate converges to the truth, its scale included."""
     strategy, truth = Kalman(), Straight(800.0, -60.0, 5850e3, 58.05e3)
-    state = strategy.start(1)
+    state = strategy.start((1, 1))
     view, last = InformationSet(MODEL).view(), 0.0
     for step in range(190):
         now = replace(
@@ -174,10 +175,10 @@ def test_the_filters_find_the_motion_without_noise() -> None:
             time_s=0.5 * step,
             step=step,
             measured={
-                "angle": np.array([np.arctan2(truth.z, truth.x)]),
+                "angle": np.array([[np.arctan2(truth.z, truth.x)]]),
                 "range": np.array([np.hypot(truth.z, truth.x)]),
             },
-            last_impulse_m_s=np.array([last]),
+            last_impulse_m_s=np.array([[last]]),
             information=view,
             new=frozenset({"angle", "range"} if step % 4 == 0 else {"angle"}),
             sensors={"range": SENSOR},
@@ -187,7 +188,7 @@ def test_the_filters_find_the_motion_without_noise() -> None:
         z, vz, x, speed = truth.z, truth.vz, truth.x, truth.speed
         truth.fire(last)
         truth.advance(0.5)
-    found = state.mean[0, int(state.log_weight[0].argmax())]
+    found = state.mean[0, 0, int(state.log_weight[0, 0].argmax())]
     # Angles do not see the scale: it is known as well as the ranges and the impulses show it.
     assert found[0] == pytest.approx(z, rel=3e-3)
     assert found[1] == pytest.approx(vz, rel=3e-3)
@@ -199,10 +200,10 @@ def test_zero_effort_steers_the_middle_of_the_set() -> None:
     information = InformationSet(replace(MODEL, bounds=replace(MODEL.bounds, vz_m_s=(20.0, 60.0))))
     now = replace(situation(0.0, 0.0), information=information.view())
     impulse = ZeroEffortMiss().decide(now, None)
-    assert impulse[0] == pytest.approx(40.0, abs=1.0)
+    assert impulse.item() == pytest.approx(40.0, abs=1.0)
     information.shift(impulse)
     again = ZeroEffortMiss().decide(replace(now, information=information.view()), None)
-    assert again[0] == pytest.approx(0.0, abs=1e-9)
+    assert again.item() == pytest.approx(0.0, abs=1e-9)
 
 
 def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:

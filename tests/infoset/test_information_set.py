@@ -37,11 +37,11 @@ def living_range_interval_m(information: InformationSet) -> tuple[Floats, Floats
 def flown(model: SetModel, steps: int, seed: int = 0, batch: int = 1) -> InformationSet:
     """A set after some steps of a model motion with random noise and impulses, before the next measurement."""
     random = np.random.default_rng(seed)
-    z, v, x = random.uniform(-1e3, 1e3, batch), random.uniform(-50.0, 50.0, batch), np.full(batch, 5801.3e3)
+    z, v, x = random.uniform(-1e3, 1e3, (1, batch)), random.uniform(-50.0, 50.0, (1, batch)), 5801.3e3
     information = InformationSet(model, batch)
     for _ in range(steps):
-        information.measure_angle(z / x + random.uniform(-1.0, 1.0, batch) * SENSOR.error_bound(x))
-        impulse = random.uniform(-3.0, 3.0, batch)
+        information.measure_angle(z / x + random.uniform(-1.0, 1.0, (1, batch)) * SENSOR.error_bound(x))
+        impulse = random.uniform(-3.0, 3.0, (1, batch))
         information.shift(impulse)
         v = v - impulse
         information.drop_below_threshold()
@@ -56,7 +56,7 @@ def test_a_section_replayed_equals_the_one_carried_from_the_start() -> None:
     assert len(carried) >= 2
     for section in carried:
         replayed = information.section_at(section.label_m)
-        np.testing.assert_allclose(replayed.polygon.polygon(), section.polygon.polygon(), rtol=1e-12, atol=0.0)
+        np.testing.assert_allclose(replayed.polygons[0].polygon(), section.polygons[0].polygon(), rtol=1e-12, atol=0.0)
         assert replayed.range_m == section.range_m
 
 
@@ -71,21 +71,21 @@ def test_rates_of_one_engagement_leave_room_for_the_sections_of_another_one(rate
         for information in (alone, both):
             information.predict()
     for one, other in zip(alone.sections(), both.sections(1), strict=True):
-        np.testing.assert_array_equal(other.polygon.polygon(), one.polygon.polygon())
+        np.testing.assert_array_equal(other.polygons[0].polygon(), one.polygons[0].polygon())
 
 
-def test_in_space_a_value_is_needed_for_each_axis_and_is_used_in_all_engagements() -> None:
+def test_in_space_a_value_is_that_of_all_axes_and_engagements_or_one_is_needed_for_each() -> None:
     model = replace(MODEL, bounds=replace(KNOWN, y_m=(-8e3, 8e3), vy_m_s=(-80.0, 80.0)))
     for batch in (1, 3):
         one, each = InformationSet(model, batch), InformationSet(model, batch)
-        one.measure_angle([0.0002, 0.0004])
-        one.shift([1.0, 2.0])
-        each.measure_angle(np.array([[0.0002] * batch, [0.0004] * batch]))
-        each.shift(np.array([[1.0] * batch, [2.0] * batch]))
+        one.measure_angle(0.0002)
+        one.shift(1.0)
+        each.measure_angle(np.full((2, batch), 0.0002))
+        each.shift(np.full((2, batch), 1.0))
         np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
         for change in (one.measure_angle, one.shift):
-            for value in (0.0004, [0.0004], [0.1, 0.2, 0.3], [[0.1, 0.2]] * 3, [np.nan, 0.1], "ab"):
-                with pytest.raises((ValueError, TypeError), match=r"two values, along y and z|finite|numbers"):
+            for value in ([0.0004], [0.1, 0.2, 0.3], [[0.1, 0.2]] * 3, [[np.nan] * batch] * 2, "ab"):
+                with pytest.raises((ValueError, TypeError), match=r"have the shape \(2, [13]\)|finite|numbers"):
                     change(value)
         np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
 
@@ -131,14 +131,14 @@ def test_the_ends_of_the_range_are_alive_and_just_beyond_them_is_dead(seed: int)
     minimum, maximum = living_range_interval_m(information)
     assert maximum[0] - minimum[0] < 0.9 * 1000e3
     for end, outward in ((minimum[0], -1.0), (maximum[0], 1.0)):
-        assert not information.section_at(end + travelled).polygon.is_empty
-        assert information.section_at(end + travelled + outward * 2e-9 * (end + travelled)).polygon.is_empty
+        assert not information.section_at(end + travelled).polygons[0].is_empty
+        assert information.section_at(end + travelled + outward * 2e-9 * (end + travelled)).polygons[0].is_empty
 
 
 def test_the_initial_rectangle_is_the_papers() -> None:
     section = InformationSet(replace(MODEL, sections=1, fewest_sections=1)).sections()[0]
     x = section.label_m
-    lower, upper = section.omega_alpha.bounding_box()
+    lower, upper = section.omega_alpha[0].bounding_box()
     assert lower[1] == pytest.approx(math.atan(-10e3 / x), rel=1e-12)
     assert upper[1] == pytest.approx(math.atan(10e3 / x), rel=1e-12)
     assert lower[0] == pytest.approx((-100.0 * x - -59e3 * -10e3) / x**2, rel=1e-9)
@@ -147,7 +147,7 @@ def test_the_initial_rectangle_is_the_papers() -> None:
 
 def test_the_initial_box_is_the_bounds() -> None:
     information = InformationSet(replace(MODEL, initial_set=InitialSet.BOX))
-    lower, upper = information.sections()[0].polygon.bounding_box()
+    lower, upper = information.sections()[0].polygons[0].bounding_box()
     np.testing.assert_array_equal(lower, (-100.0, -10e3))
     np.testing.assert_array_equal(upper, (100.0, 10e3))
 
@@ -159,7 +159,7 @@ def test_one_step_by_hand() -> None:
     x = information.sections()[0].range_m
     bound = SENSOR.error_bound(x)
     information.measure_angle(0.001)
-    lower, upper = information.sections()[0].polygon.bounding_box()
+    lower, upper = information.sections()[0].polygons[0].bounding_box()
     np.testing.assert_allclose((lower[1], upper[1]), (x * (0.001 - bound), x * (0.001 + bound)), rtol=1e-13)
     information.shift(4.0)
     information.predict()
@@ -170,7 +170,7 @@ def test_one_step_by_hand() -> None:
         corners = [(v - 4.0, z + STEP * (v - 4.0)) for v in (-100.0, 100.0) for z in (lower[1], upper[1])]
         push = abs(direction[0] * nu * STEP + direction[1] * 0.5 * nu * STEP**2)
         expected = max(direction[0] * v + direction[1] * z for v, z in corners) + push
-        assert section.polygon.support_function(direction) == pytest.approx(expected, rel=1e-13)
+        assert section.polygons[0].support_function(direction) == pytest.approx(expected, rel=1e-13)
 
 
 def test_predicted_miss_by_hand() -> None:
@@ -190,19 +190,19 @@ def test_the_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below(
     for _ in range(3):
         information.predict()
     miss = information.predicted_miss()
-    lower, upper = information.sections()[0].omega_alpha.bounding_box()
-    points = information.sections()[0].omega_alpha.polygon()
+    lower, upper = information.sections()[0].omega_alpha[0].bounding_box()
+    points = information.sections()[0].omega_alpha[0].polygon()
     tolerance = 1e-9 * (upper[0] - lower[0])
-    assert miss.upper_point.alpha_rad[0] == pytest.approx(points[points[:, 0] > upper[0] - tolerance, 1].min())
-    assert miss.lower_point.alpha_rad[0] == pytest.approx(points[points[:, 0] < lower[0] + tolerance, 1].max())
-    assert miss.upper_point.alpha_rad[0] < miss.lower_point.alpha_rad[0]
+    assert miss.upper_point.alpha_rad[0, 0] == pytest.approx(points[points[:, 0] > upper[0] - tolerance, 1].min())
+    assert miss.lower_point.alpha_rad[0, 0] == pytest.approx(points[points[:, 0] < lower[0] + tolerance, 1].max())
+    assert miss.upper_point.alpha_rad[0, 0] < miss.lower_point.alpha_rad[0, 0]
 
 
 def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_consistent_one() -> None:
     information = InformationSet(MODEL, batch=2)
     information.measure_angle(0.001)
     before = information.copy()
-    information.measure_angle([0.0012, -0.0012])
+    information.measure_angle([[0.0012, -0.0012]])
     assert information.inconsistent.tolist() == [False, True]
     step, label = information.inconsistency
     assert step.tolist() == [None, 0]
@@ -211,7 +211,7 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     # As before the measurement, and wider by what one measurement may err: e b in V, which is x b of miss.
     x, slack = 5801.3e3, 1e-9
     bound = MODEL.angle_sensor.error_bound(x)
-    old, new = before.section_at(x, 1).polygon, information.section_at(x, 1).polygon
+    old, new = before.section_at(x, 1).polygons[0], information.section_at(x, 1).polygons[0]
     grown = old.minkowski_sum(ConvexPolygons.from_box((-E * bound, 0.0), (E * bound, 0.0)))
     for direction in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.01), (-1.0, 0.02)):
         assert new.support_function(direction) == pytest.approx(float(grown.support_function(direction)), rel=slack)
@@ -230,10 +230,10 @@ def test_a_set_whose_labels_have_all_left_is_finished() -> None:
 
 def test_measuring_some_of_a_batch_leaves_the_others_alone() -> None:
     information = InformationSet(MODEL, batch=2)
-    before = information.sections(1)[3].polygon.polygon()
+    before = information.sections(1)[3].polygons[0].polygon()
     information.measure_angle(0.0003, where=[True, False])
-    np.testing.assert_array_equal(information.sections(1)[3].polygon.polygon(), before)
-    assert information.sections(0)[3].polygon.area() < information.sections(1)[3].polygon.area()
+    np.testing.assert_array_equal(information.sections(1)[3].polygons[0].polygon(), before)
+    assert information.sections(0)[3].polygons[0].area() < information.sections(1)[3].polygons[0].area()
 
 
 @pytest.mark.parametrize("recovery", list(Recovery))
@@ -268,9 +268,9 @@ def test_a_range_that_contradicts_names_the_living_label_nearest_to_it(range_m: 
 
 def test_exact_knowledge_gives_segments_and_points() -> None:
     line = replace(MODEL, bounds=replace(KNOWN, z_m=(100.0, 100.0)), initial_set=InitialSet.BOX)
-    assert InformationSet(line).sections()[0].polygon.counts == 2
+    assert InformationSet(line).sections()[0].polygons[0].counts == 2
     point = replace(line, bounds=replace(line.bounds, vz_m_s=(3.0, 3.0)))
-    assert InformationSet(point).sections()[0].polygon.polygon().tolist() == [[3.0, 100.0]]
+    assert InformationSet(point).sections()[0].polygons[0].polygon().tolist() == [[3.0, 100.0]]
 
 
 def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:
@@ -280,23 +280,23 @@ def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:
         information.predict()
     section = information.sections()[1]
     bound = float(SENSOR.error_bound(section.range_m))
-    minimum, maximum = (float(corner[1]) / section.range_m for corner in section.polygon.bounding_box())
+    minimum, maximum = (float(corner[1]) / section.range_m for corner in section.polygons[0].bounding_box())
     assert maximum - minimum > 2.0 * bound
     for share in np.linspace(0.0, 0.9, 12):
         information.measure_angle(minimum + (1.0 + share) * bound)
-        assert all(int(section.polygon.counts) <= 256 for section in information.sections())
+        assert all(int(section.polygons[0].counts) <= 256 for section in information.sections())
     assert information.tracking[0]
 
 
 def test_the_vertex_cap_is_kept_and_outward() -> None:
     """Without cuts every step adds two vertices; the reduced section contains the exact one."""
     information = InformationSet(replace(MODEL, sections=1, fewest_sections=1, initial_set=InitialSet.BOX))
-    exact = information.sections()[0].polygon
+    exact = information.sections()[0].polygons[0]
     nu = MODEL.disturbance_m_s2
     for _ in range(150):
         information.predict()
         exact = exact.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment([nu * STEP, 0.5 * nu * STEP**2])
-    kept = information.sections()[0].polygon
+    kept = information.sections()[0].polygons[0]
     assert int(kept.counts) <= 256
     assert int(exact.counts) > 256
     normals = np.column_stack((np.cos(np.linspace(0, 6.28, 60)), np.sin(np.linspace(0, 6.28, 60)))) * (50.0, 1.0)

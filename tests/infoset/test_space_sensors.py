@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from infoset import AngleSensor, ExtremePoints, PredictedMiss, RangeSensor, RateSensor
+from infoset import AngleSensor, ExtremePoints, RangeSensor, RateSensor
 from infoset.arrays import Floats
 
 EPS = float(np.finfo(np.float64).eps)
@@ -103,16 +103,3 @@ def test_range_and_rate_in_space() -> None:
     assert np.array_equal(measured, place.omega_rad_s + 1e-6 * error)
     np.testing.assert_allclose(rate.error(place, measured), error, rtol=1e-9)
     assert np.array_equal(rate.nearest(place, place.omega_rad_s + 1.0), place.omega_rad_s + 1e-6)
-
-
-def test_the_interval_of_one_axis() -> None:
-    numbers = np.arange(16.0).reshape(8, 2, 1)
-    whole = PredictedMiss(
-        np.array([True]), numbers[0], numbers[1], ExtremePoints(*numbers[2:5]), ExtremePoints(*numbers[5:8])
-    )
-    for number in range(2):
-        part = whole.axis(number)
-        assert np.array_equal(part.exists, whole.exists)
-        assert np.array_equal(part.upper_m, numbers[1, number])
-        assert np.array_equal(part.lower_point.omega_rad_s, numbers[3, number])
-        assert np.array_equal(part.upper_point.range_m, numbers[7, number])

@@ -70,7 +70,7 @@ def assert_possible(found: WorstEngagement, scenario: Scenario) -> None:
         assert not found.max_acceleration_m_s2
         assert not scenario.set_model.is_guaranteed
     else:
-        for along, axis in zip(np.atleast_2d(found.accelerations_m_s2), scenario.set_model.axes, strict=True):
+        for along, axis in zip(found.accelerations_m_s2, scenario.set_model.axes, strict=True):
             maximum = scenario.set_model.axis(axis).disturbance_m_s2
             assert found.max_acceleration_m_s2[axis] == maximum
             assert set(np.abs(along).tolist()) <= {0.0, maximum}
@@ -91,7 +91,7 @@ def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(worst: Wor
     for step in record.steps:
         if "angle" in step.measured:
             bound = sensor.error_bound(step.true_range_m)
-            assert abs(step.measured["angle"] - step.true_angle_rad) <= bound * (1.0 + 1e-12)
+            assert abs((step.measured["angle"] - step.true_angle_rad).item()) <= bound * (1.0 + 1e-12)
 
 
 @pytest.mark.thorough
@@ -146,11 +146,11 @@ def test_engagements_that_lose_their_set_can_be_left_out(coarse: Scenario) -> No
 
 def test_a_strategy_of_ones_own(coarse: Scenario) -> None:
     class Idle:
-        def start(self, batch: int) -> None:
+        def start(self, shape: tuple[int, int]) -> None:
             return None
 
         def decide(self, situation: Situation, state: None) -> np.ndarray:
-            return np.zeros(situation.information.batch)
+            return np.zeros((1, situation.information.batch))
 
     found = find_worst(coarse, strategy=Idle(), budget=10, objective=Objective.FIXED_TRUTH)
     assert found.strategy == "Idle"
@@ -181,8 +181,11 @@ def test_with_a_cut_off_the_search_begins_with_game_noise_and_its_shift(coarse: 
     game = replace(first.scenario, noise=NoiseKind.GAME, tie=TieRule.UPPER)
     assert first.construction == "game noise, tie upper"
     assert first.accelerations_m_s2 is not None
-    side = np.sign(first.accelerations_m_s2[:1])
-    assert set(first.accelerations_m_s2.tolist()) <= {0.0, 0.005 * side[0]}  # constant until the end of the flight
+    side = np.sign(first.accelerations_m_s2[:, :1])
+    assert set(first.accelerations_m_s2[0].tolist()) <= {
+        0.0,
+        0.005 * side.item(),
+    }  # constant until the end of the flight
 
     def miss_m(noise: GameNoise) -> float:
         flight = Engagements(game, draw(game, [0], 0), noise=noise, target=first.target())
@@ -190,9 +193,9 @@ def test_with_a_cut_off_the_search_begins_with_game_noise_and_its_shift(coarse: 
             flight.advance()
         return float(flight.results(np.arange(1)).miss_m[0])
 
-    shifted = GameNoise(TieRule.UPPER, np.ones((1, 1)), worst_shift_m(game), side)
+    shifted = GameNoise(TieRule.UPPER, np.ones((1, 1, 1)), worst_shift_m(game), side)
     assert first.miss_m == pytest.approx(miss_m(shifted), rel=1e-9)
-    assert first.miss_m > 1.05 * miss_m(GameNoise(TieRule.UPPER, np.ones((1, 1))))
+    assert first.miss_m > 1.05 * miss_m(GameNoise(TieRule.UPPER, np.ones((1, 1, 1))))
 
 
 def test_a_planned_target_keeps_its_sign_or_increases_the_miss() -> None:

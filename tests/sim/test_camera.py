@@ -209,7 +209,7 @@ def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
 
     def interval(alpha_rad: Callable[[float], float]) -> tuple[float, float]:
         miss = measured_set(centroid_m, alpha_rad).predicted_miss()
-        return float(miss.lower_m[0]), float(miss.upper_m[0])
+        return miss.lower_m.item(), miss.upper_m.item()
 
     lower, upper = interval(lambda before_s: 0.0)
     assert upper == pytest.approx(-lower)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import itertools
 import json
 import os
@@ -135,7 +136,9 @@ def test_more_runs_extend_a_campaign(brief: Scenario, reference: pd.DataFrame, t
 
 
 def flipped(content: bytes) -> bytes:
-    return content[: len(content) // 3] + bytes([content[len(content) // 3] ^ 1]) + content[len(content) // 3 + 1 :]
+    column = pq.ParquetFile(io.BytesIO(content)).metadata.row_group(0).column(3)
+    at = column.data_page_offset + column.total_compressed_size - 1  # its last value
+    return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
 
 
 def with_folder(file: Path) -> None:

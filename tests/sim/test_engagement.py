@@ -78,7 +78,7 @@ class ModelMotion:
     def __init__(self, scenario: Scenario, draws: Draws, seed: int) -> None:
         self._e = scenario.set_model.closing_speed_m_s
         self._nu = scenario.set_model.disturbance_m_s2
-        self._z, self._v = draws.position_m[:, 0].copy(), draws.velocity_m_s[:, 0].copy()
+        self._z, self._v = draws.position_m.T[:1].copy(), draws.velocity_m_s.T[:1].copy()
         self._start, self._steps = draws.position_m[:, 1].copy(), 0
         self._x = self._start.copy()
         self._random = np.random.default_rng(seed)
@@ -91,17 +91,21 @@ class ModelMotion:
     def fire(self, impulse_m_s: Floats) -> None:
         self._v = self._v - impulse_m_s
 
+    @property
+    def position_m(self) -> Floats:
+        return np.stack([self._z[0], self._x], axis=1)
+
     def arrival_s(self) -> Floats:
         return self._start / self._e
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         # Half of the disturbances at their bounds: the extremes are what a set must withstand.
-        push = np.clip(self._random.uniform(-2.0, 2.0, self._z.size), -1.0, 1.0) * self._nu
+        push = np.clip(self._random.uniform(-2.0, 2.0, self._z.shape), -1.0, 1.0) * self._nu
         self._z = self._z + self._v * step_s + 0.5 * push * step_s**2
         self._v = self._v + push * step_s
         self._steps += 1
         before, self._x = self._x, self._start - self._e * step_s * self._steps
-        return Passage(self._x <= 0.0, np.abs(self._z), before / self._e, self._z)
+        return Passage(self._x <= 0.0, np.abs(self._z[0]), before / self._e, self._z)
 
 
 def fly_in_the_model(scenario: Scenario, engagements: int, seed: int) -> Results:
@@ -129,10 +133,10 @@ def test_a_run_is_the_same_in_whatever_company(ranging: Scenario) -> None:
 
 
 class Silent:
-    def start(self, batch: int) -> None: ...
+    def start(self, shape: tuple[int, int]) -> None: ...
 
     def decide(self, situation: Situation, state: None) -> Floats:
-        return np.zeros_like(situation.budget_left_m_s)
+        return np.zeros_like(situation.last_impulse_m_s)
 
 
 def test_without_control_the_miss_is_that_of_the_free_motion(asteroid: Scenario) -> None:
@@ -144,14 +148,14 @@ def test_without_control_the_miss_is_that_of_the_free_motion(asteroid: Scenario)
 
 
 class Broken:
-    def start(self, batch: int) -> None: ...
+    def start(self, shape: tuple[int, int]) -> None: ...
 
     def decide(self, situation: Situation, state: None) -> Floats:
         return np.full(3, np.nan)
 
 
 def test_a_strategy_that_returns_nonsense_is_named(asteroid: Scenario) -> None:
-    with pytest.raises(ValueError, match="Broken must return 2 finite impulses"):
+    with pytest.raises(ValueError, match=r"Broken must return finite impulses \(m/s\) of the shape \(1, 2\)"):
         simulate(asteroid, 2, strategy=Broken())
 
 

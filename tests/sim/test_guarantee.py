@@ -153,13 +153,13 @@ def test_gravity_moves_the_model_motion_within_its_bounds(asteroid: Scenario, sp
         for step in range(80):
             z_label.append(e * (arrival_s - step * step_s) * motion.sight().slope)
             motion.advance(step_s)
-        acceleration = np.abs(np.diff(z_label, n=2, axis=0)) / step_s**2
+        acceleration = np.abs(np.diff(z_label, n=2, axis=0))[:, 0] / step_s**2
         for case, z_m in enumerate(widths):
             model = with_gravity(plain[case], sun, 0.0)
             (law,) = section_laws(model)
             mine = slice(4 * case, 4 * case + 4)
-            assert (law.vz_min <= label_v[mine]).all()
-            assert (label_v[mine] <= law.vz_max).all()
+            assert (law.vz_min <= label_v[0, mine]).all()
+            assert (label_v[0, mine] <= law.vz_max).all()
             most = float(acceleration[:, mine].max())
             rounding = 4.0 * np.spacing(z_m + vz_m_s * 100.0 * step_s) / step_s**2
             assert most <= model.acceleration_m_s2 + rounding
@@ -181,7 +181,7 @@ def test_a_rate_sensor_helps_and_stays_sound(asteroid: Scenario, hundred: Result
 
 
 def test_targets_manoeuvre_within_their_bound() -> None:
-    draws = np.random.default_rng(0).uniform(-1.0, 1.0, size=(400, 400))
+    draws = np.random.default_rng(0).uniform(-1.0, 1.0, size=(1, 400, 400))
     miss = np.where(np.arange(400) % 2, 3.0, -3.0)
     flown = {
         kind: np.stack([acceleration_m_s2(Target(kind, 0.02, 10.0), draws, step, 0.5, miss) for step in range(400)])

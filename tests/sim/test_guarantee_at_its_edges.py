@@ -290,9 +290,9 @@ def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_sp
     sensor = AngleSensor(1.0, 1e-3, 1e-3, 1e4)
     model = SetModel(1e3, 1.0, box, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED, pointing_error_rad=0.1)
     information = InformationSet(model)
-    information.shift([10.0, 0.0])
+    information.shift([[10.0], [0.0]])
     for section in information.sections():
-        changes_m_s = section.polygon.polygon()[:, 0]
+        changes_m_s = section.polygons[1].polygon()[:, 0]
         assert changes_m_s.max() >= 10.0 * math.sin(0.1)
         assert changes_m_s.min() <= -10.0 * math.sin(0.1)
 
@@ -347,30 +347,27 @@ def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
 def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limits(y: str | None) -> None:
     """Two intervals of living labels, at 2400 km and above 2560 km; the measurement of step 16 empties the latter."""
     model, measured, _ = two_intervals(17)
-    angles = measured[:, 2]
+    angles = measured[:, :, 2].T
     if y is not None:
         box, sensor = model.bounds, model.angle_sensor
         if y == "bound that falls with range":
             sensor = replace(sensor, error_at_nominal_range_y_rad=0.01, error_at_zero_range_y_rad=0.02)
         model = replace(model, bounds=replace(box, y_m=box.z_m, vy_m_s=box.vz_m_s), angle_sensor=sensor)
-        angles = np.stack([-angles if y == "mirror of z" else 0.0 * angles, angles])
+        angles = np.concatenate([-angles if y == "mirror of z" else 0.0 * angles, angles])
 
     def after(steps: int, sections: int) -> InformationSet:
         information = InformationSet(replace(model, sections=sections))
         for step in range(steps):
             if step > 0:
                 information.predict()
-            information.measure_angle(angles[..., step, None])
+            information.measure_angle(angles[:, [step]])
         for section in information.sections():
             replayed = information.section_at(section.label_m)
-            np.testing.assert_array_equal(section.polygon.polygon(), replayed.polygon.polygon())
-            if section.polygon_y is not None and replayed.polygon_y is not None:
-                np.testing.assert_array_equal(section.polygon_y.polygon(), replayed.polygon_y.polygon())
+            np.testing.assert_array_equal(section.polygons.vertices, replayed.polygons.vertices)
         return information
 
     def lives(information: InformationSet, label_m: float) -> bool:
-        section = information.section_at(label_m)
-        return all(polygon is None or len(polygon.polygon()) > 0 for polygon in (section.polygon, section.polygon_y))
+        return not information.section_at(label_m).polygons.is_empty.any()
 
     def stored(information: InformationSet) -> Floats:
         return information.labels_m[information.living]

@@ -50,7 +50,7 @@ def test_motion_agrees_with_an_independent_integrator(sun_degrees: float, step: 
     impulses = {30.0: 7.0, 60.0: -3.5}
     for number in range(round(120.0 / step)):
         if (impulse := impulses.get(round(number * step, 9))) is not None:
-            motion.fire(np.array([impulse]))
+            motion.fire(np.array([[impulse]]))
         motion.advance(step)
     expected = integrate_independently(position, velocity, float(np.radians(sun_degrees)), 120.0, impulses)
     # The independent coordinates are 1.5e11 m: their own rounding is 3e-5 m a step, so it bounds the comparison.
@@ -99,7 +99,7 @@ def test_min_distance_between_steps_matches_a_dense_search() -> None:
     moments = np.linspace(0.18, 0.20, 2_000_001)
     z = position[0] + velocity[0] * moments + 0.5 * acceleration * moments**2
     x = position[1] + velocity[1] * moments
-    passage = KeplerMotion(position[None], velocity[None], None).advance(0.5, np.array([acceleration]))
+    passage = KeplerMotion(position[None], velocity[None], None).advance(0.5, np.array([[acceleration]]))
     assert passage.min_distance_m[0] == pytest.approx(np.hypot(z, x).min(), rel=1e-9)
     assert passage.arrival_s[0] == pytest.approx(11.0 / 58.0, rel=1e-14)
 

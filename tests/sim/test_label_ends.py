@@ -116,7 +116,7 @@ def test_after_a_cut_off_measurements_do_not_narrow_the_choice(asteroid: Scenari
             information = step.information.copy()
             information.shift(step.impulse_m_s)
             lower_m, upper_m = information.predicted_miss_by_section_m()
-            after_impulse.append(np.maximum(upper_m, -lower_m).max(axis=1))
+            after_impulse.append(np.maximum(upper_m, -lower_m)[0].max(axis=1))
 
     while flight.flying:
         flight.advance(at_cut_off)

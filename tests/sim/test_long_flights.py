@@ -88,11 +88,11 @@ def test_a_measured_rate_reads_the_events_since_the_previous_one(asteroid: Scena
         step(information, alpha_rad)
     assert information.inconsistent.all()
     for section in information.sections():
-        replayed = information.section_at(section.label_m).polygon
-        np.testing.assert_array_equal(section.polygon.vertices, replayed.vertices)
+        replayed = information.section_at(section.label_m).polygons[0]
+        np.testing.assert_array_equal(section.polygons[0].vertices, replayed.vertices)
     twin = information.copy()
     twin._state.history.values[: twin._state.history.seen] = np.nan
     for sets in (information, twin):
         step(sets, 1.5e-4)
     for section, other in zip(information.sections(), twin.sections(), strict=True):
-        np.testing.assert_array_equal(section.polygon.vertices, other.polygon.vertices)
+        np.testing.assert_array_equal(section.polygons[0].vertices, other.polygons[0].vertices)

@@ -107,9 +107,9 @@ def test_the_set_is_within_the_interval_at_each_decision(known: Scenario) -> Non
         def compare(step: Step, bound: Theorem8 = bound, widths: list[Floats] = widths) -> None:
             if not step.tracking.any():
                 return
-            of_set = 0.5 * (step.predicted_miss.upper_m - step.predicted_miss.lower_m)
+            of_set = 0.5 * (step.predicted_miss.upper_m - step.predicted_miss.lower_m)[0]
             # The impulse of this step moves the box and the pair alike.
-            half = bound.half_width_m(step.time_s, step.measured["angle"])
+            half = bound.half_width_m(step.time_s, step.measured["angle"][0])
             assert (of_set <= half * (1.0 + 1e-6))[step.tracking].all()
             widths.append((of_set / half)[step.tracking])
 

@@ -73,19 +73,18 @@ class Stored:
     arrays: dict[str, Any]
     delay_steps: int
     share: float
-    spatial = False
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
         true = sight.sensors["angle"].true_value(sight)
         measured = self.arrays["angle"][self.arrays["steps"] == sight.step].reshape(true.shape)
         return {"angle": true + (measured - true) * (1.0 - self.share)}
 
-    def start(self, batch: int) -> None:
+    def start(self, shape: tuple[int, int]) -> None:
         return None
 
     def decide(self, situation: Situation, state: None) -> Floats:
         impulses = self.arrays["imp"]
-        return np.array([impulses[min(situation.step + self.delay_steps, impulses.size - 1)]])
+        return np.array([[impulses[min(situation.step + self.delay_steps, impulses.size - 1)]]])
 
 
 def narrow_labels(share: float) -> Engagements:
@@ -96,8 +95,8 @@ def narrow_labels(share: float) -> Engagements:
         stored = Stored(dict(arrays), scenario.thruster.delay_steps, share)
     position_m, velocity_m_s = stored.arrays["position"], stored.arrays["velocity"]
     known = replace(draw(scenario, [0], 0), position_m=position_m, velocity_m_s=velocity_m_s, images=None)
-    given = stored.arrays["acc"].reshape(1, -1)
-    target = GivenTarget(np.pad(given, ((0, 0), (0, max(0, known.steps - given.shape[-1])))))
+    given = stored.arrays["acc"].reshape(1, 1, -1)
+    target = GivenTarget(np.pad(given, ((0, 0), (0, 0), (0, max(0, known.steps - given.shape[-1])))))
     return Engagements(scenario, known, strategy=stored, noise=stored, target=target)
 
 
@@ -126,7 +125,7 @@ def test_labels_are_found_down_to_the_stated_width() -> None:
     for moved_rad in np.linspace(0.0, 2e-16, 41).tolist():
         after = flight._information.copy()
         after.measure_angle(last_rad + moved_rad)
-        lives = labels[[not after.section_at(label).polygon.is_empty for label in labels.tolist()]]
+        lives = labels[[not after.section_at(label).polygons[0].is_empty for label in labels.tolist()]]
         width = np.ptp(lives) / LABEL_M if lives.size else 0.0
         if width > 1e-15 or lives.size == 0:
             assert after.living.any() == (lives.size > 0)

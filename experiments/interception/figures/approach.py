@@ -23,6 +23,7 @@ from experiments.common.figure_style import (
 )
 from experiments.interception.course import (
     Clock,
+    moduli,
     outcome_title,
     possible_misses,
     record_titles,
@@ -30,6 +31,7 @@ from experiments.interception.course import (
 )
 from experiments.interception.figures.b_plane import RADIUS_SHOWN
 from experiments.interception.figures.shared import count_down, draw_body, draw_impulses, draw_levels, name_events
+from guidance.thruster import modulus
 from sim import Record
 
 _POSSIBLE = "possible miss without further impulses"
@@ -74,9 +76,9 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     """Draw the possible miss, that after an impulse that centres the set, and the miss of the true state."""
     known, misses = possible_misses(record)
     times = Clock(counts_down=True).at(record)
-    maximum = np.hypot.reduce([np.abs(interval).max(axis=1) for interval in misses.values()])
-    centred = np.hypot.reduce([0.5 * (interval[:, 1] - interval[:, 0]) for interval in misses.values()])
-    true = np.hypot.reduce(np.abs([*true_predicted_misses(record).values()]))
+    maximum = modulus(np.abs(misses).max(axis=-1))
+    centred = modulus(0.5 * (misses[..., 1] - misses[..., 0]))
+    true = modulus(true_predicted_misses(record))
     levels = [level for level in (_guaranteed_m(record), record.scenario.radius_m) if level]
     top = max([*maximum, *true, *levels])
     bottom = max(min([*centred, *true, *levels]), _MIN_SHOWN * min([*centred, top]), 1e-6)
@@ -94,26 +96,25 @@ def _guaranteed_m(record: Record) -> float | None:
 
 
 def _draw_moduli(axes: Axes, record: Record) -> None:
-    moduli = np.abs([step.impulse_m_s for step in record.steps])
-    draw_impulses(axes, Clock(counts_down=True).at(record), moduli, color=IMPULSE, linewidth=0.9, label="impulse")
-    if moduli.any():
-        axes.set(yscale="log", ylim=(0.4 * moduli[moduli > 0.0].min(), 2.5 * moduli.max()))
+    sizes = moduli(record)
+    draw_impulses(axes, Clock(counts_down=True).at(record), sizes, color=IMPULSE, linewidth=0.9, label="impulse")
+    if sizes.any():
+        axes.set(yscale="log", ylim=(0.4 * sizes[sizes > 0.0].min(), 2.5 * sizes.max()))
     axes.set_ylabel("impulse, m/s")
 
 
 def _draw_b_plane(axes: Axes, record: Record) -> None:
     """Draw the B-plane of one engagement: the box of the last predicted misses, and the path of that of the truth."""
     known, misses = possible_misses(record)
-    true = np.stack([*true_predicted_misses(record).values()], axis=1)
-    end = record.result.lateral_miss[0].data
+    end = record.result.lateral_miss_m[0]
     guaranteed, radius = _guaranteed_m(record), record.scenario.radius_m
     sizes = [float(np.abs(end).max()), guaranteed or 0.0]
     if len(known):
-        y, z = (misses[axis][-1] for axis in ("y", "z"))
+        y, z = misses[:, -1]
         sizes.append(float(np.abs([y, z]).max()))
         axes.add_patch(Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], label="last box of possible misses", **SET))
     if radius is not None and radius <= RADIUS_SHOWN * max(sizes):
         sizes.append(radius)
-    axes.plot(*true.T, zorder=3.0, **_TRUE)
+    axes.plot(*true_predicted_misses(record), zorder=3.0, **_TRUE)
     draw_body(axes, 1.15 * max(sizes) or 1.0, guaranteed, radius)
     axes.plot(*end, zorder=4.0, label="closest approach", **_END)

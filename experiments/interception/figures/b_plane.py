@@ -71,7 +71,7 @@ class Cloud:
 def cloud(title: str, samples: Sequence[Results]) -> Cloud:
     """Return the misses of runs in space; with several results of the same runs, the worst result of each run."""
     misses = np.array([results.miss_m for results in samples])
-    across = np.array([results.lateral_miss.data for results in samples])
+    across = np.array([results.lateral_miss_m for results in samples])
     worst, runs = misses.argmax(axis=0), np.arange(misses.shape[1])
     bounds = [
         float(bound) for results in samples if results.guarantees for bound in results.guaranteed_miss_m.filled(np.inf)

@@ -89,9 +89,8 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     axes.plot([], [], color=INK, label=f"after the largest correction, {pair.correction_m:.1f} m", **_CORRECTED)
     axes.set_xlim(shown, 0.0)
     axes.set_ylim(0.0 if pair.is_single else -1.12 * top, 2.2 * top)  # space for the legend
-    offset = "offset" if scenario.is_spatial else "$z$"
     axes.set_xlabel("time to go, s")
-    axes.set_ylabel(f"{offset} without impulses, m" if pair.is_single else f"{offset} from the midpoint, m")
+    axes.set_ylabel("offset without impulses, m" if pair.is_single else "offset from the midpoint, m")
     axes.legend(loc="upper right", fontsize="small", borderaxespad=0.2)
 
 

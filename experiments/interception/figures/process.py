@@ -23,8 +23,9 @@ from experiments.common.figure_style import (
     plain,
     style,
 )
-from experiments.interception.course import Clock, outcome_title, record_titles, true_predicted_misses
+from experiments.interception.course import Clock, along, outcome_title, record_titles, true_predicted_misses
 from experiments.interception.figures.shared import MAX_VECTORS, count_down, draw_impulses
+from infoset import AngleSensor
 from infoset.arrays import Floats
 from sim import Record
 
@@ -32,11 +33,10 @@ RANGE_SHARE = 0.1
 """Share of the first range below which values do not set the limits: angle and rate grow as 1/x and 1/x^2."""
 _MIN_RATE = 0.02
 """Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be zero."""
-_MODULUS = "#c9c9c9"
 _ZERO: dict[str, Any] = {"color": LIMIT, "linewidth": 0.6}
 
-Trace = tuple[Record, str]
-"""An engagement and one of its lateral axes."""
+Trace = tuple[Record, int]
+"""An engagement and the index of one of its lateral axes."""
 
 
 @style()
@@ -50,7 +50,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
     if not records:
         raise ValueError("at least one record is needed")
     clock = Clock.of(records)
-    impulse_m_s = max(abs(step.impulse_m_s) for record in records for step in record.steps) or 1.0
+    impulse_m_s = max(float(np.abs(along(record, "impulse_m_s")).max()) for record in records) or 1.0
     figure = new_figure(190.0)
     parts = figure.subfigures(1, len(records), squeeze=False)[0]
     grids = []
@@ -71,8 +71,8 @@ def draw_process(records: Sequence[Record]) -> Figure:
                 miss.set_xlabel("time t, s")
             _draw_impulse(impulse, trace, clock, impulse_m_s)
             draw_predicted_miss(miss, trace, clock)
-            if record.scenario.is_spatial:
-                angle.set_title(f"along {trace[1]}")
+            if len(traces) > 1:
+                angle.set_title(f"along {record.scenario.set_model.axes[trace[1]]}")
         _name_rows(grid[:, 0], clock)
         grids.append(grid)
     angles, rates, impulses, misses = np.hstack(grids)
@@ -91,7 +91,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
 
 def traces_of(records: Sequence[Record]) -> list[Trace]:
     """Return the columns of figures: each record with each of its lateral axes."""
-    return [(record, axis) for record in records for axis in record.scenario.set_model.axes]
+    return [(record, axis) for record in records for axis in range(len(record.scenario.set_model.axes))]
 
 
 def _name_rows(rows: Sequence[Axes], clock: Clock) -> None:
@@ -109,14 +109,14 @@ _SIGHT = {"angle": ("true_angle_rad", 1e3), "rate": ("true_rate_rad_s", 1e6)}
 def _true(trace: Trace, sensor: str) -> Floats:
     """Return the true angle, mrad, or rate, µrad/s, at each step."""
     field, scale = _SIGHT[sensor]
-    return scale * np.array([getattr(step.axes[trace[1]], field) for step in trace[0].steps])
+    return np.asarray(scale * along(trace[0], field)[trace[1]])
 
 
 def _measured(trace: Trace, sensor: str) -> tuple[list[int], Floats]:
     """Return the steps with a measurement, and the measured angles, mrad, or rates, µrad/s."""
     record, axis = trace
-    steps = [index for index, step in enumerate(record.steps) if sensor in step.axes[axis].measured]
-    values = np.array([record.steps[index].axes[axis].measured[sensor] for index in steps])
+    steps = [index for index, step in enumerate(record.steps) if sensor in step.measured]
+    values = np.array([record.steps[index].measured[sensor][axis] for index in steps])
     return steps, _SIGHT[sensor][1] * values
 
 
@@ -136,24 +136,26 @@ def _dots(axes: Axes, times: Floats, values: Floats, label: str) -> None:
 
 def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
     """Draw the errors of the measured angle, µrad, in their bounds."""
-    record, axis = trace
-    steps, values = _measured(trace, "angle")
+    record, (steps, values) = trace[0], _measured(trace, "angle")
     times = clock.at(record)[steps]
     ranges_m = np.array([record.steps[index].true_range_m for index in steps])
-    bounds = 1e6 * record.scenario.set_model.axis(axis).angle_sensor.error_bound(ranges_m)
+    bounds = 1e6 * _sensor(trace).error_bound(ranges_m)
     axes.axhline(0.0, **_ZERO)
     band: dict[str, Any] = {"facecolor": MEASURED, "alpha": 0.18, "linewidth": 0.0, "label": "bound of the angle error"}
     axes.fill_between(times, -bounds, bounds, **band)
     _dots(axes, times, 1e3 * (values - _true(trace, "angle")[steps]), "error of the measured angle")
 
 
+def _sensor(trace: Trace) -> AngleSensor:
+    """Return the sensor of the angle along the axis of a trace."""
+    model = trace[0].scenario.set_model
+    return model.axis(model.axes[trace[1]]).angle_sensor
+
+
 def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
     """Give axes of angle errors the same limits: logarithmic beyond the power of ten of the first bound."""
     bounds = [np.abs(axes.dataLim.intervaly).max() for axes in row]
-    firsts = []
-    for record, axis in traces:
-        sensor = record.scenario.set_model.axis(axis).angle_sensor
-        firsts.append(1e6 * float(sensor.error_bound(record.steps[0].true_range_m)))
+    firsts = [1e6 * float(_sensor(trace).error_bound(trace[0].steps[0].true_range_m)) for trace in traces]
     maximum, first = max(bounds), 10.0 ** np.ceil(np.log10(max(firsts)))
     for axes in row:
         axes.set_yscale("symlog", linthresh=first)
@@ -168,7 +170,7 @@ def _level_moduli(row: Sequence[Axes]) -> None:
 
 
 def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) -> None:
-    """Draw the impulses along an axis, on axes for a maximum; in space, behind them, their moduli, all upward."""
+    """Draw the impulses along an axis, on axes for a maximum."""
     record, axis = trace
     maximum, times = record.scenario.thruster.max_impulse_m_s, clock.at(record)
     axes.axhline(0.0, **_ZERO)
@@ -177,20 +179,15 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) ->
         label = f"maximum {maximum:g} m/s, beyond the axis"
     for limit in (-maximum, maximum):
         axes.axhline(limit, label=label, **BOUND)
-    if record.scenario.is_spatial:
-        moduli = np.array([step.impulse_m_s for step in record.steps])
-        draw_impulses(axes, times, moduli, color=_MODULUS, linewidth=0.9, label="modulus of the impulse")
-    components = np.array([step.axes[axis].impulse_m_s for step in record.steps])
-    label = "impulse component" if record.scenario.is_spatial else "impulse"
-    draw_impulses(axes, times, components, color=IMPULSE, linewidth=0.9, label=label)
+    draw_impulses(axes, times, along(record, "impulse_m_s")[axis], color=IMPULSE, linewidth=0.9, label="impulse")
 
 
 def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
     """Draw the predicted-miss interval over time."""
     record, axis = trace
-    steps = [index for index, step in enumerate(record.steps) if step.axes[axis].predicted_miss_m is not None]
-    times = clock.at(record)
-    lower, upper = np.array([record.steps[index].axes[axis].predicted_miss_m for index in steps]).reshape(-1, 2).T
+    found = {i: step.predicted_miss_m[axis] for i, step in enumerate(record.steps) if step.predicted_miss_m is not None}
+    steps, times = [*found], clock.at(record)
+    lower, upper = np.reshape([*found.values()], (-1, 2)).T
     axes.axhline(0.0, **_ZERO)
     axes.fill_between(times[steps], lower, upper, facecolor=SET_FILL, linewidth=0.0, label="predicted-miss interval")
     for bound in (lower, upper):

@@ -18,7 +18,7 @@ from experiments.common.figure_style import HALO, INK, MEASURED, WIDTH_MM, legen
 from experiments.interception.course import Clock, evenly, record_titles
 from infoset import Section
 from infoset.arrays import Floats
-from sim import AxisStep, Record, StepRecord
+from sim import Record, StepRecord
 
 TRUTH_MARK = "true (ω, α)"
 MEASUREMENT_MARK = "measured α, drawn at the true ω"
@@ -65,20 +65,25 @@ class Plane:
 
     title: str
     record: Record
-    axis: str
+    axis: int
     step: StepRecord
     chosen: Sequence[Section]
 
     @property
-    def along(self) -> AxisStep:
-        """The step along the axis."""
-        return self.step.axes[self.axis]
+    def name(self) -> str:
+        """Name of the axis."""
+        return self.record.scenario.set_model.axes[self.axis]
+
+    @property
+    def measured_rad(self) -> float | None:
+        """The measured angle, if there is one."""
+        measured = self.step.measured.get("angle")
+        return None if measured is None else float(measured[self.axis])
 
     @property
     def outlines(self) -> list[Floats]:
         """Vertices of the sections, omega in µrad/s and alpha in mrad."""
-        polygons = [each.omega_alpha if self.axis == "z" else each.omega_alpha_y for each in self.chosen]
-        return [polygon.polygon() * np.array([1e6, 1e3]) for polygon in polygons if polygon is not None]
+        return [section.omega_alpha[self.axis].polygon() * np.array([1e6, 1e3]) for section in self.chosen]
 
 
 def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[Plane]:
@@ -90,7 +95,7 @@ def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[P
         ranges = f"{_km(chosen[0])} to {_km(chosen[-1])} km" if chosen else "no section is left"
         noise = name.removeprefix(f"({ascii_lowercase[number]}) ") if len(records) > 1 else name
         title = plain(f"{noise},\n{clock.text(record, step.time_s)}, {ranges}")
-        planes += [Plane(title, record, axis, step, chosen) for axis in record.scenario.set_model.axes]
+        planes += [Plane(title, record, axis, step, chosen) for axis in range(len(record.scenario.set_model.axes))]
     return planes
 
 
@@ -110,24 +115,22 @@ def draw_plane(axes: Axes, plane: Plane) -> None:
     colours = mpl.colormaps["Blues_r"](np.linspace(0.0, 0.55, len(plane.chosen)))
     for number, (outline, colour) in enumerate(zip(plane.outlines, colours, strict=True)):
         _draw_outline(axes, outline, colour, zorder=3.0 - 0.01 * number)
-    rate, angle = plane.along.true_rate_rad_s * 1e6, plane.along.true_angle_rad * 1e3
-    if "angle" in plane.along.measured:
-        measured = plane.along.measured["angle"] * 1e3
-        axes.plot(rate, measured, zorder=5, label=MEASUREMENT_MARK, linestyle="none", **_SQUARE)
+    rate, angle = plane.step.true_rate_rad_s[plane.axis] * 1e6, plane.step.true_angle_rad[plane.axis] * 1e3
+    if plane.measured_rad is not None:
+        axes.plot(rate, plane.measured_rad * 1e3, zorder=5, label=MEASUREMENT_MARK, linestyle="none", **_SQUARE)
     axes.plot(rate, angle, zorder=6, label=TRUTH_MARK, path_effects=HALO, **_TRUTH)
-    index = f"_{plane.axis}" if plane.record.scenario.is_spatial else ""
-    axes.set_xlabel(f"rate $\\omega{index}$, µrad/s")
-    axes.set_ylabel(f"angle $\\alpha{index}$, mrad")
+    axes.set_xlabel(f"rate $\\omega_{plane.name}$, µrad/s")
+    axes.set_ylabel(f"angle $\\alpha_{plane.name}$, mrad")
 
 
 def _shade_allowed(axes: Axes, plane: Plane) -> None:
     """Shade the angles that the measurement allows at the nearest and the farthest drawn section."""
-    if "angle" not in plane.along.measured or not plane.chosen:
+    if plane.measured_rad is None or not plane.chosen:
         return
-    sensor, label = plane.record.scenario.set_model.axis(plane.axis).angle_sensor, "angles allowed by the measurement"
+    sensor, label = plane.record.scenario.set_model.axis(plane.name).angle_sensor, "angles allowed by the measurement"
     for section in (plane.chosen[0], plane.chosen[-1]):
         error = float(sensor.error_bound(section.range_m))
-        low, high = ((plane.along.measured["angle"] + sign * error) * 1e3 for sign in (-1.0, 1.0))
+        low, high = ((plane.measured_rad + sign * error) * 1e3 for sign in (-1.0, 1.0))
         axes.axhspan(low, high, color=MEASURED, alpha=0.09, linewidth=0.0, zorder=0.4, label=label)
 
 

@@ -30,7 +30,7 @@ def run(options: Adversary) -> None:
     if options.record is not None:
         record_path("--record", options.record)
     scenario, notes = study_scenario(options)
-    own = own_strategy(options.strategy, scenario)
+    own = own_strategy(options.strategy)
     times_s = read_times(options.times, options.out)
     names = ("steps.csv", RECORD, *figure_files(*FIGURES))
     with work_of(options, scenario, names, {"--record": options.record}, notes) as work:
@@ -85,11 +85,10 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
     """Return the rows of the table: title, and text of an engagement."""
     axes = [*scenario.set_model.axes, "x"]
     position, velocity = ", ".join(axes), ", ".join(f"V_{axis}" for axis in axes)
-    across = [("miss along y, z, m", lambda found: ", ".join(map(number, found.lateral_miss_m.values())))]
     return [
         ("maximum miss of any state of the set, m", lambda found: number(found.any_state_miss_m)),
         ("miss of the simulated truth, m", lambda found: number(found.miss_m)),
-        *(across if scenario.is_spatial else []),
+        (f"miss along {', '.join(axes[:-1])}, m", lambda found: ", ".join(map(number, found.lateral_miss_m.values()))),
         ("outcome", lambda found: found.outcome.value),
         ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
         (f"initial {position}, km", lambda found: _texts(found.position_m / M_PER_KM)),

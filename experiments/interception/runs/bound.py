@@ -127,12 +127,8 @@ def _summary(
     scenario: Scenario, lower: LowerBound, nominal: TruthPair, worst: Sequence[WorstOfStrategy]
 ) -> dict[str, object]:
     model = scenario.set_model
-    spatial: dict[str, object] = {}
-    if scenario.is_spatial:
-        spatial["disturbance_y_m_s2"] = model.axis("y").disturbance_m_s2
     return {
-        "disturbance_m_s2": model.disturbance_m_s2,
-        **spatial,
+        "disturbance_m_s2": {axis: model.axis(axis).disturbance_m_s2 for axis in model.axes},
         "lower_bound_m": lower.bound_m,
         "reached_at": _where(lower.pair, scenario),
         "at_nominal_range": {**_where(nominal, scenario), "bound_m": nominal.bound_m},
@@ -160,7 +156,7 @@ def _summary(
                         **_where(pair, scenario),
                         "bound_m": pair.bound_m,
                         "miss_m": flight.results.miss_m.tolist(),
-                        **_by_axis("miss", flight.results.lateral_miss.T, scenario),
+                        **_by_axis("miss", flight.results.lateral_miss_m.T, scenario),
                         "impulse_m_s": flight.results.impulse_m_s.tolist(),
                         "outcomes": [outcome.value for outcome in flight.results.outcomes],
                         "truth_kept": flight.results.truth_kept.tolist(),
@@ -185,9 +181,8 @@ def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
 
 
 def _by_axis(quantity: str, values_m: NDArray[np.float64], scenario: Scenario) -> dict[str, object]:
-    """Return values by axis, m, with the names of their keys; nothing in a plane."""
-    axes = scenario.set_model.axes if scenario.is_spatial else ()
-    return {f"{quantity}_{axis}_m": values_m[index].tolist() for index, axis in enumerate(axes)}
+    """Return values by lateral axis, m, with the names of their keys."""
+    return {f"{quantity}_{axis}_m": values_m[index].tolist() for index, axis in enumerate(scenario.set_model.axes)}
 
 
 def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:

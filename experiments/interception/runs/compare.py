@@ -30,7 +30,7 @@ from sim.parallel import Task
 
 FIGURE = "figure-comparison"
 TIES = "for each run, the worst of the four tie rules"
-COLUMNS = ("run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit")
+COLUMNS = ("run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit", "miss_y_m", "miss_z_m")
 
 
 def run(options: Compare) -> None:
@@ -49,8 +49,7 @@ def run(options: Compare) -> None:
                 "notes": [game_note(scenario, TIES)],
             }
         )
-        columns = (*COLUMNS, "miss_y_m", "miss_z_m") if scenario.is_spatial else COLUMNS
-        work.written.save("results.csv", _csv(compared, columns), "--csv")
+        work.written.save("results.csv", _csv(compared), "--csv")
         if options.out is not None:
             from experiments.interception.figures.commands import draw_compared
 
@@ -100,8 +99,10 @@ def _summary(comparison: Comparison) -> dict[str, object]:
     }
 
 
-def _csv(compared: Sequence[Comparison], names: Sequence[str]) -> str:
+def _csv(compared: Sequence[Comparison]) -> str:
     rows: list[list[Cell]] = []
+    (known,) = {tuple(results.to_dict()) for comparison in compared for results in comparison.results.values()}
+    names = [name for name in COLUMNS if name in known]
     for comparison in compared:
         for tie, results in comparison.results.items():
             columns = results.to_dict()

@@ -21,14 +21,15 @@ from experiments.interception.runs.shared import need_finite, work_of
 from experiments.interception.scenario_file import scenario_with
 from experiments.interception.strategies import own_strategy
 from guidance import NoiseKind
+from guidance.thruster import modulus
 from infoset.sensors import SENSORS
-from sim import AxisStep, Record, StepRecord, fly_one
+from sim import Record, StepRecord, fly_one
 
 
 def run(options: Engage) -> None:
     """Simulate one or two engagements, write the files and print the table."""
     scenario = scenario_with(options)
-    own = own_strategy(options.strategy, scenario)
+    own = own_strategy(options.strategy)
     times_s = read_times(options.times, options.out)
     both = options.noise == "both"
     noises = [*NoiseKind] if both else [NoiseKind(options.noise or scenario.noise)]
@@ -80,7 +81,7 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
 
 
 def steps_csv(records: Sequence[Record]) -> str:
-    """Return a line for each step of engagements of one scenario, as CSV; in space, columns name the axis."""
+    """Return a line for each step of engagements of one scenario, as CSV; columns name the lateral axis."""
     rows = [{"noise": record.noise_name, **row} for record in records for row in _step_rows(record)]
     return to_csv([*rows[0]], [[*row.values()] for row in rows])
 
@@ -91,14 +92,17 @@ def _step_rows(record: Record) -> list[dict[str, Cell]]:
         {
             "step": number,
             "time_s": step.time_s,
-            **_line_of_sight(record, step),
             "true_range_m": step.true_range_m,
-            "impulse_m_s": step.impulse_m_s,
-            **{f"impulse{mark}_m_s": axis.impulse_m_s for mark, axis in _marked(step).items()},
             **{
-                f"predicted_miss{mark}_{end}_m": value
-                for mark, axis in _marked(step).items()
-                for end, value in zip(("lower", "upper"), axis.predicted_miss_m or (None, None), strict=True)
+                f"measured_{kind.quantity}": float(step.measured[kind.name]) if kind.name in step.measured else None
+                for kind in SENSORS
+                if not kind.is_lateral
+            },
+            "impulse_m_s": float(modulus(step.impulse_m_s)),
+            **{
+                name: value
+                for index, axis in enumerate(record.scenario.set_model.axes)
+                for name, value in _along_axis(step, index, axis).items()
             },
             "truth_margin_m": step.truth_margin_m,
             "sections": len(step.sections),
@@ -107,20 +111,20 @@ def _step_rows(record: Record) -> list[dict[str, Cell]]:
     ]
 
 
-def _marked(step: StepRecord) -> dict[str, AxisStep]:
-    """Return the axes by what names of columns contain: nothing in a plane, ``_y`` and ``_z`` in space."""
-    return {"" if len(step.axes) == 1 else f"_{name}": axis for name, axis in step.axes.items()}
-
-
-def _line_of_sight(record: Record, step: StepRecord) -> dict[str, float | None]:
-    """Return the measured values and the true plane angles and rates."""
-    axes, values = _marked(step), {}
-    for kind in SENSORS:
-        for mark, axis in axes.items():
-            name = kind.name + mark * kind.is_lateral
-            values[f"measured_{kind.quantity.replace(kind.name, name)}"] = axis.measured.get(kind.name)
-    for quantity, unit in (("angle", "rad"), ("rate", "rad_s")):
-        values |= {
-            f"true_{quantity}{mark}_{unit}": getattr(axis, f"true_{quantity}_{unit}") for mark, axis in axes.items()
-        }
-    return values
+def _along_axis(step: StepRecord, index: int, axis: str) -> dict[str, Cell]:
+    """Return the numbers of a step along one lateral axis by name."""
+    lower, upper = (None, None) if step.predicted_miss_m is None else step.predicted_miss_m[index].tolist()
+    return {
+        **{
+            f"measured_{kind.quantity.replace(kind.name, f'{kind.name}_{axis}')}": (
+                float(step.measured[kind.name][index]) if kind.name in step.measured else None
+            )
+            for kind in SENSORS
+            if kind.is_lateral
+        },
+        f"true_angle_{axis}_rad": float(step.true_angle_rad[index]),
+        f"true_rate_{axis}_rad_s": float(step.true_rate_rad_s[index]),
+        f"impulse_{axis}_m_s": float(step.impulse_m_s[index]),
+        f"predicted_miss_{axis}_lower_m": lower,
+        f"predicted_miss_{axis}_upper_m": upper,
+    }

@@ -22,7 +22,7 @@ MAX_TIMES = 12
 def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     """Yield the results of engagements side by side, with the paper's for its scenario, for the screen."""
     bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
-    lateral = any(record.scenario.is_spatial for record in records)
+    lateral = sorted({axis for record in records for axis in record.scenario.set_model.axes})
     has_theorem_8 = any(record.result.theorem_8_miss_m.count() for record in records)
     columns: list[tuple[str, dict[str, str]]] = []
     for record in records:
@@ -30,7 +30,7 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
         meter = " + range sensor" if record.scenario.range_sensor is not None else ""
         values = {
             "miss, m": number(result["miss_m"]),
-            **{f"miss along {axis}, m": number(result.get(f"miss_{axis}_m")) for axis in ("y", "z") if lateral},
+            **{f"miss along {axis}, m": number(result.get(f"miss_{axis}_m")) for axis in lateral},
             "impulse, m/s": number(result["impulse_m_s"]),
             f"{' / '.join(bounds)}, m": number(result["guaranteed_miss_m"]),
             **({THEOREM_8_NAME: number(result.get("theorem_8_miss_m"))} if has_theorem_8 else {}),

@@ -48,7 +48,7 @@ LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
 def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     scenario = scenario_with(options)
-    own = own_strategy(options.strategy, scenario)
+    own = own_strategy(options.strategy)
     figures = [FIGURE, CORRIDOR, *b_plane_figures(scenario)]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)]) as work:
         if scenario.range_sensor is None:

@@ -94,10 +94,10 @@ OWN = """
 import numpy as np
 class Half:
     share = 0.5
-    def start(self, batch):
+    def start(self, shape):
         return None
     def decide(self, situation, state):
-        return self.share * np.ones(len(situation.budget_left_m_s))
+        return self.share * np.ones_like(situation.last_impulse_m_s)
 """
 
 

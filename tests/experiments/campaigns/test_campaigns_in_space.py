@@ -58,7 +58,7 @@ def test_a_sweep_over_keys_of_space_is_resumed_and_reported(space_file: Path, in
     table = CampaignFolder.read(Path("cells")).runs(["miss_m", "miss_y_m"], 3)
     flown = simulate(replace(scenario, **of_model(last), noise=NoiseKind.RANDOM, tie=scenario.tie), 5)
     assert table["miss_m"].tolist() == flown.miss_m.tolist()
-    assert table["miss_y_m"].tolist() == flown.lateral_miss[:, 0].tolist()
+    assert table["miss_y_m"].tolist() == flown.lateral_miss_m[:, 0].tolist()
     report = infoset.json("report", "cells", "--quiet")
     assert [axis["key"] for axis in report["axes"]] == [part.split("=")[0] for part in SWEPT.split(",")]
     assert report["runs"] == 20

@@ -17,10 +17,7 @@ from sim import simulate
 from tests.experiments.command_line import Command, strict
 
 ANGLES = ["measured_angle_y_rad", "measured_angle_z_rad"]
-OF_A_STEP = [
-    *("measured_range_m", "measured_rate_y_rad_s", "measured_rate_z_rad_s", "true_angle_y_rad", "true_angle_z_rad"),
-    *("true_rate_y_rad_s", "true_rate_z_rad_s"),
-]
+ALONG = ("measured_angle_{}_rad", "measured_rate_{}_rad_s", "true_angle_{}_rad", "true_rate_{}_rad_s", "impulse_{}_m_s")
 IMPULSES = ["impulse_m_s", "impulse_y_m_s", "impulse_z_m_s"]
 
 
@@ -37,15 +34,16 @@ def test_the_files_of_engage_name_the_axis(space_file: Path, infoset: Command) -
     steps, table = written.pop("steps"), rows(Path("r.csv").read_text())
     ends = [f"predicted_miss_{axis}_{end}_m" for axis in ("y", "z") for end in ("lower", "upper")]
     assert [*table[0]] == [
-        *("noise", "step", "time_s", *ANGLES, *OF_A_STEP, "true_range_m", *IMPULSES),
-        *(*ends, "truth_margin_m", "sections"),
+        *("noise", "step", "time_s", "true_range_m", "measured_range_m", "impulse_m_s"),
+        *(*(name.format("y") for name in ALONG), *ends[:2], *(name.format("z") for name in ALONG), *ends[2:]),
+        *("truth_margin_m", "sections"),
     ]
     assert [*steps[0]] == [*table[0]][1:]
     for step, row, recorded in zip(steps, table, record.steps, strict=True):
-        y, z = recorded.axes.values()
-        assert [step[name] for name in ANGLES] == [y.measured["angle"], z.measured["angle"]]
-        assert [step[name] for name in IMPULSES] == [recorded.impulse_m_s, y.impulse_m_s, z.impulse_m_s]
-        misses = [*(y.predicted_miss_m or (None, None)), *(z.predicted_miss_m or (None, None))]
+        assert [step[name] for name in ANGLES] == recorded.measured["angle"].tolist()
+        given = recorded.impulse_m_s
+        assert [step[name] for name in IMPULSES] == [np.hypot(*given), *given]
+        misses = [None] * 4 if recorded.predicted_miss_m is None else recorded.predicted_miss_m.ravel().tolist()
         assert [float(row[end]) if row[end] else None for end in ends] == misses
         assert [step[end] for end in ends] == misses
     assert np.hypot(written["miss_y_m"], written["miss_z_m"]) == pytest.approx(written["miss_m"], rel=1e-3)
@@ -76,9 +74,8 @@ import numpy as np
 
 class Mine:
     name = "mine"
-    spatial = {spatial}
 
-    def start(self, batch):
+    def start(self, shape):
         return None
 
     def decide(self, situation, state):
@@ -87,20 +84,14 @@ class Mine:
 """
 
 
-@pytest.mark.parametrize("spatial", [False, True])
-def test_a_strategy_of_a_file_gets_one_axis_or_both(spatial: bool, space_file: Path, infoset: Command) -> None:
-    whole, none = f"strategy_{spatial}.py", f"nothing_{spatial}.py"
-    Path(whole).write_text(OWN.format(spatial=spatial, more=""))
-    code, out, err = infoset("engage", space_file, "--strategy", f"{whole}:Mine", "--json", "-")
+def test_a_strategy_of_a_file_decides_along_both_axes(space_file: Path, infoset: Command) -> None:
+    Path("whole.py").write_text(OWN.format(more=""))
+    code, out, err = infoset("engage", space_file, "--strategy", "whole.py:Mine", "--json", "-")
     assert code == 0, err
     steps = strict(out)["steps"]
     assert max(abs(step["impulse_y_m_s"]) for step in steps) > 0.0
-    Path(none).write_text(OWN.format(spatial=spatial, more="[:, :0]" if spatial else "[:0]"))
-    code, _, message = infoset("engage", space_file, "--strategy", f"{none}:Mine")
+    assert infoset("engage", "asteroid-1997", "--strategy", "whole.py:Mine")[0] == 0
+    Path("none.py").write_text(OWN.format(more="[:, :0]"))
+    code, _, message = infoset("engage", space_file, "--strategy", "none.py:Mine")
     assert code == 2
-    assert f"{none}: ValueError: strategy Mine must return" in message
-    assert ("shape (2, 1), along y and z" in message) == spatial
-    if spatial:
-        message = infoset.refused("engage", "asteroid-1997", "--strategy", f"{whole}:Mine")
-        assert "decides for both lateral axes" in message
-        assert "the scenario is in a plane" in message
+    assert "none.py: ValueError: strategy Mine must return finite impulses (m/s) of the shape (2, 1)" in message

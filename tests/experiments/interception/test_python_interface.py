@@ -70,23 +70,24 @@ def test_results_are_saved_by_suffix(results: Results, tmp_path: Path) -> None:
 
 def with_lateral_columns(results: Results) -> Results:
     """Results as those of engagements in space."""
-    start, miss = np.arange(4.0 * len(results)).reshape(2, len(results), 2) - 3.0
-    return replace(results, lateral_start=np.ma.MaskedArray(start), lateral_miss=np.ma.MaskedArray(miss))
+    y = np.arange(3.0 * len(results)).reshape(3, len(results)) - 3.0
+    plane = (results.position_m, results.velocity_m_s, results.lateral_miss_m)
+    position_m, velocity_m_s, miss_m = (np.column_stack(pair) for pair in zip(y, plane, strict=True))
+    return replace(results, position_m=position_m, velocity_m_s=velocity_m_s, lateral_miss_m=miss_m)
 
 
 def test_only_results_in_space_have_the_columns_of_the_second_axis(results: Results, tmp_path: Path) -> None:
-    columns = ["start_y_m", "start_vy_m_s", "miss_y_m", "miss_z_m"]
+    columns = ["start_y_m", "start_vy_m_s", "miss_y_m"]
     assert not {*columns} & {*results.to_dict()}
     spatial = with_lateral_columns(results)
     assert spatial.to_dict() == {
         **results.to_dict(),
-        "start_y_m": [-3.0, -1.0, 1.0],
-        "start_vy_m_s": [-2.0, 0.0, 2.0],
-        "miss_y_m": [3.0, 5.0, 7.0],
-        "miss_z_m": [4.0, 6.0, 8.0],
+        "start_y_m": [-3.0, -2.0, -1.0],
+        "start_vy_m_s": [0.0, 1.0, 2.0],
+        "miss_y_m": [3.0, 4.0, 5.0],
     }
     taken = join([spatial.take(np.array([2])), spatial.take(np.array([0, 1]))])
-    assert taken.to_dict()["miss_y_m"] == [7.0, 3.0, 5.0]
+    assert taken.to_dict()["miss_y_m"] == [5.0, 3.0, 4.0]
     assert "miss_y_m" not in join([results, results]).to_dict()
     save(spatial, tmp_path / "results.csv")
     (head, *_) = csv.reader((tmp_path / "results.csv").read_text().splitlines())

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.common.figure_style import figure_bytes
-from experiments.interception.course import Courses, possible_misses, true_predicted_misses
+from experiments.interception.course import Courses, moduli, possible_misses, true_predicted_misses
 from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse
 from experiments.interception.figures.corridor import draw_corridor
@@ -19,12 +19,12 @@ from experiments.interception.figures.process import draw_process
 from experiments.interception.scenario_file import load_scenario
 from experiments.interception.study import Curve
 from guidance import NoiseKind
+from guidance.thruster import modulus
 from infoset.arrays import Floats
 from sim import Record, Results, fly_one, simulate
 from sim.scenario import of_model
 
 RUNS = 12
-AXES = ("y", "z")
 MEDIAN, NINETY, GUARANTEE = "circle: median of the miss", "circle: 90 % of the misses", "guaranteed miss Φ"
 
 
@@ -58,7 +58,7 @@ def test_the_b_plane_shows_each_miss_and_the_circles_of_its_quantiles(results: R
     figure = draw_b_plane([cloud("random noise", [results])])
     assert all(content for _, content in figure_bytes(figure))
     (axes,) = figure.axes
-    np.testing.assert_array_equal(drawn(axes)["miss of one run"], results.lateral_miss.data)
+    np.testing.assert_array_equal(drawn(axes)["miss of one run"], results.lateral_miss_m)
     quantiles = {MEDIAN: np.quantile(results.miss_m, 0.5), NINETY: np.quantile(results.miss_m, 0.9)}
     assert circles(axes) == pytest.approx(quantiles)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("miss along y, m", "miss along z, m")
@@ -69,13 +69,13 @@ def test_the_b_plane_shows_each_miss_and_the_circles_of_its_quantiles(results: R
 
 def test_with_several_results_of_a_run_the_worst_is_drawn(results: Results) -> None:
     middle = float(np.median(results.miss_m))
-    near = replace(results, miss_m=np.full(RUNS, middle), lateral_miss=0.5 * results.lateral_miss)
+    near = replace(results, miss_m=np.full(RUNS, middle), lateral_miss_m=0.5 * results.lateral_miss_m)
     worst = cloud("worst", [near, results])
     np.testing.assert_array_equal(worst.miss_m, np.maximum(results.miss_m, middle))
     worse = results.miss_m > middle
     assert worse.any()
-    np.testing.assert_array_equal(worst.across_m[worse], results.lateral_miss.data[worse])
-    np.testing.assert_array_equal(worst.across_m[~worse], near.lateral_miss.data[~worse])
+    np.testing.assert_array_equal(worst.across_m[worse], results.lateral_miss_m[worse])
+    np.testing.assert_array_equal(worst.across_m[~worse], near.lateral_miss_m[~worse])
 
 
 def test_ellipses_contain_their_share_of_the_runs() -> None:
@@ -93,28 +93,23 @@ def test_ellipses_contain_their_share_of_the_runs() -> None:
     assert {"ellipse: 50 % of the runs", "ellipse: 99 % of the runs"} <= set(legend(figure))
 
 
-def test_process_has_the_courses_of_both_axes_and_the_moduli_of_impulses(records: list[Record]) -> None:
+def test_process_has_the_courses_of_both_axes(records: list[Record]) -> None:
     figure = draw_process(records)
     assert len(figure.axes) == 16
     for number, axes in enumerate(figure.axes):
-        record, axis = records[number // 8], AXES[number % 2]
-        along = [step.axes[axis] for step in record.steps]
+        steps, axis = records[number // 8].steps, number % 2
         row = number % 8 // 2
         if row < 2:
             field, scale = (("true_angle_rad", 1e3), ("true_rate_rad_s", 1e6))[row]
-            np.testing.assert_allclose(
-                drawn(axes)["true value"][:, 1], [scale * getattr(step, field) for step in along]
-            )
+            true = [scale * getattr(step, field)[axis] for step in steps]
+            np.testing.assert_allclose(drawn(axes)["true value"][:, 1], true)
         if row == 2:
-            behind, before = (
-                np.array([np.asarray(path.vertices)[1, 1] for path in lines.get_paths()]) for lines in axes.collections
-            )
-            moduli = np.array([step.impulse_m_s for step in record.steps])
-            np.testing.assert_allclose(behind, moduli[moduli > 0.0])
-            component = np.array([step.impulse_m_s for step in along])
-            np.testing.assert_allclose(before, component[component != 0.0])
+            (bars,) = axes.collections
+            given = np.array([step.impulse_m_s[axis] for step in steps])
+            heights = [np.asarray(path.vertices)[1, 1] for path in bars.get_paths()]
+            np.testing.assert_allclose(heights, given[given != 0.0])
         if row == 3:
-            lower = [step.predicted_miss_m[0] for step in along if step.predicted_miss_m is not None]
+            lower = [step.predicted_miss_m[axis, 0] for step in steps if step.predicted_miss_m is not None]
             assert any(np.array_equal(np.asarray(line.get_ydata()), lower) for line in axes.lines)
         assert axes.get_ylim() == figure.axes[2 * row].get_ylim()
 
@@ -140,7 +135,7 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     last = next(number for number, step in enumerate(record.steps) if step.sections[0].range_m < near_m)
     steps = record.steps[: last + 1]
     assert 0.8 * len(record.steps) < len(steps) < len(record.steps)
-    intervals = np.array([[step.axes[axis].predicted_miss_m for axis in AXES] for step in steps])
+    intervals = np.array([step.predicted_miss_m for step in steps])
     np.testing.assert_allclose(known[:, 1], np.hypot(*np.abs(intervals).max(axis=2).T))
     np.testing.assert_allclose(centred[:, 1], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
     before = record.scenario.nominal_arrival_s - np.array([step.time_s for step in record.steps])
@@ -148,8 +143,8 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     np.testing.assert_allclose(shown[:, 0], np.maximum(before, 0.25))
     end_step = record.steps[-1]
     seconds = end_step.true_range_m / model.closing_speed_m_s
-    end = [miss[-1] - seconds * end_step.axes[axis].impulse_m_s for axis, miss in true_predicted_misses(record).items()]
-    np.testing.assert_allclose(end, record.result.lateral_miss[0].data, atol=0.01)
+    end = true_predicted_misses(record)[:, -1] - seconds * end_step.impulse_m_s
+    np.testing.assert_allclose(end, record.result.lateral_miss_m[0], atol=0.01)
     assert (shown[: len(steps), 1] < 1.001 * known[:, 1]).all()
     assert possible.get_xlim()[0] > possible.get_xlim()[1]
     assert [text.get_text() for text in possible.texts] == ["cut-off, 10 s", "last image, 4 s"]
@@ -172,12 +167,12 @@ def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.
     for run in range(3):
         record = fly_one(scenario, run)
         _, misses = possible_misses(record)
-        maximum = np.hypot.reduce([np.abs(interval).max(axis=1) for interval in misses.values()])
+        maximum = modulus(np.abs(misses).max(axis=-1))
         stored = courses.possible_m[run]
         maximum = maximum[: min(len(maximum) - 1, len(stored))]
         np.testing.assert_array_equal(stored[: len(maximum)], maximum)
         assert np.isnan(stored[len(maximum) :]).all()
-        given = [abs(step.impulse_m_s) for step in record.steps[: len(stored)]]
+        given = moduli(record)[: len(stored)]
         np.testing.assert_allclose(courses.impulse_m_s[run, : len(given)], given, rtol=1e-12)
 
 
@@ -194,8 +189,7 @@ def test_courses_of_long_flights_keep_the_max_impulses(monkeypatch: pytest.Monke
     every = load_scenario("asteroid-1997-space")
     courses = Courses(every, 1)
     simulate(every, 1, observe=courses.observe)
-    impulses = [step.impulse_m_s for step in fly_one(every).steps]
-    assert courses.impulse_m_s.max() == pytest.approx(max(impulses), rel=1e-12)
+    assert courses.impulse_m_s.max() == pytest.approx(moduli(fly_one(every)).max(), rel=1e-12)
 
 
 def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
@@ -224,9 +218,9 @@ def test_a_long_flight_shows_the_errors_of_its_angles_within_their_bound_over_th
         if line.get_label() == "error of the measured angle"
     ]
     bound = scenario.set_model.angle_sensor.error_bound
-    for name, (axes, line) in zip(("y", "z"), panels, strict=True):
-        steps = [step for step in record.steps if "angle" in step.axes[name].measured]
-        errors = [step.axes[name].measured["angle"] - step.axes[name].true_angle_rad for step in steps]
+    for axis, (axes, line) in enumerate(panels):
+        steps = [step for step in record.steps if "angle" in step.measured]
+        errors = [step.measured["angle"][axis] - step.true_angle_rad[axis] for step in steps]
         to_go_s = [scenario.nominal_arrival_s - step.time_s for step in steps]
         assert line.get_xdata() == pytest.approx(np.array(to_go_s))
         assert line.get_ydata() == pytest.approx(1e6 * np.array(errors), abs=1e-6)

@@ -346,7 +346,7 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
     observer = LinearObserver(
         [[1.0, 0.0], [step_s, 1.0]],
         np.array([[[0.0, 1.0 / width]] for width in widths]),
-        start.polygon,
+        start.polygons[0],
         noise=1.0,
         disturbance=Zonotope([0.0, 0.0], [[limit * step_s, 0.5 * limit * step_s**2]]),
     )
@@ -357,7 +357,7 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
         observer.update([angles[k] * ranges[k] / widths[k]])
     section = information.sections()[2]
     assert section.range_m == pytest.approx(ranges[-1])
-    assert section.polygon.hausdorff_distance(observer.estimate().polygons) < 1e-9
+    assert section.polygons[0].hausdorff_distance(observer.estimate().polygons) < 1e-9
 
 
 # Formerly lost the true state: seeds 216 and 252, with exact measurements, a singular matrix and a flat initial set;

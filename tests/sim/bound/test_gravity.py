@@ -74,7 +74,7 @@ class TrueFlight:
         relative = np.zeros((2, 3))
         relative[:, [*self.lateral, 2]] = pair.position_m[which], pair.velocity_m_s[which]
         self.state = np.concatenate([-sun.distance_m * toward, speed * along, *relative])
-        pushes = pair.acceleration_m_s2.reshape(len(axes), 2, -1)[:, which]
+        pushes = pair.acceleration_m_s2[:, which]
         self.pushes, self.time_s = pushes, 0.0
 
     def rates(self, _time: float, state: Floats, push: Floats) -> Floats:

@@ -61,12 +61,11 @@ def with_disturbance(scenario: Scenario, disturbance_m_s2: float) -> Scenario:
 def positions(pair: TruthPair, scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times of all steps and of the arrival, and the lateral positions then, by plain stepping.
 
-    The positions have the shape (2, steps + 1), or (axes, 2, steps + 1) in space.
+    The positions have the shape (C, 2, steps + 1).
     """
     steps = pair.acceleration_m_s2.shape[-1]
     times = np.append(np.arange(steps) * scenario.set_model.step_s, pair.arrival_s)
-    shape = pair.acceleration_m_s2.shape[:-1]
-    z, v = pair.position_m[:, :-1].T.reshape(shape), pair.velocity_m_s[:, :-1].T.reshape(shape)
+    z, v = pair.position_m[:, :-1].T, pair.velocity_m_s[:, :-1].T
     track = [z]
     for i in range(steps):
         duration, push = times[i + 1] - times[i], pair.acceleration_m_s2[..., i]
@@ -82,8 +81,8 @@ def min_share(pair: TruthPair, scenario: Scenario) -> float:
     The velocity across x is at most W: that at the start, by accelerations, and the whole budget of 1000 m/s.
     """
     assert scenario.thruster.budget_m_s == 1000.0
-    pushes = np.abs(pair.acceleration_m_s2).reshape(-1, 2, pair.acceleration_m_s2.shape[-1])
-    speeds = np.abs(pair.velocity_m_s[:, :-1].T) + pushes.sum(axis=-1) * scenario.set_model.step_s
+    pushes = np.abs(pair.acceleration_m_s2).sum(axis=-1)
+    speeds = np.abs(pair.velocity_m_s[:, :-1].T) + pushes * scenario.set_model.step_s
     maximum = float(np.hypot.reduce(speeds).max()) + 1000.0
     ranges = pair.label_m + pair.vx_m_s * scenario.set_model.step_s * np.arange(pair.last_common_step + 1)
     slopes = maximum / -pair.vx_m_s + max(0.0, 0.5 * pair.apart_m - pair.correction_m) / ranges

@@ -18,6 +18,7 @@ from infoset import (
     SetModel,
     StateBox,
 )
+from infoset.arrays import Floats
 from infoset.model import InitialSet, Model
 from infoset.sensor import Sensor
 from sim import Scenario, Sun
@@ -37,8 +38,8 @@ METER, RATE = RangeSensor(1.0, 0.1), RateSensor(1.0, 4.0)
 def sight(step: int, *sensors: Sensor) -> LineOfSight:
     return LineOfSight(
         step,
-        np.array([0.010, 0.012, -0.5, -0.501]),
-        np.array([1.0, 2.0, 3.0, 5.0]),
+        np.array([[0.010, 0.012, -0.5, -0.501]]),
+        np.array([[1.0, 2.0, 3.0, 5.0]]),
         np.array([1000.0, 1000.0, 500.0, 502.0]),
         {sensor.name: sensor for sensor in sensors},
     )
@@ -58,10 +59,10 @@ def nothing_known() -> InformationSetView:
 def test_pairs_are_measured_in_the_middle_until_it_is_late(nothing_known: InformationSetView) -> None:
     noise = PairNoise(3)
     common = noise.measure(sight(3, SENSOR, METER, RATE), nothing_known)
-    assert common["angle"] == pytest.approx([0.011, 0.011, -0.5005, -0.5005])
+    assert common["angle"][0] == pytest.approx([0.011, 0.011, -0.5005, -0.5005])
     assert common["range"] == pytest.approx([1000.0, 1000.0, 501.0, 501.0])
-    assert common["rate"] == pytest.approx([1.5, 1.5, 4.0, 4.0])
-    assert common["angle"][0] == common["angle"][1]
+    assert common["rate"][0] == pytest.approx([1.5, 1.5, 4.0, 4.0])
+    assert common["angle"][0, 0] == common["angle"][0, 1]
     assert noise.max_share == pytest.approx(1.0)  # the first pair, 0.001 of 0.001
     honest = noise.measure(sight(4, SENSOR, METER, RATE), nothing_known)
     assert np.array_equal(honest["angle"], sight(4).alpha_rad)
@@ -141,12 +142,12 @@ def random_in_space(number: int) -> Scenario:
 class Still:
     """No impulse at all."""
 
-    def start(self, batch: int) -> None:
+    def start(self, shape: tuple[int, int]) -> None:
         """Start without a state."""
 
-    def decide(self, situation: Situation, state: None) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def decide(self, situation: Situation, state: None) -> Floats:
         """Return zeros."""
-        return np.zeros(len(situation.budget_left_m_s))
+        return np.zeros_like(situation.last_impulse_m_s)
 
 
 def check(scenario: Scenario, strategy: Strategy) -> None:
