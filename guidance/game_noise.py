@@ -65,13 +65,15 @@ class GameNoise:
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
         """Choose the measurements of a step; the true values where the set is empty."""
+        # The angles first: one pass over the sections then computes the predicted misses too.
+        angles = predicted.min_and_max_alpha()
         miss = predicted.predicted_miss(sight.pending)
         upper_is_worse = self._upper_is_worse(miss, sight.step)
         measured = {}
         for name, sensor in sight.sensors.items():
             true = sensor.true_value(sight)
             if isinstance(sensor, AngleSensor):
-                chosen = self._shifted(sensor, sight, _angle(sensor, sight, predicted, miss, upper_is_worse))
+                chosen = self._shifted(sensor, sight, _angle(sensor, sight, angles, miss, upper_is_worse))
             elif isinstance(sensor, RangeSensor):
                 chosen = _range(sensor, sight, predicted, miss, upper_is_worse)
             else:
@@ -114,13 +116,17 @@ class SwitchingNoise(GameNoise):
 
 
 def _angle(
-    sensor: AngleSensor, sight: LineOfSight, predicted: InformationSetView, miss: PredictedMiss, upper_is_worse: Flags
+    sensor: AngleSensor,
+    sight: LineOfSight,
+    angles: tuple[Floats, Floats, Floats, Floats],
+    miss: PredictedMiss,
+    upper_is_worse: Flags,
 ) -> Floats:
     upper, lower = miss.upper_point, miss.lower_point
     worst = np.where(upper_is_worse, upper.alpha_rad, lower.alpha_rad)
     other = np.where(upper_is_worse, lower.alpha_rad, upper.alpha_rad)
     reach = sensor.error_bounds(np.where(upper_is_worse, upper.range_m, lower.range_m))
-    minimum, maximum, range_of_min, range_of_max = predicted.min_and_max_alpha()
+    minimum, maximum, range_of_min, range_of_max = angles
     bound = sensor.bound(sight)
     return keep_point(
         (worst > other) | ((worst == other) & upper_is_worse),

@@ -145,6 +145,9 @@ class Misses:
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
         return self.lower, self.upper
 
+    def min_and_max_alpha(self) -> tuple[Floats, ...]:
+        return (np.zeros(self.lower.shape[:-1]),) * 4
+
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
         return self.ranges_m.min(axis=1), self.ranges_m.max(axis=1)
 
