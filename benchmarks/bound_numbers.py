@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from experiments import load_scenario
 from guidance import Thruster
-from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
+from infoset import Camera, InitialSet, Model, SetModel, StateBox
 from sim import Scenario, Sun
 from sim.bound.lower_bound import lower_bound
 from sim.scenario import of_model
@@ -27,7 +27,7 @@ def slow(range_km: float) -> Scenario:
     """Return the slow approach from a range."""
     range_m = 1e3 * range_km
     box = StateBox((-1e4, 1e4), (range_m - 500.0, range_m + 500.0), (-0.1, 0.1), (-2000.01, -1999.99))
-    sensor = AngleSensor.camera(200.0, 5e-6, 5.0)
+    sensor = Camera(200.0, 5e-6, 5.0)
     model = SetModel(2e3, 200.0, box, sensor, range_threshold_m=1e5, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
     thruster = Thruster(30.0, 1e-4, 2.0, last_impulse_s=2000.0)
     return Scenario(

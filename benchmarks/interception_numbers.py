@@ -11,7 +11,7 @@ import numpy as np
 from experiments import load_scenario
 from experiments.interception.study import curve_scenarios
 from guidance import NoiseKind, TieRule
-from infoset import InitialSet
+from infoset import AngleSensor, InitialSet
 from sim import Results, Scenario, simulate
 from sim.scenario import of_model
 
@@ -31,6 +31,7 @@ def variants(single: Scenario) -> dict[str, Scenario]:
     """Return the changes of the single engagement that were tried to explain the printed impulses."""
     model = single.set_model
     angle = model.angle_sensor
+    assert isinstance(angle, AngleSensor)
     near, far = angle.error_at_zero_range_rad, angle.error_at_nominal_range_rad
     halved = {"step_s": 0.5 * model.step_s, "angle_sensor": replace(angle, period_s=0.5 * angle.period_s)}
     exchanged = replace(angle, error_at_nominal_range_rad=near, error_at_zero_range_rad=far)

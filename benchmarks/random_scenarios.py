@@ -21,6 +21,7 @@ from guidance import NoiseKind, Thruster, TieRule
 from infoset import (
     AngleSensor,
     Bias,
+    Camera,
     InitialSet,
     Model,
     RangeSensor,
@@ -134,7 +135,7 @@ def camera_scenario(number: int) -> Scenario:
     centroid_m = 0.1 * model.range_threshold_m * float(10.0 ** -abs(generator.normal(0.0, 1.0)))
     last_s = arrival_s * float(10.0 ** generator.uniform(-2.5, -0.7)) if often(0.5) else 0.0
     first_s = last_s + (arrival_s - last_s) * float(generator.uniform(0.3, 1.1))
-    sensor = AngleSensor.camera(
+    sensor = Camera(
         model.angle_sensor.period_s,
         model.angle_sensor.constant_error_rad * float(10.0 ** generator.uniform(-2.0, 0.0)),
         0.0 if often(0.1) else centroid_m * (1.0 - 1e-12),

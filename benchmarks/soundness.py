@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from benchmarks.random_scenarios import camera_scenario, gravity_scenario, random_scenario, scheduled
 from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
-from infoset import InformationSetView, InitialSet, Model, RateSensor
+from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor
 from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.bound.pair_flight import middle
 from sim.draws import Draws, draw
@@ -98,13 +98,14 @@ def in_space(scenario: Scenario, number: int) -> Scenario:
     random = np.random.default_rng(np.random.SeedSequence(entropy=21, spawn_key=(number,)))
     model, sun = scenario.set_model, scenario.sun
     sensor = model.angle_sensor
+    assert isinstance(sensor, AngleSensor)
     if random.uniform() < 0.25:  # a bound that rises with range
         swapped = sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad
         sensor = replace(sensor, error_at_nominal_range_rad=swapped[0], error_at_zero_range_rad=swapped[1])
     differ = random.uniform() < 0.5
     sensor = replace(
         sensor,
-        error_at_nominal_range_y_rad=1.5 * (sensor.error_at_nominal_range_rad or 0.0) if differ else None,
+        error_at_nominal_range_y_rad=1.5 * sensor.error_at_nominal_range_rad if differ else None,
         error_at_zero_range_y_rad=0.7 * sensor.constant_error_rad if differ else None,
     )
     box = model.bounds

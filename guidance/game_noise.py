@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance.noise import LineOfSight, TieRule, draws_of_step, need_draws
-from infoset import AngleSensor, InformationSetView, PredictedMiss, RangeSensor
+from infoset import BearingSensor, InformationSetView, PredictedMiss, RangeSensor
 from infoset.arrays import Flags, Floats
-from infoset.sensor import Measurements
+from infoset.sensors import Measurements
 
 TIE_TOLERANCE = 1e-6
 
@@ -72,7 +72,7 @@ class GameNoise:
         measured = {}
         for name, sensor in sight.sensors.items():
             true = sensor.true_value(sight)
-            if isinstance(sensor, AngleSensor):
+            if isinstance(sensor, BearingSensor):
                 chosen = self._shifted(sensor, sight, _angle(sensor, sight, angles, miss, upper_is_worse))
             elif isinstance(sensor, RangeSensor):
                 chosen = _range(sensor, sight, predicted, miss, upper_is_worse)
@@ -89,7 +89,7 @@ class GameNoise:
         side = np.array(sides.get(self.tie, 0.0))
         return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
 
-    def _shifted(self, sensor: AngleSensor, sight: LineOfSight, chosen: Floats) -> Floats:
+    def _shifted(self, sensor: BearingSensor, sight: LineOfSight, chosen: Floats) -> Floats:
         """Return the measured angles with the shift of this step where there is one, and the chosen ones elsewhere."""
         if self.shift_m is None:
             return chosen
@@ -116,7 +116,7 @@ class SwitchingNoise(GameNoise):
 
 
 def _angle(
-    sensor: AngleSensor,
+    sensor: BearingSensor,
     sight: LineOfSight,
     angles: tuple[Floats, Floats, Floats, Floats],
     miss: PredictedMiss,

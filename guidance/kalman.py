@@ -9,7 +9,7 @@ import numpy as np
 
 from guidance.estimate import MissEstimate
 from guidance.situation import Situation
-from infoset import AngleSensor, Bias, RangeSensor, SetModel
+from infoset import BearingSensor, RangeSensor, SetModel
 from infoset.arrays import Floats
 from infoset.limits import COUNT, Checked, NotNegative
 
@@ -191,19 +191,19 @@ def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
         sensor = plane.angle_sensor
         bound[axis] = (
             sensor.constant_error_rad
-            if sensor.bias is Bias.CONSTANT
+            if sensor.has_constant_bias
             else np.maximum(sensor.error_bound(range_m[axis]), 0.5 * sensor.error_bound(plane.bounds.farthest_m))
         )
     return bound
 
 
-def _constant_error_m(sensor: AngleSensor) -> float:
+def _constant_error_m(sensor: BearingSensor) -> float:
     """Return the bound of the part of the errors that is constant in a flight, m.
 
     The angles then show a point at this lateral distance from the centre, which no measurement can tell from the
     centre: the error of an estimated miss contains it unchanged.
     """
-    return sensor.centroid_error_m if sensor.bias is Bias.CONSTANT else 0.0
+    return sensor.centroid_error_m if sensor.has_constant_bias else 0.0
 
 
 @dataclass(frozen=True)

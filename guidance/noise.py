@@ -12,7 +12,7 @@ import numpy as np
 from infoset import InformationSetView
 from infoset.arrays import Floats
 from infoset.limits import real_array, real_values, shown
-from infoset.sensor import Measurements, Sensor
+from infoset.sensors import Measurements, Sensor
 
 
 class NoiseKind(Enum):

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from guidance.noise import LineOfSight, draws_of_step, need_draws
-from infoset import AngleSensor, InformationSetView
+from infoset import Camera, InformationSetView
 from infoset.arrays import Floats
-from infoset.sensor import Measurements
+from infoset.sensors import Measurements
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ class RandomNoise(ScriptedNoise):
         errors = super().errors_of_step(sight)
         if self.bias is None:
             return errors
-        camera = sight.sensors.get(AngleSensor.name)
-        if isinstance(camera, AngleSensor):
+        camera = sight.sensors.get(Camera.name)
+        if isinstance(camera, Camera):
             errors[camera.name] = camera.with_bias(sight, errors[camera.name], self.bias)
         return errors
 

@@ -11,7 +11,7 @@ import numpy as np
 from guidance.thruster import Thruster
 from infoset import InformationSetView, PredictedMiss
 from infoset.arrays import Flags, Floats
-from infoset.sensor import Measurements, Sensor
+from infoset.sensors import Measurements, Sensor
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.geometry.zonotope import Zonotope
 from infoset.information_set import InformationSet, InformationSetView
 from infoset.model import InitialSet, Model, Recovery, SetModel, SetSettings, StateBox
-from infoset.sensor import Sensor
-from infoset.sensors import AngleSensor, Bias, RangeSensor, RateSensor
+from infoset.sensors import AngleSensor, BearingSensor, Bias, Camera, RangeSensor, RateSensor, Sensor
 from infoset.set_queries import Section, to_omega_alpha
 
 if TYPE_CHECKING:
@@ -32,7 +31,9 @@ __version__ = version("infoset")
 
 __all__ = [
     "AngleSensor",
+    "BearingSensor",
     "Bias",
+    "Camera",
     "ConvexPolygons",
     "Estimate",
     "ExtremePoints",

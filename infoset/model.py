@@ -9,8 +9,7 @@ from functools import cached_property
 from typing import Annotated
 
 from infoset.limits import NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
-from infoset.sensor import Sensor
-from infoset.sensors import AngleSensor
+from infoset.sensors import BearingSensor, Sensor
 
 Interval = tuple[float, float]
 
@@ -200,7 +199,7 @@ class SetModel(SetSettings):
         The step Delta of observation and control, s.
     bounds : StateBox
         Possible states at t = 0.
-    angle_sensor : AngleSensor
+    angle_sensor : BearingSensor
         The line-of-sight sensor.
     gravity_m_s2 : float
         Bound of the difference of gravity along z; used by the guaranteed model only.
@@ -228,7 +227,7 @@ class SetModel(SetSettings):
     closing_speed_m_s: Positive
     step_s: Positive
     bounds: StateBox
-    angle_sensor: AngleSensor
+    angle_sensor: BearingSensor
     gravity_m_s2: NotNegative = 0.0
     gravity_y_m_s2: NotNegative | None = None
     gravity_speed_change: NotNegative = 0.0
@@ -239,7 +238,7 @@ class SetModel(SetSettings):
         super().__post_init__()
         if len(self.axes) == 1:
             for name, is_set in (
-                ("angle_sensor", self.angle_sensor.is_spatial),
+                (self.angle_sensor.table, self.angle_sensor.is_spatial),
                 ("disturbance_y_m_s2", self.disturbance_y_m_s2 is not None),
                 ("gravity_y_m_s2", self.gravity_y_m_s2 is not None),
                 ("pointing_error_rad", self.pointing_error_rad > 0.0),
@@ -249,13 +248,13 @@ class SetModel(SetSettings):
                         f"SetModel: {name} holds a value of an engagement in space, and bounds have no y_m and vy_m_s: "
                         "set them, or leave the value out"
                     )
-        self.check_period("angle_sensor", self.angle_sensor)
+        self.check_period(self.angle_sensor)
         self.check_start("bounds", self.bounds)
         nearest_m = CENTROID_ERRORS_AT_THRESHOLD * self.angle_sensor.centroid_error_m
         if self.range_threshold_m < nearest_m:
             raise ValueError(
                 f"SetModel: range_threshold_m must be at least {CENTROID_ERRORS_AT_THRESHOLD:g} times "
-                f"angle_sensor.centroid_error_m, {nearest_m:g} m: got {self.range_threshold_m!r}"
+                f"{self.angle_sensor.table}.centroid_error_m, {nearest_m:g} m: got {self.range_threshold_m!r}"
             )
 
     @property
@@ -289,8 +288,8 @@ class SetModel(SetSettings):
             for name, (disturbance, gravity) in (("y", along_y), ("z", along_z))
         }
 
-    def check_period(self, name: str, sensor: Sensor) -> None:
-        """Refuse a sensor whose period is not a whole number of steps; `name` is its name in the message.
+    def check_period(self, sensor: Sensor) -> None:
+        """Refuse a sensor whose period is not a whole number of steps.
 
         Raises
         ------
@@ -301,7 +300,8 @@ class SetModel(SetSettings):
         whole = self.steps_in(sensor.period_s)
         if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
             raise ValueError(
-                f"{name}.period_s must be a whole number of steps of {self.step_s!r} s: got {sensor.period_s!r} s"
+                f"{sensor.table}.period_s must be a whole number of steps of {self.step_s!r} s: "
+                f"got {sensor.period_s!r} s"
             )
 
     def check_start(self, name: str, box: StateBox) -> None:
@@ -327,7 +327,7 @@ class SetModel(SetSettings):
         bound = min(self.angle_sensor.axis(name).error_bound(box.farthest_m) for name in box.axes)
         if not bound > 0.0:
             raise ValueError(
-                f"angle_sensor: its error bound must be positive up to the maximum distance of {name}, "
+                f"{self.angle_sensor.table}: its error bound must be positive up to the maximum distance of {name}, "
                 f"{box.farthest_m:g} m: got {bound:.3g} rad there"
             )
 

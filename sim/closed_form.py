@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from infoset import SetModel
+from infoset import Camera, SetModel
 from infoset.arrays import Floats
 from sim.scenario import Scenario
 
@@ -150,12 +150,10 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
     """
     model = scenario.set_model
     camera = model.angle_sensor
-    if not camera.is_camera:
-        raise ValueError("the closed form is that of a camera: set angle_sensor.pixel_error_rad and centroid_error_m")
+    if not isinstance(camera, Camera):
+        raise ValueError("the closed form is that of a camera: the scenario must have the table camera")
     if camera.miss_probability > 0.0:
-        raise ValueError(
-            "the closed form is that of a camera that loses no image: set angle_sensor.miss_probability = 0"
-        )
+        raise ValueError("the closed form is that of a camera that loses no image: set camera.miss_probability = 0")
     first_s, last_s = images_s(scenario)
     along = (
         possible_miss_m(

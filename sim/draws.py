@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance import NoiseKind, TieRule
-from infoset import Bias, StateBox
+from infoset import StateBox
 from infoset.arrays import Floats
 from sim.gravity import max_impulses_m_s, with_gravity
 from sim.scenario import Scenario
@@ -80,7 +80,7 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         name: (lateral if sensor.is_lateral else uniform)(sensor.stream) for name, sensor in scenario.sensors.items()
     }
     camera = scenario.set_model.angle_sensor
-    bias = lateral(BIAS, 1)[..., 0] if camera.bias is Bias.CONSTANT else None
+    bias = lateral(BIAS, 1)[..., 0] if camera.has_constant_bias else None
     return Draws(
         position_m,
         velocity_m_s,

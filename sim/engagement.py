@@ -22,9 +22,9 @@ from guidance.least_effort import LeastEffort
 from guidance.noise import checked_measurements
 from guidance.strategy import checked_impulses
 from guidance.thruster import modulus
-from infoset import AngleSensor, InformationSet, InformationSetView, PredictedMiss
+from infoset import BearingSensor, InformationSet, InformationSetView, PredictedMiss
 from infoset.arrays import Flags, Floats
-from infoset.sensor import Measurements
+from infoset.sensors import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.closed_form import worst_shift_m
 from sim.draws import Draws
@@ -236,7 +236,7 @@ class Engagements:
         asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, pending)
         measured = kept = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
         cuts = [(measured, self._tracking)]
-        camera, images = AngleSensor.name, self._draws.images
+        camera, images = BearingSensor.name, self._draws.images
         if images is not None and camera in measured:
             seen = images[:, self.step] >= self.scenario.set_model.angle_sensor.miss_probability
             self._seen = {name: seen if name == camera else np.ones_like(seen) for name in measured}

@@ -13,7 +13,7 @@ from guidance.game_noise import SwitchingNoise
 from guidance.scripted_noise import errors_made, measure_with_errors
 from infoset import InformationSetView
 from infoset.arrays import Flags, Floats, Integers
-from infoset.sensor import Measurements, Sensor
+from infoset.sensors import Measurements, Sensor
 from sim.draws import corners
 from sim.scenario import Manoeuvre, Scenario
 from sim.target import amplitudes_m_s2

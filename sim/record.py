@@ -11,7 +11,7 @@ from guidance import MeasurementNoise, Strategy
 from infoset import Section
 from infoset.arrays import Floats
 from infoset.limits import WHOLE
-from infoset.sensor import Measurements
+from infoset.sensors import Measurements
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.results import Results, ending

@@ -14,8 +14,7 @@ from guidance.strategy import Strategy
 from guidance.thruster import Thruster
 from infoset.limits import Checked, Description, Limits, Name, NotNegative, Positive, check_fields
 from infoset.model import SetModel, SetSettings, StateBox
-from infoset.sensor import Sensor
-from infoset.sensors import AngleSensor, RangeSensor, RateSensor
+from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
 
 _DIRECTION = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
 _ELEVATION = Limits(minimum=-0.5 * math.pi, maximum=0.5 * math.pi)
@@ -112,6 +111,10 @@ class Scenario:
         Starts that are possible on board (B x D).
     dispersion : StateBox
         True starts (B0 x D0), uniform, unknown on board. A fixed value has equal ends.
+    angle_sensor : AngleSensor or None
+        The sensor of the line-of-sight angles, if it is not a camera.
+    camera : Camera or None
+        The camera that measures them. One of the two must be given.
     information_set : SetSettings
         Choices of the information set.
     sun : Sun or None
@@ -138,7 +141,8 @@ class Scenario:
     sun: Sun | None = None
     uncertainty: StateBox
     dispersion: StateBox
-    angle_sensor: AngleSensor
+    angle_sensor: AngleSensor | None = None
+    camera: Camera | None = None
     range_sensor: RangeSensor | None = None
     rate_sensor: RateSensor | None = None
     target: Target | None = None
@@ -148,8 +152,8 @@ class Scenario:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        for name, sensor in self.sensors.items():
-            self.set_model.check_period(f"{name}_sensor", sensor)
+        for sensor in self.sensors.values():
+            self.set_model.check_period(sensor)
         self._check_axes()
         _ = self.impulse_steps  # raises ValueError if the thruster can give no impulse
         self.set_model.check_start("dispersion", self.dispersion)
@@ -180,7 +184,7 @@ class Scenario:
             closing_speed_m_s=self.closing_speed_m_s,
             step_s=self.step_s,
             bounds=self.uncertainty,
-            angle_sensor=self.angle_sensor,
+            angle_sensor=self.bearing_sensor,
             **vars(self.information_set),
         )
 
@@ -205,6 +209,23 @@ class Scenario:
                 )
 
     @property
+    def bearing_sensor(self) -> BearingSensor:
+        """The sensor of the line-of-sight angles.
+
+        Raises
+        ------
+        ValueError
+            If the scenario has none, or two.
+        """
+        fitted = [sensor for sensor in (self.angle_sensor, self.camera) if sensor is not None]
+        if len(fitted) != 1:
+            raise ValueError(
+                "Scenario: must have one sensor of angles, the table angle_sensor, whose error bound is linear in the "
+                f"range, or the table camera: got {'both' if fitted else 'neither'}"
+            )
+        return fitted[0]
+
+    @property
     def nominal_arrival_s(self) -> float:
         """Time from the start to x = 0 at the nominal range and closing speed, s."""
         return self.nominal_range_m / self.closing_speed_m_s
@@ -227,7 +248,7 @@ class Scenario:
     @property
     def sensors(self) -> dict[str, Sensor]:
         """Sensors on board by name, in the order in which a step applies their measurements."""
-        fitted = (self.range_sensor, self.angle_sensor, self.rate_sensor)
+        fitted = (self.range_sensor, self.bearing_sensor, self.rate_sensor)
         return {sensor.name: sensor for sensor in fitted if sensor is not None}
 
 
@@ -236,11 +257,13 @@ def of_model(model: SetModel) -> dict[str, Any]:
 
     The bounds of gravity and of the engine's errors are not among them; they follow from the scenario.
     """
+    sensor = model.angle_sensor
     return {
         "closing_speed_m_s": model.closing_speed_m_s,
         "step_s": model.step_s,
         "uncertainty": model.bounds,
-        "angle_sensor": model.angle_sensor,
+        "angle_sensor": sensor if isinstance(sensor, AngleSensor) else None,
+        "camera": sensor if isinstance(sensor, Camera) else None,
         "information_set": SetSettings(**{field.name: getattr(model, field.name) for field in fields(SetSettings)}),
     }
 

@@ -7,7 +7,7 @@ import numpy as np
 from guidance.authority import correctable_later_m
 from guidance.least_effort import unavoidable_m
 from guidance.situation import Situation
-from infoset import AngleSensor, SetModel
+from infoset import BearingSensor, SetModel
 from infoset.arrays import Flags, Floats
 from infoset.engine.section_law import BOUND_SLACK, section_laws
 
@@ -76,8 +76,8 @@ class Theorem8:
         Impulses have the shape (1, B), because the theorem is that of a plane.
         """
         (wanted_m_s,), (given_m_s,) = wanted_m_s, given_m_s
-        angles = situation.measured[AngleSensor.name][0] if AngleSensor.name in situation.measured else None
-        seen = deciding & situation.is_new(AngleSensor.name)
+        angles = situation.measured[BearingSensor.name][0] if BearingSensor.name in situation.measured else None
+        seen = deciding & situation.is_new(BearingSensor.name)
         if angles is not None and not self._has_first.all():
             self._look_first(seen & ~self._has_first, situation.time_s, angles)
         if not situation.may_fire or angles is None:

@@ -103,10 +103,11 @@ def brief() -> Scenario:
     """A short scenario with few sections: the last ten seconds of an approach with a known range."""
     from experiments.interception.scenario_file import load_scenario
     from infoset import StateBox
+    from tests.sensors import linear
 
     published = load_scenario("asteroid-1997")
     box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
-    sensor = replace(published.set_model.angle_sensor, nominal_range_m=595e3)
+    sensor = replace(linear(published.angle_sensor), nominal_range_m=595e3)
     model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
     return replace(published, name="brief", **of_model(model), dispersion=box, nominal_range_m=595e3)
 

@@ -72,13 +72,13 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
 def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
     """Return the error bounds of each sensor by key, under the name of their common factor: `angle_sensor.scale`."""
     return {
-        f"{sensor}_sensor.{SCALE}": {
-            f"{sensor}_sensor.{name}": value
-            for name, value in vars(declared).items()
+        f"{sensor.table}.{SCALE}": {
+            f"{sensor.table}.{name}": value
+            for name, value in vars(sensor).items()
             if "error" in name and value
             if isinstance(value, float)
         }
-        for sensor, declared in scenario.sensors.items()
+        for sensor in scenario.sensors.values()
     }
 
 

@@ -64,7 +64,7 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Seq
     decisions = decisions.astype({"required_known": "Int64", "runs_needed": "Int64"})
     axes, noises = folder.manifest.axes, noises_of(folder)
     decisions["limit_bound"] = required.bound if isinstance(required, Requirement) else _radii_m(folder, table)
-    if required.quantity == "guaranteed_miss_m" and folder.manifest.scenario.set_model.angle_sensor.is_camera:
+    if required.quantity == "guaranteed_miss_m" and folder.manifest.scenario.camera is not None:
         decisions["closed_form_m"] = np.repeat(_closed_forms(folder), len(noises))
     return SweepTable(axes, tuple(noises), required, pd.concat([table, decisions], axis="columns"))
 

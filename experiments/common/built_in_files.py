@@ -30,7 +30,7 @@ PROBLEMS = {
     "observer": ProblemKind("observe", "observer", "load_observer"),
 }
 """Kinds of problems by the `kind` of their files."""
-_SCENARIO_TABLES = {"uncertainty", "dispersion", "angle_sensor", "thruster", "information_set"}
+_SCENARIO_TABLES = {"uncertainty", "dispersion", "angle_sensor", "camera", "thruster", "information_set"}
 """A file without a kind that has two of these tables is taken for a scenario."""
 
 

@@ -138,8 +138,8 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         )
         if acceleration > bound and line not in lines:
             lines.append(line)
-    sensor = model.angle_sensor
-    exact = sensor.error_at_nominal_range_y_rad == sensor.error_at_zero_range_y_rad == 0.0
+    sensor = scenario.angle_sensor
+    exact = sensor and sensor.error_at_nominal_range_y_rad == sensor.error_at_zero_range_y_rad == 0.0
     if exact and not uncertainty.y_m == uncertainty.vy_m_s == (0.0, 0.0):
         lines.append(
             "angle_sensor.error_at_nominal_range_y_rad and error_at_zero_range_y_rad are 0, and uncertainty.y_m and "

@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.common.screen import some_runs
 from guidance import NoiseKind, Strategy, TieRule
-from infoset import Bias, Model
+from infoset import Model
 from infoset.arrays import Flags, Floats
 from sim import HitEstimate, Results, Scenario, estimate_hits
 from sim.statistics import shown_quantiles
@@ -180,7 +180,7 @@ def game_note(scenario: Scenario, rule: str | None = None) -> str:
 
 def random_note(scenario: Scenario) -> str:
     """Return a line about what a result with random noise is."""
-    constant = scenario.set_model.angle_sensor.bias is Bias.CONSTANT
+    constant = scenario.set_model.angle_sensor.has_constant_bias
     return (
         "random noise (uniform errors within the bounds, independent from one measurement to the next"
         f"{', with a constant centroid error' if constant else ''}) is one model of many: a decision holds for it only"

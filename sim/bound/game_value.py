@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from infoset import AngleSensor, InformationSet, StateBox
+from infoset import BearingSensor, InformationSet, StateBox
 from infoset.arrays import Flags, Floats
 from infoset.model import CENTROID_ERRORS_AT_THRESHOLD
 from sim.bound.lower_bound import LowerBound
@@ -124,7 +124,7 @@ def _course(scenario: Scenario) -> _Course:
     z_m, vz_m_s = (0.5 * float(np.ptp(ends)) for ends in (box.z_m, box.vz_m_s))
     centred = StateBox((-z_m, z_m), box.x_m, (-vz_m_s, vz_m_s), box.vx_m_s)
     # Half of the difference of two members of a set is a member of the set from a centred box after measurements of 0.
-    nearest_m = CENTROID_ERRORS_AT_THRESHOLD * (model.angle_sensor.centroid_error_m or 0.0)
+    nearest_m = CENTROID_ERRORS_AT_THRESHOLD * model.angle_sensor.centroid_error_m
     widest = InformationSet(replace(model, bounds=centred, range_threshold_m=nearest_m), guarantee=False)
     steps = math.ceil(box.x_m[0] / (e * step_s) * (1.0 - ROUNDING))
     ranges_m: Floats = box.x_m[0] - e * step_s * np.arange(steps, dtype=np.float64)
@@ -180,7 +180,7 @@ def _guarantee(course: _Course) -> tuple[float, float]:
     return float(worst_m), float(spent_m_s)
 
 
-def _wider(sensor: AngleSensor, range_m: float, slope: float) -> float:
+def _wider(sensor: BearingSensor, range_m: float, slope: float) -> float:
     """Return how much wider than for small angles the band of an angle can be, up to a slope of the line of sight."""
     bound, true_rad = sensor.error_bound(range_m), math.atan(slope)
     maximum, seen_rad = max(bound, sensor.error_bound(range_m * math.hypot(1.0, slope))), math.inf

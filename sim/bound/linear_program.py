@@ -9,7 +9,7 @@ import numpy as np
 
 from infoset import SetModel
 from infoset.arrays import Flags, Floats, Integers
-from infoset.sensor import Sensor
+from infoset.sensors import Sensor
 from sim.bound.coasting import Coasting
 
 MARGIN = 1e-6

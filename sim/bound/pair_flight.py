@@ -10,7 +10,7 @@ from guidance import Strategy
 from guidance.noise import LineOfSight
 from infoset import InformationSetView
 from infoset.arrays import Floats
-from infoset.sensor import Measurements
+from infoset.sensors import Measurements
 from sim.bound.pair_of_motions import TruthPair
 from sim.draws import Draws
 from sim.engagement import Engagements

@@ -9,9 +9,9 @@ from operator import attrgetter
 
 import numpy as np
 
-from infoset import AngleSensor
+from infoset import BearingSensor
 from infoset.arrays import Floats, Integers
-from infoset.sensor import Apart
+from infoset.sensors import Apart
 from sim.bound.coasting import NoArrivalError, coasting
 from sim.bound.gravity_reserve import GravityReserve, gravity_reserve
 from sim.bound.linear_program import MARGIN, PairProgram
@@ -121,7 +121,7 @@ class Approach:
             self._due[name] = due[[sensor.measures_at(each_s) for each_s in before_s]]
         self._programs: list[PairProgram] = []
         for i, planar in enumerate(self._models):
-            sensors = {**scenario.sensors, AngleSensor.name: planar.angle_sensor}
+            sensors = {**scenario.sensors, BearingSensor.name: planar.angle_sensor}
             program = PairProgram(planar, sensors, self._due, self.motion, i)
             # Two axes that are alike have one linear program.
             self._programs.append(next(filter(program.is_like, self._programs), program))

@@ -30,7 +30,7 @@ def test_a_schedule_without_impulses_names_the_key_to_change(thruster: dict[str,
 
 
 def test_an_image_window_between_two_measurements_has_a_warning() -> None:
-    scenario = load_scenario("dart-2022", ["angle_sensor.first_image_s=308", "angle_sensor.last_image_s=302"])
+    scenario = load_scenario("dart-2022", ["camera.first_image_s=308", "camera.last_image_s=302"])
     (line,) = scenario_warnings(scenario)
     assert "no impulse follows a measurement: images are taken from 308 s to 302 s before" in line
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from guidance import Strategy, Thruster, TieRule
-from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, Camera, InitialSet, Model, RateSensor, SetModel, StateBox
 from infoset.arrays import Floats
 from infoset.model import Interval
 from sim import Body, Results, Scenario, Target
@@ -62,9 +62,9 @@ def engagement(
         (-v, 0.7 * v),
         (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
     )
-    sensor = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
+    sensor: AngleSensor | Camera = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
     if camera:
-        sensor = AngleSensor.camera(step_s, error * angle_rad, 0.001999 * range_m)
+        sensor = Camera(step_s, error * angle_rad, 0.001999 * range_m)
     thruster, disturbance = Thruster(10.0 * v, 1e-3 * v, 0.2 * v), 0.01 * slope * speed_m_s**2 / range_m
     along_y = None
     if in_space:
@@ -190,7 +190,11 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
 
     model, engine, sun, target = scenario.set_model, scenario.thruster, scenario.sun, scenario.target
     ranging, rating = scenario.range_sensor, scenario.rate_sensor
-    sensor = model.angle_sensor
+    sensor = replace(model.angle_sensor, period_s=time * model.angle_sensor.period_s)
+    if isinstance(sensor, AngleSensor):
+        sensor = replace(sensor, nominal_range_m=length * sensor.nominal_range_m)
+    elif isinstance(sensor, Camera):
+        sensor = replace(sensor, centroid_error_m=length * sensor.centroid_error_m)
     return replace(
         scenario,
         nominal_range_m=length * scenario.nominal_range_m,
@@ -201,12 +205,7 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
                 closing_speed_m_s=speed * model.closing_speed_m_s,
                 step_s=time * model.step_s,
                 bounds=box(model.bounds),
-                angle_sensor=replace(
-                    sensor,
-                    period_s=time * sensor.period_s,
-                    nominal_range_m=None if sensor.nominal_range_m is None else length * sensor.nominal_range_m,
-                    centroid_error_m=length * sensor.centroid_error_m,
-                ),
+                angle_sensor=sensor,
                 disturbance_m_s2=acceleration * model.disturbance_m_s2,
                 disturbance_y_m_s2=in_units(model.disturbance_y_m_s2),
                 range_threshold_m=length * model.range_threshold_m,

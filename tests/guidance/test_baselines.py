@@ -24,7 +24,7 @@ from guidance import (
     strategy_names,
 )
 from guidance.scripted_noise import ScriptedNoise
-from infoset import AngleSensor, Bias, InformationSet, Model, SetModel, StateBox
+from infoset import BearingSensor, Bias, Camera, InformationSet, Model, SetModel, StateBox
 from infoset.arrays import Flags, Floats
 from sim.draws import draw
 from sim.engagement import Engagements
@@ -38,7 +38,7 @@ ENGINE = Thruster(budget_m_s=1e9, min_impulse_m_s=0.0, max_impulse_m_s=1e9)
 BASELINES = [name for name in strategy_names() if "kalman" in name]
 
 
-def set_model(sensor: AngleSensor, nu: float = 0.0, width_m: float = 1e5, range_error_m: float = 0.0) -> SetModel:
+def set_model(sensor: BearingSensor, nu: float = 0.0, width_m: float = 1e5, range_error_m: float = 0.0) -> SetModel:
     box = StateBox(
         (-width_m, width_m), (E * T - range_error_m, E * T + range_error_m), (-width_m / T, width_m / T), (-E, -E)
     )
@@ -53,7 +53,7 @@ def set_model(sensor: AngleSensor, nu: float = 0.0, width_m: float = 1e5, range_
     )
 
 
-MODEL = set_model(AngleSensor.camera(10.0, 1e-5))
+MODEL = set_model(Camera(10.0, 1e-5))
 
 
 def situation(model: SetModel = MODEL, batch: int = 1, step: int = 0, step_s: float = 10.0) -> Situation:
@@ -293,7 +293,7 @@ def deviation_m(bounds_rad: Callable[[Floats], Floats], steps: Floats, width_m: 
 @pytest.mark.parametrize("bias", list(Bias))
 def test_deviations_with_a_camera_are_those_of_a_line_through_the_positions(centroid_m: float, bias: Bias) -> None:
     """Range and speed are known; a constant centroid error adds c^2/3 to the variance of the miss."""
-    model = set_model(AngleSensor.camera(10.0, 1e-5, centroid_m, bias=bias))
+    model = set_model(Camera(10.0, 1e-5, centroid_m, bias=bias))
     estimator, now = measured(KalmanBank, model, Truth(0.0, 0.0), 60)
     independent = centroid_m if bias is Bias.RANDOM else 0.0
     expected = deviation_m(lambda x: 1e-5 + independent / x, np.arange(60.0))
@@ -331,7 +331,7 @@ def test_the_dead_zone_ends_at_the_last_allowed_time() -> None:
 
 
 def test_augmented_estimators_find_the_acceleration_of_the_target() -> None:
-    model = set_model(AngleSensor.camera(10.0, 1e-6), nu=0.01)
+    model = set_model(Camera(10.0, 1e-6), nu=0.01)
     truth = Truth(500.0, -2.0, a=0.006)
     estimator, now = measured(lambda shape, _: KalmanBank(shape, True), model, truth, 60)
     assert estimator.estimate(now).miss_m[0, 0] == pytest.approx(truth.miss_m, rel=0.02)
@@ -354,7 +354,7 @@ def test_engagements_without_noise_and_gravity_hit(name: str) -> None:
 def test_a_mission_with_a_camera_a_schedule_and_a_delay(name: str) -> None:
     """Images are lost, and each impulse of three is given two steps after its decision."""
     scenario = load_scenario("asteroid-1997-space")
-    camera = AngleSensor.camera(0.5, 1e-4, 20.0, bias=Bias.CONSTANT, miss_probability=0.3, last_image_s=4.0)
+    camera = Camera(0.5, 1e-4, 20.0, bias=Bias.CONSTANT, miss_probability=0.3, last_image_s=4.0)
     engine = Thruster(1e4, 0.0, 1e3, impulses_s=(75.0, 30.0, 8.0), delay_steps=2)
     scenario = replace(
         scenario, **of_model(replace(scenario.set_model, angle_sensor=camera)), range_sensor=None, thruster=engine

@@ -14,7 +14,7 @@ from guidance.game_noise import SwitchingNoise
 from guidance.noise import TieRule
 from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
 from infoset import AngleSensor, InformationSet, Model, RangeSensor, RateSensor, SetModel, StateBox
-from infoset.sensor import Sensor
+from infoset.sensors import Sensor
 
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
 MODEL = SetModel(

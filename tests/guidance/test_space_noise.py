@@ -26,7 +26,7 @@ from infoset import (
     StateBox,
 )
 from infoset.arrays import Floats
-from infoset.sensor import Sensor
+from infoset.sensors import Sensor
 
 BATCH = 4
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
+from infoset import AngleSensor, Camera, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 from infoset.engine import section_life
 from infoset.engine.section_law import section_laws
@@ -103,7 +103,7 @@ def test_bands_of_a_camera_contain_the_truth_and_are_convex(
     near: float,
 ) -> None:
     """At all ranges from ten centroid errors up, with the bounds of both axes reached, and a closing speed of 50 %."""
-    sensor = AngleSensor.camera(0.5, 10.0**pixel, 10.0**centroid)
+    sensor = Camera(0.5, 10.0**pixel, 10.0**centroid)
     threshold_m = 10.0 ** (centroid + 1.0 + threshold) * (1.0 + 1e-12)
     known = replace(KNOWN, vx_m_s=(-58e3 * (1.0 + speed_error), -58e3 * (1.0 - speed_error)))
     if threshold_m >= 5e6:

@@ -13,15 +13,7 @@ from scipy.optimize import linprog
 
 from experiments import load_scenario
 from guidance import NoiseKind, Thruster, TieRule
-from infoset import (
-    AngleSensor,
-    Bias,
-    InformationSet,
-    InitialSet,
-    Model,
-    SetModel,
-    StateBox,
-)
+from infoset import AngleSensor, Bias, Camera, InformationSet, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 from sim import Record, Results, Scenario, fly_one, simulate
 from sim.bound.lower_bound import lower_bound, pair_at
@@ -38,7 +30,7 @@ FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0
 def camera_scenario(**fields: Any) -> Scenario:
     """Return an engagement of one hour in a plane, with a camera; `fields` are those of the angle sensor."""
     law = {"centroid_error_m": CENTROID_M, **fields}
-    camera = AngleSensor.camera(EVERY_S, PIXEL_RAD, **law)
+    camera = Camera(EVERY_S, PIXEL_RAD, **law)
     box = StateBox((-1e4, 1e4), (3590.0 * SPEED_M_S, 3610.0 * SPEED_M_S), (-2.0, 2.0), (-6141.0, -6139.0))
     model = SetModel(
         SPEED_M_S,
@@ -177,7 +169,7 @@ def test_possible_misses_of_dart_are_those_of_pairs(cut_off_s: float, changing_m
 
 def measured_set(centroid_m: float, alpha_rad: Callable[[float], float]) -> InformationSet:
     """Return the set after images from `FIRST_S` to `LAST_S`, with known range and speed and no disturbance."""
-    camera = AngleSensor.camera(EVERY_S, PIXEL_RAD, centroid_m)
+    camera = Camera(EVERY_S, PIXEL_RAD, centroid_m)
     at_start = (FIRST_S * SPEED_M_S, FIRST_S * SPEED_M_S)
     box = StateBox((-1e6, 1e6), at_start, (-1e3, 1e3), (-SPEED_M_S, -SPEED_M_S))
     threshold_m = max(1e3, 10.0 * centroid_m)
@@ -214,7 +206,7 @@ def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
     lower, upper = interval(lambda before_s: 0.0)
     assert upper == pytest.approx(-lower)
     assert expected * (1.0 - 1e-9) <= upper <= (1.0 + 1e-5) * expected
-    bound, random = AngleSensor.camera(EVERY_S, PIXEL_RAD, centroid_m).error_bound, np.random.default_rng(3)
+    bound, random = Camera(EVERY_S, PIXEL_RAD, centroid_m).error_bound, np.random.default_rng(3)
     for _ in range(5):
         lower, upper = interval(lambda before_s: random.choice([-1.0, 1.0]) * bound(before_s * SPEED_M_S))
         assert 0.5 * (upper - lower) <= (1.0 + 1e-5) * expected
@@ -279,7 +271,7 @@ def test_a_camera_without_centroid_error_is_the_line_with_equal_errors(asteroid:
         initial = InitialSet.BOX if kind is Model.GUARANTEED else InitialSet.RECTANGLE
         model = replace(asteroid.set_model, model=kind, initial_set=initial)
         line = AngleSensor(0.5, 2e-4, 2e-4, 5801.3e3)
-        camera = AngleSensor.camera(0.5, 2e-4)
+        camera = Camera(0.5, 2e-4)
         first, second = (
             simulate(replace(asteroid, noise=NoiseKind.GAME, **of_model(replace(model, angle_sensor=sensor))), 5)
             for sensor in (line, camera)

@@ -25,6 +25,7 @@ from sim.scenario import of_model
 from sim.simulate import ENGAGEMENTS_AT_ONCE
 from sim.storage import Axis, CampaignFolder, StorageError, fingerprint, read_manifest
 from sim.versions import VersionError, versions
+from tests.sensors import linear
 from tests.sim.shuffled import Shuffled
 
 
@@ -244,7 +245,7 @@ def test_another_campaign_is_refused_and_every_difference_shown(brief: Scenario,
     campaign = mixed(brief, tmp_path, 32)
     campaign.run()
     before = {each: each.read_bytes() for each in tmp_path.rglob("*") if each.is_file()}
-    sensor = replace(brief.set_model.angle_sensor, error_at_zero_range_rad=0.0003)
+    sensor = replace(linear(brief.angle_sensor), error_at_zero_range_rad=0.0003)
     other = replace(brief, **of_model(replace(brief.set_model, angle_sensor=sensor)), tie=TieRule.LOWER)
     for changed, lines in (
         (replace(campaign, seed=6, chunk=8), ["seed: 5 in the folder, 6 now", "chunk: 16 in the folder, 8 now"]),

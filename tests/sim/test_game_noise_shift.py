@@ -57,7 +57,7 @@ def test_a_target_at_the_bound_of_the_model_brings_every_run_to_the_closed_form(
 
 def test_without_a_disturbance_the_shift_is_a_straight_line_between_the_bounds() -> None:
     """Its miss is that of the closed form."""
-    settings = ["angle_sensor.centroid_error_m=3", "information_set.disturbance_m_s2=0", "target.manoeuvre=none"]
+    settings = ["camera.centroid_error_m=3", "information_set.disturbance_m_s2=0", "target.manoeuvre=none"]
     scenario = load_scenario("dart-2022", settings)
     shifts_m, first_s, last_s, speed_m_s = worst_shift_m(scenario), scenario.nominal_arrival_s, 150.0, 6140.0
     assert shifts_m is not None

@@ -25,6 +25,7 @@ from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.scenario import of_model
 from tests.kernels import callable_kernels
+from tests.sensors import linear
 
 CASES = Path(__file__).parent / "cases"
 rate_band = callable_kernels(section_life).rate_band
@@ -351,7 +352,7 @@ def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limi
     if y is not None:
         box, sensor = model.bounds, model.angle_sensor
         if y == "bound that falls with range":
-            sensor = replace(sensor, error_at_nominal_range_y_rad=0.01, error_at_zero_range_y_rad=0.02)
+            sensor = replace(linear(sensor), error_at_nominal_range_y_rad=0.01, error_at_zero_range_y_rad=0.02)
         model = replace(model, bounds=replace(box, y_m=box.z_m, vy_m_s=box.vz_m_s), angle_sensor=sensor)
         angles = np.concatenate([-angles if y == "mirror of z" else 0.0 * angles, angles])
 

@@ -11,7 +11,7 @@ import pytest
 from guidance import LineOfSight, NoiseKind
 from infoset import InformationSetView, InitialSet, Model, RangeSensor, Recovery, Sensor
 from infoset.arrays import Flags, Floats
-from infoset.sensor import Cuttable, Geometry, Measurements
+from infoset.sensors import Cuttable, Geometry, Measurements
 from sim import Outcome, Scenario, fly_one, lower_bound, simulate
 from sim.scenario import of_model
 from tests.space import in_space

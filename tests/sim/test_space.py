@@ -16,6 +16,7 @@ from sim.draws import Draws, draw
 from sim.engagement import Engagements, Step
 from sim.scenario import of_model
 from tests.long_steps import with_long_steps
+from tests.sensors import linear
 from tests.space import in_space
 
 NOISES = [(NoiseKind.RANDOM, TieRule.UPPER), *((NoiseKind.GAME, tie) for tie in TieRule)]
@@ -60,7 +61,7 @@ def test_the_plane_is_a_special_case(
     # Theory, section 9, item 1: y = V_y = 0, known exactly and measured without error; one code, so equal bits.
     planar = in_model(with_long_steps(request.getfixturevalue(name)), model)
     planar = replace(planar, noise=noise, tie=tie, strategy=strategy)
-    sensor = replace(planar.set_model.angle_sensor, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
+    sensor = replace(linear(planar.angle_sensor), error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
     bounds = flat(planar.set_model.bounds)
     known = replace(planar.set_model, bounds=bounds, angle_sensor=sensor, disturbance_y_m_s2=0.0)
     spatial = replace(planar, **of_model(known), dispersion=flat(planar.dispersion))
@@ -107,7 +108,7 @@ def uneven(scenario: Scenario) -> Scenario:
 
 def exchanged(scenario: Scenario) -> Scenario:
     model = scenario.set_model
-    sensor = model.angle_sensor
+    sensor = linear(model.angle_sensor)
     y, z = sensor.axis("y"), sensor.axis("z")
     sensor = replace(
         sensor,

@@ -13,6 +13,7 @@ from sim import Campaign, CampaignNoise, QuantileName, Requirement, Scenario
 from sim.requirement import Decision, judge
 from sim.scenario import of_model
 from sim.storage import Axis, CampaignFolder, read_manifest
+from tests.sensors import linear
 from tests.sim.shuffled import Shuffled
 
 ERRORS = (1e-5, 1.2e-4, 1.5e-4, 3e-4)
@@ -25,7 +26,7 @@ class InterruptError(Exception):
 
 @pytest.fixture(scope="module")
 def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    sensor = brief.set_model.angle_sensor
+    sensor = linear(brief.angle_sensor)
     cells = tuple(
         replace(
             brief, **of_model(replace(brief.set_model, angle_sensor=replace(sensor, error_at_zero_range_rad=error)))

@@ -25,7 +25,7 @@ from experiments.common.figure_style import (
 )
 from experiments.interception.course import Clock, along, outcome_title, record_titles, true_predicted_misses
 from experiments.interception.figures.shared import MAX_VECTORS, count_down, draw_impulses
-from infoset import AngleSensor
+from infoset import BearingSensor
 from infoset.arrays import Floats
 from sim import Record
 
@@ -146,7 +146,7 @@ def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
     _dots(axes, times, 1e3 * (values - _true(trace, "angle")[steps]), "error of the measured angle")
 
 
-def _sensor(trace: Trace) -> AngleSensor:
+def _sensor(trace: Trace) -> BearingSensor:
     """Return the sensor of the angle along the axis of a trace."""
     model = trace[0].scenario.set_model
     return model.axis(model.axes[trace[1]]).angle_sensor

@@ -14,6 +14,7 @@ from sim import simulate
 from sim.scenario import of_model
 from sim.storage import CampaignFolder
 from tests.experiments.command_line import Command, strict
+from tests.sensors import linear
 
 pytestmark = pytest.mark.usefixtures("unrendered")
 
@@ -53,7 +54,7 @@ def test_a_sweep_over_keys_of_space_is_resumed_and_reported(space_file: Path, in
     last = replace(
         model,
         bounds=replace(model.bounds, y_m=(-100.0, 200.0)),
-        angle_sensor=replace(sensor, error_at_zero_range_y_rad=0.0004),
+        angle_sensor=replace(linear(sensor), error_at_zero_range_y_rad=0.0004),
     )
     table = CampaignFolder.read(Path("cells")).runs(["miss_m", "miss_y_m"], 3)
     flown = simulate(replace(scenario, **of_model(last), noise=NoiseKind.RANDOM, tie=scenario.tie), 5)

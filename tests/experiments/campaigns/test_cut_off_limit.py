@@ -27,8 +27,8 @@ IDEAL = [
     "dispersion.vx_km_s=-6.14",
     "step_s=20",
     "angle_sensor.period_s=20",
-    "angle_sensor.centroid_error_m=0",
-    "angle_sensor.bias=random",
+    "camera.centroid_error_m=0",
+    "camera.bias=random",
     "target.manoeuvre=none",
     "information_set.disturbance_m_s2=0",
     "thruster.min_impulse_m_s=0",
@@ -45,7 +45,7 @@ def test_the_limit_of_the_chart_is_the_closed_form(infoset: Command, tmp_path: P
     """The noise of the game leaves the misses of the closed form possible, and the last impulse centres them."""
     file = tmp_path / "ideal.toml"
     file.write_text(to_toml(load_scenario("dart-2022", IDEAL)))
-    axes = ("angle_sensor.pixel_error_rad=1e-6:1.7e-5:5", "thruster.last_impulse_s=angle_sensor.last_image_s=40:320:8")
+    axes = ("camera.pixel_error_rad=1e-6:1.7e-5:5", "thruster.last_impulse_s=camera.last_image_s=40:320:8")
     infoset(
         *("sweep", file, "--vary", axes[0], "--vary", axes[1], "--noise", "game", "--runs", "6", "--quiet"),
         *("--require", "guaranteed_miss_m p50<25", "--out", tmp_path / "out"),

@@ -14,6 +14,7 @@ from experiments.interception.scenario_file import load_scenario
 from sim import Scenario
 from sim.scenario import of_model
 from sim.storage import Axis
+from tests.sensors import linear
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,7 @@ def test_the_issues_example(asteroid: Scenario) -> None:
     assert (first.values[0], first.values[-1], len(first.values)) == (5e-5, 5e-4, 8)
     assert second.values == (2.0, 5.0, 8.0, 11.0, 14.0, 17.0, 20.0)
     cells = sweep_cells(asteroid, axes)
-    found = [(cell.set_model.angle_sensor.error_at_nominal_range_rad, cell.thruster.max_impulse_m_s) for cell in cells]
+    found = [(linear(cell.angle_sensor).error_at_nominal_range_rad, cell.thruster.max_impulse_m_s) for cell in cells]
     assert found == list(itertools.product(first.values, second.values))
     back = {
         replace(
@@ -89,7 +90,7 @@ def test_keys_with_the_same_values(asteroid: Scenario) -> None:
     (axis,) = sweep_axes(tied, asteroid)
     assert axis == Axis(tied.rpartition("=")[0], (1e-4, 2e-4, 4e-4), "log")
     for cell, value in zip(sweep_cells(asteroid, (axis,)), axis.values, strict=True):
-        sensor = cell.set_model.angle_sensor
+        sensor = linear(cell.angle_sensor)
         assert (sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad) == (value, value)
 
 
@@ -99,8 +100,8 @@ def test_a_factor_of_all_error_bounds_of_a_sensor(asteroid: Scenario) -> None:
     cells = sweep_cells(asteroid, axes)
     bounds = [
         (
-            cell.set_model.angle_sensor.error_at_nominal_range_rad,
-            cell.set_model.angle_sensor.error_at_zero_range_rad,
+            linear(cell.angle_sensor).error_at_nominal_range_rad,
+            linear(cell.angle_sensor).error_at_zero_range_rad,
             cell.range_sensor.relative_error if cell.range_sensor else None,
         )
         for cell in cells

@@ -57,7 +57,7 @@ def test_one_key_has_lines_over_the_decisions() -> None:
 
 def test_the_limit_of_two_keys_is_a_line() -> None:
     axes = (
-        Axis("angle_sensor.pixel_error_rad", tuple(np.geomspace(1e-6, 5e-5, 8).tolist()), "log"),
+        Axis("camera.pixel_error_rad", tuple(np.geomspace(1e-6, 5e-5, 8).tolist()), "log"),
         Axis("thruster.last_impulse_s", tuple(np.geomspace(30.0, 900.0, 8).tolist()), "log"),
     )
     required = Requirement(QuantileName("guaranteed_miss_m", 0.99), 25.0)

@@ -115,7 +115,7 @@ def test_the_limit_of_hits_is_that_of_a_fine_sweep(tmp_path: Path) -> None:
     quick = ["step_s=20", "angle_sensor.period_s=20", "thruster.max_impulse_m_s=1"]
     scenario, found = load_scenario("dart-2022", [*short, *quick]), []
     for count in (2, 7):
-        axis = Axis("angle_sensor.pixel_error_rad", tuple(np.linspace(1.3e-5, 2.5e-5, count).tolist()))
+        axis = Axis("camera.pixel_error_rad", tuple(np.linspace(1.3e-5, 2.5e-5, count).tolist()))
         (limit,) = limits(swept(scenario, (axis,), 40, tmp_path / str(count), HitRequirement(0.9))).to_dict("records")
         found.append(limit)
     coarse, fine = found

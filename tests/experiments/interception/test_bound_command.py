@@ -18,6 +18,7 @@ from sim.scenario import of_model
 from sim.storage.codec import fingerprint
 from sim.versions import versions
 from tests.experiments.command_line import Command
+from tests.sensors import linear
 from tests.space import in_space
 
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
@@ -34,7 +35,7 @@ def short() -> Scenario:
     published = load_scenario("asteroid-1997")
     box = StateBox((-1e3, 1e3), (1740e3, 1750e3), (-100.0, 100.0), (-58e3, -57.5e3))
     model = replace(published.set_model, bounds=box)
-    nominal = replace(model, angle_sensor=replace(model.angle_sensor, nominal_range_m=1745e3))
+    nominal = replace(model, angle_sensor=replace(linear(model.angle_sensor), nominal_range_m=1745e3))
     return replace(published, name="short", **of_model(nominal), dispersion=box, nominal_range_m=1745e3)
 
 

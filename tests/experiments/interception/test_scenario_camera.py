@@ -9,19 +9,16 @@ import pytest
 from experiments.common.errors import InputError
 from experiments.common.input_file import read_text, to_toml
 from experiments.interception.scenario_file import scenario_warnings
-from infoset import AngleSensor
-from infoset.sensors import Bias
+from infoset import Camera
 from sim import Scenario
 from tests.built_in import scenario_text
 
 PLANE = scenario_text("asteroid-1997")
 CAMERA = re.sub("(?m)^(error_at_|nominal_range_km = 5801.3$).*\n", "", PLANE).replace(
-    "[angle_sensor]", "[angle_sensor]\npixel_error_rad = 5e-6\ncentroid_error_m = 20.0"
+    "[angle_sensor]", "[camera]\npixel_error_rad = 5e-6\ncentroid_error_m = 20.0"
 )
+IMAGES = ["first_image_s=50.0", "last_image_s=4.5", "miss_probability=0.125"]
 WHOLE = [
-    "angle_sensor.first_image_s=50.0",
-    "angle_sensor.last_image_s=4.5",
-    "angle_sensor.miss_probability=0.125",
     "thruster.last_impulse_s=7",
     "thruster.impulses_s=[50.0, 20, 7.5]",
     "thruster.delay_steps=2",
@@ -33,40 +30,45 @@ def camera(**values: str) -> Scenario:
     return read_text(Scenario, CAMERA, "file", settings)
 
 
-def test_a_pixel_error_in_place_of_the_linear_bound_makes_a_camera() -> None:
+def test_a_camera_in_place_of_a_sensor_with_a_linear_bound() -> None:
     scenario = camera()
-    assert scenario.angle_sensor == AngleSensor.camera(0.5, 5e-6, 20.0)
+    assert scenario.angle_sensor is None
+    assert scenario.camera == scenario.set_model.angle_sensor == Camera(0.5, 5e-6, 20.0)
     assert "error_at" not in to_toml(scenario)
     assert read_text(Scenario, to_toml(scenario), "written") == scenario
-    assert read_text(Scenario, CAMERA.replace("centroid_error_m = 20.0", ""), "file").angle_sensor.centroid_error_m == 0
+    without = read_text(Scenario, CAMERA.replace("centroid_error_m = 20.0", ""), "file")
+    assert without.camera == Camera(0.5, 5e-6)
 
 
 @pytest.mark.parametrize("text", [PLANE, CAMERA, scenario_text("asteroid-1997-space")])
 def test_every_key_is_read_and_written(text: str) -> None:
-    scenario = read_text(Scenario, text, "file", [*WHOLE, *(["angle_sensor.bias=constant"] if text == CAMERA else [])])
-    sensor, thruster = scenario.angle_sensor, scenario.thruster
+    table = "camera" if text == CAMERA else "angle_sensor"
+    images = [*IMAGES, *(["bias=constant"] if text == CAMERA else [])]
+    settings = [*WHOLE, *(f"{table}.{image}" for image in images)]
+    scenario = read_text(Scenario, text, "file", settings)
+    sensor, thruster = scenario.bearing_sensor, scenario.thruster
     assert (sensor.first_image_s, sensor.last_image_s, sensor.miss_probability) == (50.0, 4.5, 0.125)
-    assert sensor.bias is (Bias.CONSTANT if text == CAMERA else Bias.RANDOM)
+    assert sensor.has_constant_bias is (text == CAMERA)
     assert (thruster.last_impulse_s, thruster.impulses_s, thruster.delay_steps) == (7.0, (50.0, 20.0, 7.5), 2)
     assert read_text(Scenario, to_toml(scenario), "written") == scenario
 
 
 def test_the_error_of_the_centre_is_small_at_the_range_threshold() -> None:
     with pytest.raises(InputError, match=r"range_threshold_m must be at least 10 times .*, 8000 m: got 5000"):
-        camera(angle_sensor__centroid_error_m="800")
+        camera(camera__centroid_error_m="800")
 
 
 def test_measurements_after_the_last_impulse_are_warned_of() -> None:
-    blind = camera(angle_sensor__first_image_s="20", thruster__last_impulse_s="30")
+    blind = camera(camera__first_image_s="20", thruster__last_impulse_s="30")
     (line,) = scenario_warnings(blind)
     assert "no impulse follows a measurement" in line
     assert "the last impulse is 30.0224 s before it" in line
-    assert not scenario_warnings(camera(angle_sensor__first_image_s="30.1", thruster__last_impulse_s="30"))
+    assert not scenario_warnings(camera(camera__first_image_s="30.1", thruster__last_impulse_s="30"))
     schedule = {"thruster__impulses_s": "[60.0, 40.0, 20.0]", "thruster__last_impulse_s": "30"}
     after_cut_off = "the impulses at 20 s before the arrival are after the cut-off"
     for first_image_s, delay_steps, number in (("35", "0", 2), ("40.1", "0", 1), ("40.1", "2", 2)):
         lines = scenario_warnings(
-            camera(angle_sensor__first_image_s=first_image_s, thruster__delay_steps=delay_steps, **schedule)
+            camera(camera__first_image_s=first_image_s, thruster__delay_steps=delay_steps, **schedule)
         )
         assert len(lines) == number
         assert [after_cut_off in line for line in lines].count(True) == 1

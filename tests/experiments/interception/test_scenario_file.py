@@ -110,8 +110,7 @@ def test_the_start_for_an_own_scenario_has_every_key() -> None:
         (["sun.distance_km=6000"], "sun.distance_m must be greater than the maximum possible range"),
         (["thruster.impulses_s=[200]"], "thruster.impulses_s: the first impulse can be given 100.022 s before"),
         (["thruster.last_impulse_s=101"], "thruster.last_impulse_s excludes all impulses"),
-        (["angle_sensor.centroid_error_m=10"], "or pixel_error_rad and centroid_error_m of a camera"),
-        (["angle_sensor.bias=constant"], "bias can be constant only for a camera"),
+        (["camera.pixel_error_rad=1e-5", "camera.period_s=0.5"], "or the table camera: got both"),
         (["uncertainty.y_km=[-1, 1]"], "y_m and vy_m_s must both be set, or neither: vy_m_s is missing"),
         (["angle_sensor.error_at_zero_range_y_rad=1e-4"], "angle_sensor holds a value of an engagement in space"),
         (

@@ -13,6 +13,7 @@ from sim import Manoeuvre, Scenario, Target
 from sim.scenario import of_model
 from sim.storage.codec import fingerprint
 from tests.built_in import scenario_text
+from tests.sensors import linear
 
 AXIS = {"uncertainty": ("[-9.0, 9.0]", "[-0.09, 0.09]"), "dispersion": ("[-0.9, 0.9]", "[-0.08, 0.08]")}
 
@@ -73,7 +74,7 @@ def test_every_key_of_space_is_read_and_written() -> None:
         f'{text}\n[target]\nmanoeuvre = "constant"\nacceleration_m_s2 = 0.001\nacceleration_y_m_s2 = 0.002\n',
         "mine.toml",
     )
-    sensor = scenario.set_model.angle_sensor
+    sensor = linear(scenario.angle_sensor)
     assert (sensor.error_at_nominal_range_y_rad, sensor.error_at_zero_range_y_rad) == (0.0, 0.0)
     assert (scenario.set_model.disturbance_y_m_s2, scenario.thruster.pointing_error_rad) == (0.006, 0.01)
     assert scenario.sun is not None

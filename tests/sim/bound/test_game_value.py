@@ -10,11 +10,12 @@ import pytest
 
 from experiments.interception.scenario_file import load_scenario, with_model
 from guidance import NoiseKind, Thruster
-from infoset import AngleSensor, InitialSet, Model, StateBox
+from infoset import AngleSensor, Camera, InitialSet, Model, StateBox
 from infoset.sensors import RateSensor
 from sim import Scenario, Sun, lower_bound, simulate
 from sim.bound.game_value import ValueReserve, value_reserve, why_no_value
 from sim.scenario import of_model
+from tests.sensors import linear
 from tests.space import in_space
 
 RANGE_M, SPEED_M_S = 1745e3, 58e3
@@ -24,7 +25,7 @@ def known(*, z_m: tuple[float, float] = (-1e3, 1e3), vz_m_s: float = 100.0, rang
     """Return half a minute of the published approach in free space, with known range and closing speed."""
     scenario = with_model(load_scenario("asteroid-1997"), Model.GUARANTEED)
     box = StateBox(z_m, (range_m, range_m), (-vz_m_s, vz_m_s), (-SPEED_M_S, -SPEED_M_S))
-    sensor = replace(scenario.set_model.angle_sensor, nominal_range_m=range_m)
+    sensor = replace(linear(scenario.angle_sensor), nominal_range_m=range_m)
     model = replace(scenario.set_model, bounds=box, angle_sensor=sensor, disturbance_m_s2=0.0)
     return replace(
         scenario, sun=None, range_sensor=None, nominal_range_m=range_m, dispersion=box, **of_model(model), name="known"
@@ -135,7 +136,7 @@ def test_reserve_of_one_impulse_by_hand() -> None:
     assert reserve.tangent_m == pytest.approx(exact_m * (np.cos(np.arctan(slope) + 2e-4) ** -2 - 1.0), rel=1e-3)
 
 
-CAMERA = AngleSensor.camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.0)
+CAMERA = Camera(0.5, 5e-5, 20.0, first_image_s=20.0, last_image_s=1.0)
 
 
 @pytest.mark.thorough

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from guidance import Thruster
-from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, Camera, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
 from sim import Scenario, Sun
 from sim.bound.coasting import coasting
 from sim.bound.lower_bound import pair_at
@@ -32,7 +32,7 @@ def slow_flight(range_km: float, *, cut_off_s: float | None = 2000.0, strength: 
     """2 km/s with the Sun at 60 million km across the approach; range and speed are known."""
     range_m = 1e3 * range_km
     box = StateBox((-1e4, 1e4), (range_m - 500.0, range_m + 500.0), (-0.1, 0.1), (-2000.01, -1999.99))
-    sensor = AngleSensor.camera(200.0, 5e-6, 5.0)
+    sensor = Camera(200.0, 5e-6, 5.0)
     model = SetModel(
         closing_speed_m_s=2000.0,
         step_s=200.0,

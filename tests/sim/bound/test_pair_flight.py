@@ -20,11 +20,12 @@ from infoset import (
 )
 from infoset.arrays import Floats
 from infoset.model import InitialSet, Model
-from infoset.sensor import Sensor
+from infoset.sensors import Sensor
 from sim import Scenario, Sun
 from sim.bound.lower_bound import lower_bound, pair_at
 from sim.bound.pair_flight import PairNoise, fly_pair
 from sim.scenario import of_model
+from tests.sensors import linear
 
 QUICK = 4
 """Random scenarios of the quick tests: of one label, so that there are few linear programs."""
@@ -128,8 +129,7 @@ def random_in_space(number: int) -> Scenario:
     """A random scenario with a second lateral axis: other bounds, any Sun."""
     scenario, draws = random_scenario(number), np.random.default_rng([2001, number])
     model, share = scenario.set_model, draws.uniform(0.3, 1.0, 4)
-    sensor = model.angle_sensor
-    assert sensor.error_at_nominal_range_rad is not None
+    sensor = linear(model.angle_sensor)
     sensor = replace(sensor, error_at_nominal_range_y_rad=share[0] * sensor.error_at_nominal_range_rad)
     (minimum, maximum), speed = model.bounds.z_m, share[2] * model.bounds.vz_m_s[1]
     box = replace(model.bounds, y_m=(minimum, share[1] * maximum), vy_m_s=(-speed, speed))

@@ -85,6 +85,8 @@ class Sensor(ABC):
     ----------
     name : str
         Key of its measurements and errors.
+    table : str
+        Its table in files.
     quantity : str
         What it measures, with the unit: ``measured_<quantity>`` is its column in files.
     stream : int
@@ -94,6 +96,7 @@ class Sensor(ABC):
     """
 
     name: ClassVar[str]
+    table: ClassVar[str]
     quantity: ClassVar[str]
     stream: ClassVar[int]
     is_lateral: ClassVar[bool] = True

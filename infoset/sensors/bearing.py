@@ -1,0 +1,288 @@
+"""Sensors of the line-of-sight angles with bounded errors: one with a linear error bound, and a camera."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import KW_ONLY, dataclass, replace
+from enum import Enum
+from functools import cached_property
+from typing import ClassVar, TypeVar
+
+import numpy as np
+
+from infoset.arrays import Flags, Floats
+from infoset.limits import Fraction, NotNegative, Part, Positive, check_fields
+from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
+
+RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
+
+TIME_TOLERANCE = 1e-6
+"""Rounding of the first and the last image, as a share of the time between two images."""
+NEGLIGIBLE_ERROR_RAD = 1e-60
+"""Error bound of an axis that is measured without error."""
+
+
+class Bias(Enum):
+    """How the random error of a camera is drawn.
+
+    RANDOM: a new error within the whole bound for each image. CONSTANT: the centroid part is drawn once a run, the
+    pixel part for each image.
+    """
+
+    RANDOM = "random"
+    CONSTANT = "constant"
+
+
+@dataclass(frozen=True)
+class BearingSensor(Sensor):
+    """A sensor of the line-of-sight angles atan2(z, x) and, in space, atan2(y, x), each with its own error.
+
+    The error bound of an angle is a constant, a part that is linear in the range, and a part that falls with it; a kind
+    of sensor has one of the latter two.
+
+    Parameters
+    ----------
+    period_s : float
+        Time between measurements, s; the first is at t = 0.
+    first_image_s, last_image_s : float
+        Times before the nominal arrival of the first and the last image, s. Images begin at the start for None, and
+        continue until the true arrival for 0.
+    miss_probability : float
+        Probability that an image is lost, in [0, 1).
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits, or two of them contradict each other.
+    """
+
+    name: ClassVar[str] = "angle"
+    quantity: ClassVar[str] = "angle_rad"
+    stream: ClassVar[int] = 1
+
+    period_s: Positive
+    _: KW_ONLY
+    first_image_s: Positive | None = None
+    last_image_s: NotNegative = 0.0
+    miss_probability: Part = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.first_image_s is not None and self.first_image_s < self.last_image_s:
+            raise ValueError(
+                f"{type(self).__name__}: first_image_s must be at least last_image_s, because both are times before "
+                f"the arrival: got {self.first_image_s!r} and {self.last_image_s!r}"
+            )
+
+    @property
+    @abstractmethod
+    def constant_error_rad(self) -> float:
+        """The part of the error bound that does not depend on the range, rad."""
+
+    @property
+    def error_slope_rad_per_m(self) -> float:
+        """Change of the error bound with the range, rad/m."""
+        return 0.0
+
+    @property
+    def centroid_error_m(self) -> float:
+        """The part of the error bound that falls with the distance, times the distance, m."""
+        return 0.0
+
+    @property
+    def has_constant_bias(self) -> bool:
+        """Whether the centroid part of the random errors is constant in a run."""
+        return False
+
+    @property
+    def is_spatial(self) -> bool:
+        """Whether a value is set that only an engagement in space uses."""
+        return self != self.axis("z")
+
+    def axis(self, name: str) -> BearingSensor:
+        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes negligible."""
+        return self
+
+    @abstractmethod
+    def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
+        """Return the maximum size of the error at a range (m), rad; in space that of the angle of z."""
+
+    def error_bounds(self, range_m: Floats) -> Floats:
+        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B).
+
+        Returns
+        -------
+        ndarray, shape (..., B)
+            (2, B) if the two axes differ.
+        """
+        return self.error_bound(range_m)
+
+    def true_value(self, sight: Geometry) -> Floats:
+        """Return the line-of-sight angles, rad."""
+        return sight.alpha_rad
+
+    def bound(self, sight: Geometry) -> Floats:
+        """Return the error bound at the true range, rad."""
+        return self.error_bounds(sight.range_m)
+
+    def measures_at(self, before_arrival_s: float) -> bool:
+        """Return whether there are images at a time before the nominal arrival, s."""
+        room_s = TIME_TOLERANCE * self.period_s
+        too_early = self.first_image_s is not None and before_arrival_s > self.first_image_s + room_s
+        too_late = self.last_image_s > 0.0 and before_arrival_s < self.last_image_s - room_s
+        return not (too_early or too_late)
+
+    def error(self, sight: Geometry, measured: Floats) -> Floats:
+        """Return the error of measured angles in units of the bound."""
+        return (measured - sight.alpha_rad) / np.maximum(self.bound(sight), NEGLIGIBLE_ERROR_RAD)
+
+    def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
+        """Cut by the angle."""
+        sets.measure_angle(measured[self.name], where)
+
+    def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> tuple[bool, Floats]:
+        """Return a band of z."""
+        return False, errors * self.error_bound(range_m) * range_m
+
+    def share(self, apart: Apart) -> Floats:
+        """Return half of the maximum difference of the angles, in units of the bound, shape (n,).
+
+        An angle changes by at most as much as z/x. The bound may fall with the distance, which is greater than the
+        range. An axis that is measured without error is left out.
+        """
+        angles = np.abs(apart.offset_m) / apart.range_m
+        bounds = np.minimum(self.error_bounds(apart.range_m), self.error_bounds(apart.farthest_m))
+        shares = np.where(bounds == 0.0, 0.0, 0.5 * angles / np.maximum(bounds, NEGLIGIBLE_ERROR_RAD))
+        return np.asarray(shares.max(axis=0))
+
+
+@dataclass(frozen=True)
+class AngleSensor(BearingSensor):
+    """A sensor of the line-of-sight angles with an error bound that is linear in the range.
+
+    Parameters
+    ----------
+    error_at_nominal_range_rad, error_at_zero_range_rad : float
+        Bound a + h(d) at `nominal_range_m` and at zero range, rad, in (0, 1). The same line continues beyond.
+    nominal_range_m : float
+        Range at which the first of the two holds, m.
+    error_at_nominal_range_y_rad, error_at_zero_range_y_rad : float or None
+        The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For space only.
+    **others
+        Fields of `BearingSensor`.
+
+    References
+    ----------
+    Kumkov and Patsko (1997), equations (4) and (10).
+    """
+
+    table: ClassVar[str] = "angle_sensor"
+
+    error_at_nominal_range_rad: Fraction
+    error_at_zero_range_rad: Fraction
+    nominal_range_m: Positive
+    _: KW_ONLY
+    error_at_nominal_range_y_rad: Part | None = None
+    error_at_zero_range_y_rad: Part | None = None
+
+    @property
+    def constant_error_rad(self) -> float:
+        """The error bound at range zero, rad."""
+        return self.error_at_zero_range_rad
+
+    @property
+    def error_slope_rad_per_m(self) -> float:
+        """Change of the error bound with the range, rad/m."""
+        return (self.error_at_nominal_range_rad - self.error_at_zero_range_rad) / self.nominal_range_m
+
+    def axis(self, name: str) -> AngleSensor:
+        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes negligible."""
+        return self._planar[name]
+
+    @cached_property
+    def _planar(self) -> dict[str, AngleSensor]:
+        """The sensors of both plane angles, which strategies need at every step."""
+        plain = replace(self, error_at_nominal_range_y_rad=None, error_at_zero_range_y_rad=None)
+        at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
+        return {"y": replace(plain, error_at_nominal_range_rad=at_nominal, error_at_zero_range_rad=at_zero), "z": plain}
+
+    @property
+    def _bounds_of_y(self) -> tuple[float, float]:
+        """The bounds of the angle of the y axis at the nominal range and at range zero, rad; they may be zero."""
+        at_nominal, at_zero = self.error_at_nominal_range_y_rad, self.error_at_zero_range_y_rad
+        return (
+            self.error_at_nominal_range_rad if at_nominal is None else at_nominal,
+            self.error_at_zero_range_rad if at_zero is None else at_zero,
+        )
+
+    def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
+        """Return the maximum size of the error at a range (m), rad; in space that of the angle of z."""
+        return self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
+
+    def error_bounds(self, range_m: Floats) -> Floats:
+        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B).
+
+        Returns
+        -------
+        ndarray, shape (..., B)
+            (2, B) if the two axes differ.
+        """
+        if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
+            return self.error_bound(range_m)
+        y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))
+        at_nominal, at_zero = self._bounds_of_y
+        return np.stack([at_zero + (at_nominal - at_zero) / self.nominal_range_m * y, self.error_bound(z)])
+
+
+@dataclass(frozen=True)
+class Camera(BearingSensor):
+    """A sensor of the line-of-sight angles with the error bound pixel_error_rad + centroid_error_m / d at distance d.
+
+    The bound is the same for both axes.
+
+    Parameters
+    ----------
+    pixel_error_rad : float
+        Maximum error of an image, rad, in (0, 1).
+    centroid_error_m : float
+        Maximum distance between the point of the body that the camera measures and its centre, m.
+    bias : Bias
+        Whether the random error of the centroid is constant in a run.
+    **others
+        Fields of `BearingSensor`.
+    """
+
+    table: ClassVar[str] = "camera"
+
+    pixel_error_rad: Fraction
+    centroid_error_m: NotNegative = 0.0
+    bias: Bias = Bias.RANDOM
+
+    @property
+    def constant_error_rad(self) -> float:
+        """The error bound of an image, rad."""
+        return self.pixel_error_rad
+
+    @property
+    def has_constant_bias(self) -> bool:
+        """Whether the centroid part of the random errors is constant in a run."""
+        return self.bias is Bias.CONSTANT
+
+    def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
+        """Return the maximum size of the error at a range (m), rad.
+
+        It does not increase at distances below the centroid error, where c/d is greater than 1 rad.
+        """
+        distance: RangeOrRanges = np.maximum(range_m, self.centroid_error_m or 1.0)
+        return self.pixel_error_rad + self.centroid_error_m / distance
+
+    def with_bias(self, sight: Geometry, error: Floats, bias: Floats) -> Floats:
+        """Return the error in units of the bound, from those of the pixel and of the centroid part.
+
+        Parameters
+        ----------
+        error, bias : ndarray, shape (..., B)
+            Errors in units of the bounds of the two parts, within [-1, 1].
+        """
+        share = self.pixel_error_rad / self.error_bound(sight.range_m)
+        return share * error + (1.0 - share) * bias
