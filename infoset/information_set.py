@@ -83,7 +83,7 @@ class InformationSet(InformationSetView):
             some_left=np.zeros(batch, dtype=bool),
             lost_step=np.full(batch, -1, dtype=np.int64),
             lost_label=np.zeros(batch),
-            phi=GuaranteedMiss(laws, batch, model.speed_error) if has_phi else None,
+            phi=GuaranteedMiss(laws[0], batch, model.speed_error) if has_phi else None,
         )
         super().__init__(state)
 
@@ -102,10 +102,11 @@ class InformationSet(InformationSetView):
         -----
         Phi bounds the miss of the labels below the threshold. The label of the true state is one of them at arrival.
         """
-        phi = self._state.phi
-        if phi is None:
+        state = self._state
+        if state.phi is None:
             return np.zeros(self.batch), np.zeros(self.batch, dtype=bool)
-        return phi.bound_m, phi.exists & ~self.inconsistent
+        phi_m, exists = state.phi.bound(state.stack, state.history)
+        return phi_m, exists & ~self.inconsistent
 
     def view(self) -> InformationSetView:
         """Return a read-only view of this set; it follows the set."""
@@ -234,8 +235,6 @@ class InformationSet(InformationSetView):
         impulse = self._lateral("impulse_m_s", impulse_m_s)
         state, elapsed = self._state, self._state.history.elapsed
         active = self._computes_phi & flags("where", where, (self.batch,)) & impulse.any(axis=0)
-        if state.phi is not None:
-            state.phi.fire(np.where(active, impulse, 0.0), elapsed)
         if active.any():
             state.history.record(IMPULSE, impulse, active)
             state.stack.shift(active, impulse, elapsed)

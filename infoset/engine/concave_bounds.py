@@ -19,16 +19,14 @@ def line_at(x: float, x0: float, y0: float, x1: float, y1: float) -> float:
 
 
 @allocation_free
-def bound_between(
-    labels: Floats, values: Floats, number: int, first: int, p: float, q: float, slope: float, centre: float
-) -> float:
-    """Upper bound on [p, q] of a concave function with given values, plus slope (x - centre).
+def bound_between(labels: Floats, values: Floats, first: int, p: float, q: float, slope: float) -> float:
+    """Upper bound on [p, q] of a concave function with given values, plus a line through zero at its middle, by (12).
 
-    `labels` are `number` increasing arguments, of which `first` are at most p and the others at least q; `values` are
-    those of the function. Outside of two of its points, a concave function lies below the line through them. The bound
-    is infinite if neither side has two points.
+    `values` are those of the function at increasing `labels`, of which `first` are at most p and the others at least q.
+    Outside of two of its points, a concave function lies below the line through them. The bound is infinite if neither
+    side has two points.
     """
-    has_left, has_right = first >= 2, number - first >= 2
+    has_left, has_right = first >= 2, labels.size - first >= 2
     left_p = left_q = right_p = right_q = np.inf
     if has_left:
         a, b = first - 2, first - 1
@@ -38,11 +36,12 @@ def bound_between(
         a, b = first, first + 1
         right_p = line_at(p, labels[a], values[a], labels[b], values[b])
         right_q = line_at(q, labels[a], values[a], labels[b], values[b])
-    best = max(min(left_p, right_p) + slope * (p - centre), min(left_q, right_q) + slope * (q - centre))
+    middle = 0.5 * (p + q)
+    best = max(min(left_p, right_p) + slope * (p - middle), min(left_q, right_q) + slope * (q - middle))
     if has_left and has_right and (left_p < right_p) != (left_q < right_q):
         share = (right_p - left_p) / ((right_p - left_p) - (right_q - left_q))
         x = p + share * (q - p)
-        best = max(best, left_p + share * (left_q - left_p) + slope * (x - centre))
+        best = max(best, left_p + share * (left_q - left_p) + slope * (x - middle))
     return best
 
 
@@ -62,12 +61,12 @@ def is_dead_between(dead: Records, latest: Floats) -> bool:
         if dead[i].died == last_event and (count == 0 or dead[i].label > known[count - 1]):
             known[count], values[count] = dead[i].label, dead[i].overlap
             count += 1
-    minimum, maximum = dead[0].label, dead[len(dead) - 1].label
+    minimum, maximum, last = dead[0].label, dead[len(dead) - 1].label, known[count - 1]
     rounding = -CERTAIN * maximum
-    if minimum < known[0] and bound_between(known, values, count, ZERO, minimum, known[0], 0.0, 0.0) >= rounding:
+    known, values = known[:count], values[:count]
+    if minimum < known[0] and bound_between(known, values, ZERO, minimum, known[0], 0.0) >= rounding:
         return False
     for i in range(count - 1):
-        if bound_between(known, values, count, i + 1, known[i], known[i + 1], 0.0, 0.0) >= rounding:
+        if bound_between(known, values, i + 1, known[i], known[i + 1], 0.0) >= rounding:
             return False
-    last = known[count - 1]
-    return bool(last == maximum or bound_between(known, values, count, count, last, maximum, 0.0, 0.0) < rounding)
+    return bool(last == maximum or bound_between(known, values, count, last, maximum, 0.0) < rounding)

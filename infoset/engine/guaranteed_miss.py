@@ -1,8 +1,9 @@
 """The guaranteed miss Phi: an upper bound of the true miss over all labels, computed on board.
 
-Labels leave the set step by step as their range passes below the threshold. This module bounds the predicted misses of
-the labels that leave, between the replayed labels too, and then follows the impulses until their range is zero.
-docs/guarantee.md contains the theorem and its proof.
+Labels leave the set step by step as their range passes below the threshold. Phi is the maximum of (10) in
+docs/guarantee.md over all of them: a search by branch and bound. The labels that leave in one step are divided into
+pieces, and Lemma 7 bounds each piece. The piece with the maximum bound is divided further until an exact section
+reaches nearly as much; the other pieces need no more than their first bounds.
 """
 
 from __future__ import annotations
@@ -12,17 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import ZERO, allocation_free, entry
+from infoset._compile import ZERO, allocation_free, entry, inlined
 from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.concave_bounds import bound_between
-from infoset.engine.history import History
-from infoset.engine.location import FIRST, LABEL_RESOLUTION, LAST, locate_end, search_window
+from infoset.engine.history import IMPULSE, PREDICTION, EventLog, History
+from infoset.engine.location import FIRST, LABEL_RESOLUTION, LAST, Living, locate_end, search_window
 from infoset.engine.replays import (
     LOWER,
     PROBE,
     UPPER,
     Past,
+    Records,
     keep_section,
     past_of,
     probe,
@@ -32,47 +34,55 @@ from infoset.engine.replays import (
     with_window,
 )
 from infoset.engine.section_law import SectionLaw, law_of
-from infoset.engine.section_life import ALIVE, time_to_go
-from infoset.engine.section_passes import Sections
-from infoset.engine.section_stack import SectionStack, impulse_doubts
+from infoset.engine.section_life import ALIVE, across_of, impulse_doubt, range_of, time_to_go
+from infoset.engine.section_stack import SectionStack
 
-LABELS = 4
-"""Labels replayed for one step; one more on each side serves for extrapolation."""
+LABELS = 3
+"""Labels replayed for one window; one more on each side serves for extrapolation."""
 MAX_LABELS = LABELS + 2
 PIECES = LABELS + 1
 NEAREST_OUTSIDE = 0.005
 """Minimum distance of a label below the others, in their spacing: a nearer one amplifies rounding."""
-MAX_LEAVING_WINDOWS = 16
-"""Maximum number of windows of the labels that leave at one step, with rates: a power of two."""
-LOOSE = 1.25
-"""A window is halved if its bound exceeds the maximum value known to be reached by this factor."""
+TIGHT = 1.001
+"""A piece is divided if its bound exceeds the maximum miss of an exact section by this factor."""
+MAX_DIVIDED = 400
+"""Maximum number of pieces that are divided. If more are needed, Phi is a greater bound."""
 GROUPS = 3000
 """Labels that leave within this part of a flight are bounded together, if they need several steps."""
-MINIMUM, MAXIMUM, NEAREST, FARTHEST = range(4)
-"""Columns of a piece: bounds of its predicted miss, and the labels of its ends, m."""
 SLACK = 1e-9
 ROUNDING = 4.0 * chains.EPSILON
 """Rounding error of a miss, relative to the maximum label: of x at the closest approach, also if z is exactly zero."""
+PIECE = np.dtype([("near", np.float64), ("far", np.float64), ("step", np.int64), ("bound", np.float64)])
+"""A piece: its labels, m, the number of the step in `Leaving`, and the bound of its miss by (12), m."""
 
 
-@allocation_free
-def extremes_along(points: Floats, count: int, tau: float) -> tuple[float, float]:
-    """Minimum and maximum z + V tau over the vertices (V, z)."""
-    minimum, maximum = np.inf, -np.inf
-    for i in range(count):
-        value = points[i, 1] + points[i, 0] * tau
-        minimum = min(minimum, value)
-        maximum = max(maximum, value)
-    return minimum, maximum
+class Leaving(NamedTuple):
+    """Labels that leave in each of W steps.
+
+    Parameters
+    ----------
+    near, far : ndarray, shape (W, B)
+        Limits of the labels, m; the lower one is greater if none leaves.
+    known : ndarray, shape (W, B)
+        A label between them that lives, m; minus infinity if none is known.
+    events, elapsed : ndarray of int, shape (W,)
+        Numbers of events and of predictions before they leave.
+    """
+
+    near: Floats
+    far: Floats
+    known: Floats
+    events: Integers
+    elapsed: Integers
 
 
 class Outlines(NamedTuple):
-    """Working arrays for the labels replayed for one step.
+    """Sections of the labels replayed for one window.
 
     Parameters
     ----------
     labels : ndarray, shape (MAX_LABELS,)
-        The labels, m.
+        The labels, m, in increasing order.
     points : ndarray, shape (C, MAX_LABELS, CAPACITY, 2)
         Vertices (V, z) of their sections along each axis.
     counts : ndarray of int, shape (C, MAX_LABELS)
@@ -87,226 +97,271 @@ class Outlines(NamedTuple):
     supports: Floats
 
 
-@allocation_free
-def bound_piece(
-    outlines: Outlines, number: int, first: int, p: float, q: float, travelled: float, law: SectionLaw
-) -> tuple[float, float]:
-    """Return bounds of z + V x/e over all sections of an axis with labels from p to q.
+class Replayed(NamedTuple):
+    """Number of the labels replayed for a window, and how many of them are below and above its living ones."""
 
-    The support of the sections in a fixed direction is a concave function of the label, but the direction of z + V x/e
-    turns with the label. With the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first term has
-    a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- r.
-    """
-    labels, values = outlines.labels, outlines.supports
-    points, counts = outlines.points[law.channel], outlines.counts[law.channel]
-    e = law.closing_speed
-    centre = 0.5 * (p + q)
-    tau = (centre - travelled) / e
-    for k in range(number):
-        minimum, maximum = np.inf, -np.inf
-        for i in range(counts[k]):
-            minimum = min(minimum, points[k, i, 0])
-            maximum = max(maximum, points[k, i, 0])
-        values[0, k], values[1, k] = -minimum, maximum
-        minimum, maximum = extremes_along(points[k], counts[k], tau)
-        values[2, k], values[3, k] = -minimum, maximum
-    v_min = -bound_between(labels, values[0], number, first, p, q, 0.0, centre)
-    v_max = bound_between(labels, values[1], number, first, p, q, 0.0, centre)
-    v_middle = 0.5 * (v_min + v_max)
-    room = 0.5 * (v_max - v_min) * (q - p) / (2.0 * e)
-    minimum = -bound_between(labels, values[2], number, first, p, q, -v_middle / e, centre) - room
-    maximum = bound_between(labels, values[3], number, first, p, q, v_middle / e, centre) + room
-    drift = 0.5 * law.disturbance * ((q - travelled) / e) ** 2
-    return minimum - drift, maximum + drift
+    number: int
+    inner: int
+    outer: int
+
+
+@inlined
+def support(points: Floats, count: int, v: float, z: float) -> float:
+    """Return the support of a polygon of `count` vertices (V, z) in a direction."""
+    maximum = -np.inf
+    for i in range(count):
+        maximum = max(maximum, v * points[i, 0] + z * points[i, 1])
+    return maximum
 
 
 @allocation_free
-def bound_leaving(
-    lower: float,
-    upper: float,
-    known: float,
-    past: Past,
-    errors: Floats | None,
-    outlines: Outlines,
-    pieces: Floats,
-) -> int:
-    """Bound the predicted miss of all living labels between two limits, m; return the number of pieces written.
+def write_outline(outlines: Outlines, i: int, label: float, row: int, past: Past) -> None:
+    """Write the sections in a row of the workspace as those of label number `i`."""
+    outlines.labels[i] = label
+    for channel in range(past.laws.shape[0]):
+        tau = time_to_go(label, past.log.elapsed, law_of(past.laws, channel))
+        section = replayed_section(past, channel, row, label)
+        outlines.counts[channel, i] = chains.outline(section, tau, outlines.points[channel, i])
 
-    The pieces of all axes have the same ends; `pieces`, shape (C, >= PIECES, 4), receives them. With rates, the window
-    consists of these limits; `errors` are those of the history, as in `replay`. `known` is a label between them that
-    lives; less than `lower` if none is known.
+
+@allocation_free
+def later_impulses(near: float, far: float, side: float, past: Past, law: SectionLaw) -> tuple[float, float]:
+    """Return a lower bound of the sum of side kappa_j x_j/e in (10) over the impulses after a history.
+
+    It is a linear function of the labels from `near` to `far`: its value at the middle, m, and its slope. The events
+    that follow the history are in the workspace. An impulse at which only a part of the labels has arrived is bounded
+    by its extremes.
     """
-    living, limits, laws, elapsed = known, past.room.known, past.laws, past.log.elapsed
-    if errors is not None:
-        # The living labels need not form an interval, so that the window must be searched.
-        first_label = known if known >= lower else 0.5 * (lower + upper)
-        if not search_window(lower, upper, first_label, past):
-            return 0
-        living = limits[1].label
-    lower_lives = probe(limits, FIRST, lower, past)
+    e, elapsed, values, applies = law.closing_speed, past.log.elapsed, past.room.values, past.room.applies
+    middle, slope = 0.0, 0.0
+    for event in range(past.log.number, applies.shape[0]):
+        if past.log.kinds[event] == PREDICTION:
+            elapsed += 1
+        elif past.log.kinds[event] == IMPULSE and applies[event]:
+            x_near, x_far = range_of(near, elapsed, law), range_of(far, elapsed, law)
+            if x_far <= 0.0:
+                break
+            impulse = values[law.channel, event]
+            minimum = side * impulse - impulse_doubt(impulse, across_of(values, event, law), law)
+            if x_near >= 0.0:
+                middle += minimum * (0.5 * (x_near + x_far) / e)
+                slope += minimum / e
+            else:
+                middle += min(minimum * (x_far / e), 0.0)
+    return middle, slope
+
+
+@allocation_free
+def miss_at(outlines: Outlines, i: int, past: Past) -> float:
+    """Return the maximum miss (10) of the section of one label, without the error of the speed, m."""
+    label, miss = outlines.labels[i], 0.0
+    for channel in range(past.laws.shape[0]):
+        law = law_of(past.laws, channel)
+        points, count = outlines.points[channel, i], outlines.counts[channel, i]
+        tau = time_to_go(label, past.log.elapsed, law)
+        upper = support(points, count, tau, 1.0) - later_impulses(label, label, 1.0, past, law)[0]
+        lower = support(points, count, -tau, -1.0) - later_impulses(label, label, -1.0, past, law)[0]
+        miss = math.hypot(miss, max(upper, lower) + 0.5 * law.disturbance * tau**2)
+    return miss
+
+
+@allocation_free
+def max_exact_miss(replayed: Replayed, past: Past, outlines: Outlines) -> float:
+    """Return the maximum miss of the exact sections of replayed labels, m; with rates, that of one of them.
+
+    The bands of rates that are convex on a window are wider than those of its labels.
+    """
+    worst, miss = ZERO, 0.0
+    for i in range(replayed.inner, replayed.number - replayed.outer):
+        miss_here = miss_at(outlines, i, past)
+        if miss_here > miss:
+            worst, miss = i, miss_here
+    if past.errors is not None:
+        label, alone = outlines.labels[worst], with_window(past, np.inf, -np.inf)
+        if run(label, alone)[0] != ALIVE:
+            return 0.0
+        write_outline(outlines, ZERO, label, PROBE, alone)
+        miss = miss_at(outlines, ZERO, alone)
+    return miss
+
+
+@allocation_free
+def living_part(known: float, past: Past) -> Living:
+    """Return the living labels of the window of a history, which form an interval, and leave the sections at its ends.
+
+    With rates, the bands are those that are convex on the window. `known` is a label of the window that lives; any
+    other number if none is known.
+    """
+    near, far, limits = past.nearest, past.farthest, past.room.known
+    below, lower, upper, above = near, near, far, far
+    lower_lives = probe(limits, FIRST, near, past)
     if lower_lives:
         keep_section(past, LOWER)
-    upper_lives = probe(limits, LAST, upper, past)
+    upper_lives = probe(limits, LAST, far, past)
     if upper_lives:
         keep_section(past, UPPER)
-    if lower_lives:
-        living = lower
-    elif upper_lives:
-        living = upper
-    if living < lower:
-        # The living labels form an interval, and both limits are dead: no label between them lives.
-        return 0
-    resolution = LABEL_RESOLUTION * upper
-    first_dead, last_dead = lower, upper
-    first, last = lower, upper
+    living = near if lower_lives else far
+    if not lower_lives and not upper_lives:
+        living = known if near <= known <= far else 0.5 * (near + far)
+        if past.errors is not None:
+            # A label that lives by itself may be dead with the bands of the window, and others may live.
+            if not search_window(near, far, living, past):
+                return Living(False, below, lower, upper, above)
+            living = limits[1].label
+        elif living != known:
+            # The living labels of the set form an interval. None of it is known here, and both limits are dead.
+            return Living(False, below, lower, upper, above)
+    resolution = LABEL_RESOLUTION * far
     if not lower_lives:
-        first_dead, first = locate_end(limits[0], living, resolution, past, LOWER)
+        below, lower = locate_end(limits[0], living, resolution, past, LOWER)
     if not upper_lives:
-        last_dead, last = locate_end(limits[2], living, resolution, past, UPPER)
-    spacing = (last - first) / (LABELS - 1)
-    law = law_of(laws, ZERO)
-    travelled = law.closing_speed * (law.step * elapsed)
+        above, upper = locate_end(limits[2], living, resolution, past, UPPER)
+    return Living(True, below, lower, upper, above)
+
+
+@allocation_free
+def replay_labels(living: Living, past: Past, outlines: Outlines) -> Replayed:
+    """Write the sections of equally spaced living labels, and of one more on each side without rates.
+
+    The sections at the ends are in the workspace. A single label is replayed if the interval is as short as the
+    resolution.
+    """
+    spacing, law = (living.upper - living.lower) / (LABELS - 1), law_of(past.laws, ZERO)
+    travelled = living.lower - range_of(living.lower, past.log.elapsed, law)
     number = inner = outer = ZERO
-    if spacing <= resolution:
-        spacing = 0.0
+    if spacing <= LABEL_RESOLUTION * living.upper:
+        write_outline(outlines, ZERO, living.lower, LOWER, past)
+        return Replayed(ZERO + 1, inner, outer)
     for k in range(-1, LABELS + 1):
-        outside = k < 0 or k == LABELS
-        if (spacing == 0.0 and k != 0) or (k < 0 and not lower_lives) or (k == LABELS and not upper_lives):
-            continue
-        if outside and errors is not None:
-            # The bands are convex only on the window.
-            continue
-        label = last if k == LABELS - 1 and spacing > 0.0 else first + k * spacing
+        label, row = living.lower + k * spacing, PROBE
         if k < 0 and label <= travelled:
             # No section exists behind x = 0. A much shorter distance would amplify rounding errors.
-            label = travelled + 0.5 * (first - travelled)
-            if first - label < NEAREST_OUTSIDE * spacing:
+            label = travelled + 0.5 * (living.lower - travelled)
+            if living.lower - label < NEAREST_OUTSIDE * spacing:
                 continue
-        row = PROBE
         if k == 0:
             row = LOWER
         elif k == LABELS - 1:
-            row = UPPER
+            label, row = living.upper, UPPER
+        elif k < 0 or k == LABELS:
+            # Labels live outside if the limit does. The bands of rates are convex only on the window.
+            limit_lives = living.below == living.lower if k < 0 else living.above == living.upper
+            if past.errors is not None or not limit_lives or run(label, past)[0] != ALIVE:
+                continue
+            inner, outer = inner + (k < 0), outer + (k > 0)
         elif run(label, past)[0] != ALIVE:
             continue
-        if outside and k < 0:
-            inner = 1
-        elif outside:
-            outer = 1
-        outlines.labels[number] = label
-        tau = (label - travelled) / law.closing_speed
-        for channel in range(laws.shape[0]):
-            section = replayed_section(past, channel, row, label)
-            outlines.counts[channel, number] = chains.outline(section, tau, outlines.points[channel, number])
+        write_outline(outlines, number, label, row, past)
         number += 1
-    if spacing == 0.0 or number < 3:
-        # The living labels are equal to within the resolution: one outline and a small margin bound them all.
-        width = last_dead - first_dead
-        tau = (first - travelled) / law.closing_speed
-        for channel in range(laws.shape[0]):
-            minimum, maximum = extremes_along(outlines.points[channel, 0], outlines.counts[channel, 0], tau)
-            magnitude = abs(minimum) + abs(maximum)
-            margin = SLACK * magnitude + width * magnitude / max(first - travelled, 1.0)
-            drift = 0.5 * law_of(laws, channel).disturbance * tau * tau
-            pieces[channel, 0, MINIMUM], pieces[channel, 0, MAXIMUM] = (
-                minimum - margin - drift,
-                maximum + margin + drift,
-            )
-            pieces[channel, 0, NEAREST], pieces[channel, 0, FARTHEST] = first_dead, last_dead
-        return 1
-    made = 0
-    inside = number - inner - outer
-    for piece in range(inside + 1):
-        # The first piece ends at the first living label, the last one begins at the last living label.
-        at = inner + piece
-        p = first_dead if piece == 0 else outlines.labels[at - 1]
-        q = last_dead if piece == inside else outlines.labels[at]
-        if q <= p:
-            continue
-        for channel in range(laws.shape[0]):
-            minimum, maximum = bound_piece(outlines, number, at, p, q, travelled, law_of(laws, channel))
-            pieces[channel, made, MINIMUM], pieces[channel, made, MAXIMUM] = minimum, maximum
-            pieces[channel, made, NEAREST], pieces[channel, made, FARTHEST] = p, q
-        made += 1
-    return made
-
-
-@entry
-def bound_leaving_all(
-    active: Flags,
-    lower: Floats,
-    upper: Floats,
-    floor: Floats,
-    past: Past,
-    sections: Sections,
-    outlines: Outlines,
-    pieces: Floats,
-    made: Integers,
-) -> None:
-    """Write the pieces of the active engagements and their numbers.
-
-    With rates, a window of labels is halved while its bound is loose, since the bands that are convex on a window are
-    wider on a wider window. `floor` is the bound of the labels that have arrived: Phi is no less.
-    """
-    slots, used, windows = sections.slots, sections.used, past.room.windows
-    errors, laws = past.errors, past.laws
-    for b in range(active.shape[0]):
-        made[b] = 0
-        if not active[b] or lower[b] > upper[b]:
-            continue
-        select(past, b)
-        reached = 0.5 * floor[b]
-        windows[0].near, windows[0].far = lower[b], upper[b]
-        count = 1
-        while count > 0:
-            count -= 1
-            near, far = windows[count].near, windows[count].far
-            known = near - 1.0
-            for s in range(used[b]):
-                if slots[b, s].living and near <= slots[b, s].label <= far:
-                    known = slots[b, s].label
-            window, middle = past, 0.5 * (near + far)
-            may_halve = errors is not None and MAX_LEAVING_WINDOWS * (far - near) > 1.5 * (upper[b] - lower[b])
-            if errors is not None:
-                window = with_window(past, near, far)
-            spread = 0.0
-            if may_halve:
-                spread = spread_at(middle, window, outlines.points[0, 0])
-                if spread > LOOSE * reached:
-                    reached = max(reached, spread_at(middle, past, outlines.points[0, 0]))
-            number = ZERO
-            new_pieces = pieces[:, b, made[b] :]
-            if spread <= LOOSE * reached:
-                number = bound_leaving(near, far, known, window, errors, outlines, new_pieces)
-                spread = 0.0
-                for channel in range(laws.shape[0] if number > 0 else 0):
-                    minimum, maximum = np.inf, -np.inf
-                    for piece in range(number):
-                        minimum = min(minimum, new_pieces[channel, piece, MINIMUM])
-                        maximum = max(maximum, new_pieces[channel, piece, MAXIMUM])
-                    spread = math.hypot(spread, 0.5 * (maximum - minimum))
-            # Later impulses may centre the interval, so that its width determines Phi.
-            if may_halve and spread > LOOSE * reached:
-                windows[count].near, windows[count].far = near, middle
-                windows[count + 1].near, windows[count + 1].far = middle, far
-                count += 2
-                continue
-            made[b] += number
+    return Replayed(number, inner, outer)
 
 
 @allocation_free
-def spread_at(label: float, past: Past, outline: Floats) -> float:
-    """Return half the width of the predicted misses at one label, m, in space half the diagonal; zero if it is dead."""
-    if run(label, past)[0] != ALIVE:
-        return 0.0
-    spread = 0.0
+def bound_pieces(
+    living: Living, replayed: Replayed, past: Past, outlines: Outlines, pieces: Records, count: int
+) -> int:
+    """Add the pieces between replayed labels, with their bounds, to `count` pieces; return the new count.
+
+    The first piece ends at the first living label, and the last one begins at the last living label.
+    """
+    number, inner, outer = replayed
+    if number < 3:
+        # The living labels are equal to within the resolution: one outline and a small margin bound them all.
+        piece = pieces[count]
+        piece.near, piece.far = living.below, living.above
+        piece.bound = miss_at(outlines, ZERO, past) + margin_of(outlines, living.above - living.below, past)
+        return count + 1
+    for first in range(inner, number - outer + 1):
+        near = living.below if first == inner else outlines.labels[first - 1]
+        far = living.above if first == number - outer else outlines.labels[first]
+        if near < far:
+            piece = pieces[count]
+            piece.near, piece.far = near, far
+            piece.bound = bound_piece(near, far, number, first, past, outlines)
+            count += 1
+    return count
+
+
+@allocation_free
+def bound_piece(near: float, far: float, number: int, first: int, past: Past, outlines: Outlines) -> float:
+    """Return the bound (12) of the miss over all labels from `near` to `far`, without the error of the speed, m.
+
+    The support of the sections in a fixed direction is a concave function of the label, but the direction of z + V x/e
+    turns with the label. With the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first term has
+    a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- rho. Of the `number` replayed
+    labels, `first` are below the piece.
+    """
+    labels, supports, total = outlines.labels[:number], outlines.supports[:, :number], 0.0
     for channel in range(past.laws.shape[0]):
         law = law_of(past.laws, channel)
+        e, tau = law.closing_speed, time_to_go(0.5 * (near + far), past.log.elapsed, law)
+        for k in range(max(first - 2, 0), min(first + 2, number)):
+            points, count = outlines.points[channel, k], outlines.counts[channel, k]
+            supports[0, k], supports[1, k] = support(points, count, 1.0, 0.0), support(points, count, -1.0, 0.0)
+            supports[2, k], supports[3, k] = support(points, count, tau, 1.0), support(points, count, -tau, -1.0)
+        v_max = bound_between(labels, supports[0], first, near, far, 0.0)
+        v_min = -bound_between(labels, supports[1], first, near, far, 0.0)
+        v_middle, rho = 0.5 * (v_max + v_min), 0.5 * (v_max - v_min)
+        moved, turn = later_impulses(near, far, 1.0, past, law)
+        upper = bound_between(labels, supports[2], first, near, far, v_middle / e - turn) - moved
+        moved, turn = later_impulses(near, far, -1.0, past, law)
+        lower = bound_between(labels, supports[3], first, near, far, -v_middle / e - turn) - moved
+        drift = 0.5 * law.disturbance * time_to_go(far, past.log.elapsed, law) ** 2
+        total = math.hypot(total, max(upper, lower) + rho * ((far - near) / (2.0 * e)) + drift)
+    return total
+
+
+@allocation_free
+def margin_of(outlines: Outlines, width: float, past: Past) -> float:
+    """Return the margin of a bound from one label, m, for `width` metres of labels: their relative change of range."""
+    label, margin = outlines.labels[0], 0.0
+    for channel in range(past.laws.shape[0]):
+        law = law_of(past.laws, channel)
+        points, count = outlines.points[channel, 0], outlines.counts[channel, 0]
         tau = time_to_go(label, past.log.elapsed, law)
-        count = chains.outline(replayed_section(past, channel, PROBE, label), tau, outline)
-        minimum, maximum = extremes_along(outline, count, tau)
-        spread = math.hypot(spread, 0.5 * (maximum - minimum) + 0.5 * law.disturbance * tau * tau)
-    return spread
+        size = abs(support(points, count, tau, 1.0)) + abs(support(points, count, -tau, -1.0))
+        margin += size * (SLACK + width / max(tau * law.closing_speed, 1.0))
+    return margin
+
+
+@entry
+def bound_all(leaving: Leaving, past: Past, outlines: Outlines, pieces: Records, phi: Floats) -> None:
+    """Write Phi of each engagement without the error of the speed, m; minus infinity where no label has left.
+
+    All labels that leave in a step are one piece at first, whose bound is infinite. `pieces` has room for all of them.
+    """
+    log = past.log
+    for b in range(phi.shape[0]):
+        select(past, b)
+        count, divided, reached, phi[b] = ZERO, ZERO, -np.inf, -np.inf
+        for w in range(leaving.events.shape[0]):
+            if leaving.near[w, b] <= leaving.far[w, b]:
+                piece = pieces[count]
+                piece.near, piece.far, piece.step, piece.bound = leaving.near[w, b], leaving.far[w, b], w, np.inf
+                count += 1
+        while count > 0:
+            worst = 0
+            for i in range(count):
+                if pieces[i].bound > pieces[worst].bound:
+                    worst = i
+            piece = pieces[worst]
+            near, far, step = piece.near, piece.far, piece.step
+            if piece.bound < np.inf:
+                phi[b] = piece.bound
+                divided += 1
+                if piece.bound <= TIGHT * reached or divided > MAX_DIVIDED:
+                    break
+            count -= 1
+            pieces[worst] = pieces[count]
+            until = EventLog(log.kinds, log.values, log.applies, leaving.events[step], leaving.elapsed[step])
+            window = Past(until, past.errors, past.laws, past.room, near, far)
+            living = living_part(leaving.known[step, b], window)
+            if living.exists:
+                replayed = replay_labels(living, window, outlines)
+                before, count = count, bound_pieces(living, replayed, window, outlines, pieces, count)
+                for i in range(before, count):
+                    pieces[i].step = step
+                reached = max(reached, max_exact_miss(replayed, window, outlines))
 
 
 class GuaranteedMiss:
@@ -315,96 +370,61 @@ class GuaranteedMiss:
     `speed_error` is the maximum |eta|, the relative error of the closing speed.
     """
 
-    def __init__(self, laws: tuple[SectionLaw, ...], batch: int, speed_error: float) -> None:
-        self._laws, self._law, self._speed_error = laws, laws[0], speed_error
-        self._settled = np.zeros(batch)
-        self.exists: Flags = np.zeros(batch, dtype=bool)
-        steps = self._law.label_max / (self._law.closing_speed * self._law.step)
+    def __init__(self, law: SectionLaw, batch: int, speed_error: float) -> None:
+        self._law, self._speed_error = law, speed_error
+        steps = law.label_max / (law.closing_speed * law.step)
         self._group_steps = max(1, int(steps / GROUPS))
         self._bounded_below = np.full(batch, -np.inf)
-        # Pieces whose range is not zero yet, so that impulses move them.
-        self._pending: list[tuple[Floats, Flags]] = []
-
-    @property
-    def bound_m(self) -> Floats:
-        """Phi so far, m, shape (B,); zero where no label has left."""
-        return np.maximum(self._settled, self._worst(self._pending))
+        self._leaving: list[Leaving] = []
 
     def copy(self) -> GuaranteedMiss:
         """Return an independent copy."""
-        twin = GuaranteedMiss(self._laws, len(self._settled), self._speed_error)
-        twin._settled, twin.exists = self._settled.copy(), self.exists.copy()
-        twin._bounded_below = self._bounded_below.copy()
-        twin._pending = [(pieces.copy(), real.copy()) for pieces, real in self._pending]
+        twin = GuaranteedMiss(self._law, len(self._bounded_below), self._speed_error)
+        twin._bounded_below, twin._leaving = self._bounded_below.copy(), self._leaving.copy()
         return twin
 
-    def fire(self, impulse_m_s: Floats, elapsed: int) -> None:
-        """Apply impulses, m/s, shape (C, B), to the labels that have left but not arrived."""
-        if not self._pending:
-            return
-        e = self._law.closing_speed
-        travelled = e * (self._law.step * elapsed)
-        doubt = np.stack([impulse_doubts(impulse_m_s, law) for law in self._laws])
-        still = []
-        for pieces, real in self._pending:
-            near = np.maximum(pieces[..., NEAREST] - travelled, 0.0) / e
-            far = np.maximum(pieces[..., FARTHEST] - travelled, 0.0) / e
-            if not (real & (far > 0.0)).any():
-                self._settled = np.maximum(self._settled, self._worst([(pieces, real)]))
-                continue
-            for_min, for_max = impulse_m_s - doubt, impulse_m_s + doubt
-            moves = np.stack([k[..., None] * x for k in (for_min, for_max) for x in (near, far)])
-            pieces[..., MINIMUM] -= moves.max(axis=0)
-            pieces[..., MAXIMUM] -= moves.min(axis=0)
-            still.append((pieces, real))
-        self._pending = still
-
     def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
-        """Add the bound of the living labels from `lower` to `upper` that leave in this step.
+        """Note that the living labels from `lower` to `upper`, shape (B,), m, leave in this step.
 
-        Each label is replayed from the start. Labels that leave during the following steps of a group are bounded
-        too, so that the number of replays does not grow with the number of steps.
+        Labels that leave during the following steps of a group are noted too, so that their number of windows does not
+        grow with the number of steps.
         """
         lower = np.maximum(lower, self._bounded_below)
         active = active & (lower <= upper) & (lower < self._min_label(history.elapsed + 1))
         if not active.any():
             return
         below = self._min_label(history.elapsed + self._group_steps)
-        upper = np.minimum(upper, below)
+        near, far = np.where(active, lower, np.inf), np.minimum(upper, below)
         self._bounded_below = np.where(active, below, self._bounded_below)
-        channels, batch = len(self._laws), len(active)
-        errors = history.errors_if_any
-        most = PIECES if errors is None else PIECES * MAX_LEAVING_WINDOWS
-        pieces, made = np.zeros((channels, batch, most, 4)), np.zeros(batch, dtype=np.int64)
-        bound_leaving_all(
-            active,
-            lower,
-            upper,
-            self._settled,
-            past_of(history, stack.table),
-            stack.sections,
-            Outlines(
+        slots = stack.sections.slots
+        lives = slots["living"] & (slots["label"] >= near[:, None]) & (slots["label"] <= far[:, None])
+        lives &= np.arange(slots.shape[1]) < stack.sections.used[:, None]
+        known = np.where(lives, slots["label"], -np.inf).max(axis=1)
+        events, elapsed = np.array(history.events), np.array(history.elapsed)
+        self._leaving.append(Leaving(near, far, known, events, elapsed))
+
+    def bound(self, stack: SectionStack, history: History) -> tuple[Floats, Flags]:
+        """Return Phi so far, m, and whether a label has left, both of shape (B,).
+
+        The labels that have left are replayed from the start; the impulses that followed act on them. The time is
+        linear in the number of events and in that of the steps in which labels leave.
+        """
+        batch, channels, windows = len(self._bounded_below), len(stack.laws), len(self._leaving)
+        phi = np.full(batch, -np.inf)
+        if windows:
+            outlines = Outlines(
                 np.empty(MAX_LABELS),
                 np.empty((channels, MAX_LABELS, chains.CAPACITY, 2)),
                 np.empty((channels, MAX_LABELS), dtype=np.int64),
                 np.empty((4, MAX_LABELS)),
-            ),
-            pieces,
-            made,
-        )
-        real = np.arange(most) < made[:, None]
-        if real.any():
-            self.exists |= real.any(axis=1)
-            self._pending.append((pieces, real))
+            )
+            leaving = Leaving(*(np.stack(each) for each in zip(*self._leaving, strict=True)))
+            pieces = np.recarray(PIECES * (windows + MAX_DIVIDED), PIECE)
+            bound_all(leaving, past_of(history, stack.table), outlines, pieces, phi)
+        exists = phi >= 0.0
+        factor = (1.0 + self._speed_error) * (1.0 + SLACK)
+        return np.where(exists, (phi + ROUNDING * self._law.label_max) * factor, 0.0), exists
 
     def _min_label(self, elapsed: int) -> float:
         """Return the minimum label, m, that is not below the range threshold after a number of steps."""
         return self._law.min_range + self._law.closing_speed * (self._law.step * elapsed)
-
-    def _worst(self, parts: list[tuple[Floats, Flags]]) -> Floats:
-        worst = np.zeros_like(self._settled)
-        for pieces, real in parts:
-            modulus = np.hypot.reduce(np.maximum(pieces[..., MAXIMUM], -pieces[..., MINIMUM]), axis=0)
-            modulus += ROUNDING * self._law.label_max
-            worst = np.maximum(worst, np.where(real, modulus, 0.0).max(axis=1))
-        return worst * ((1.0 + self._speed_error) * (1.0 + SLACK))

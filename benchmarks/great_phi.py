@@ -1,0 +1,182 @@
+"""Search for flights with a great Phi, and compare Phi with the maximum miss of exact sections over the same labels.
+
+    python -m benchmarks.great_phi                      # without and with the range sensor, 2000 engagements each
+    python -m benchmarks.great_phi --budget 400 --rate-error 1e-6
+
+The search is that of `infoset adversary`, with Phi in place of the miss. For the flights with the maximum Phi, the
+section of 200 labels among those that leave in each step is computed at that step, and the impulses of the flight act
+on it until its range is zero. The maximum miss of these states, (10) in docs/guarantee.md for 200 labels a step, is
+less than the supremum over all labels, which Phi bounds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.interception.scenario_file import load_scenario
+from guidance import TieRule, make_strategy
+from guidance.scripted_noise import ScriptedNoise
+from infoset import InformationSet, InitialSet, Model, RateSensor
+from infoset.engine.section_law import section_laws
+from sim import Scenario
+from sim.adversary import Objective, _Search
+from sim.draws import Draws
+from sim.engagement import Engagements, Step
+from sim.gravity import on_board_model
+from sim.planned_flights import Flown, Plans, by_axis
+from sim.scenario import of_model
+from sim.target import GivenTarget
+
+Floats = NDArray[np.float64]
+LABELS = 200
+SHOWN = 6
+
+
+class PhiSearch(_Search):
+    """The search of `infoset adversary` with Phi in place of the miss."""
+
+    def engagements(self, flown: Flown) -> Engagements:
+        """Return the flights again, at t = 0, with Phi."""
+        plans, draws = flown.plans, self._draws
+        size = len(plans)
+        position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
+        drawn = draws.execution, draws.target, draws.pointing, draws.images
+        repeated = (None if each is None else np.repeat(each, size, axis=-2) for each in drawn)
+        execution, target, pointing, images = repeated
+        tie = np.repeat(draws.tie, size, axis=-2)
+        errors = {
+            name: by_axis(flown.errors[:, row], self.scenario.sensors.get(name))
+            for row, name in enumerate(self._space.names)
+        }
+        accelerations = by_axis(flown.accelerations_m_s2) if self._space.has_accelerations else None
+        return Engagements(
+            self.scenario,
+            Draws(position_m, velocity_m_s, {}, tie, execution, target, pointing, images=images),
+            self._strategy,
+            noise=ScriptedNoise(errors),
+            target=None if accelerations is None else GivenTarget(accelerations),
+        )
+
+    def _fly(self, plans: Plans, tie: TieRule | None) -> Flown:
+        flown = super()._fly(plans, tie)
+        flight = self.engagements(flown)
+        while flight.flying:
+            flight.advance()
+        phi_m = flight.results(np.arange(len(plans))).guaranteed_miss_m
+        return replace(flown, value=np.where(np.isfinite(flown.value), phi_m.filled(-np.inf), -np.inf))
+
+    def best(self, number: int) -> list[Flown]:
+        """Return the flights with the maximum Phi found."""
+        assert self._elite is not None
+        return [self._elite.take(np.array([index])) for index in range(min(number, len(self._elite.value)))]
+
+
+class Watched:
+    """Sets of a flight in the steps in which labels leave, and its impulses."""
+
+    def __init__(self) -> None:
+        self.sets: list[tuple[int, InformationSet]] = []
+        self.impulses_m_s: list[float] = []
+
+    def observe(self, step: Step) -> None:
+        """Keep the set if labels leave after this step, and the impulse."""
+        information = step.information.copy()
+        self.impulses_m_s.append(float(step.impulse_m_s[0, 0]) if step.flying[0] else 0.0)
+        if information._state.lower_label[0] < information._min_label_next() and information._computes_phi[0]:
+            self.sets.append((step.step, information))
+
+    def max_miss_m(self, scenario: Scenario) -> float:
+        """Return the maximum miss of the states of `LABELS` sections a step, by (10)."""
+        model = on_board_model(scenario)
+        (law,) = section_laws(model)
+        maximum = 0.0
+        for step, information in self.sets:
+            state = information._state
+            nearest = state.lower_label[0]
+            farthest = min(state.upper_label[0], information._min_label_next())
+            for label in living_labels(information, nearest, farthest):
+                vertices = information.section_at(label).polygons[0].polygon()
+                if not len(vertices):
+                    continue
+                tau = label / law.closing_speed - step * law.step
+                misses = vertices[:, 1] + vertices[:, 0] * tau
+                minimum, most = misses.min(), misses.max()
+                for later, impulse in enumerate(self.impulses_m_s[step:]):
+                    left_s = max(tau - later * law.step, 0.0)
+                    doubt = abs(impulse) * law.impulse_error
+                    minimum, most = minimum - (impulse + doubt) * left_s, most - (impulse - doubt) * left_s
+                drift = 0.5 * law.disturbance * tau**2
+                maximum = max(maximum, most + drift, drift - minimum)
+        return maximum * (1.0 + model.speed_error)
+
+
+def living_labels(information: InformationSet, nearest: float, farthest: float) -> Floats:
+    """Return `LABELS` labels between the ends of the living ones, whose ends are bisected from as many labels."""
+
+    def lives(label: float) -> bool:
+        return len(information.section_at(label).polygons[0].polygon()) > 0
+
+    coarse = np.linspace(nearest, farthest, LABELS)
+    living = np.flatnonzero([lives(label) for label in coarse])
+    if not len(living):
+        return np.empty(0)
+    ends = []
+    for last, dead in ((living[0], living[0] - 1), (living[-1], living[-1] + 1)):
+        inside, outside = coarse[last], coarse[min(max(dead, 0), len(coarse) - 1)]
+        for _ in range(40):
+            middle = 0.5 * (inside + outside)
+            inside, outside = (middle, outside) if lives(middle) else (inside, middle)
+        ends.append(inside)
+    return np.linspace(ends[0], ends[1], LABELS)
+
+
+def great_flights(scenario: Scenario, budget: int, seed: int, shown: int) -> Iterator[tuple[float, float, float]]:
+    """Search, and yield Phi, the maximum miss of the exact sections and the miss of the best flights, m."""
+    search = PhiSearch(scenario, make_strategy(scenario.strategy), Objective.FIXED_TRUTH, seed, keep_set=True)
+    with ThreadPoolExecutor(1) as pool:
+        search.run(budget, pool, None)
+    for flown in search.best(shown):
+        flight, watched = search.engagements(flown), Watched()
+        while flight.flying:
+            flight.advance(watched.observe)
+        results = flight.results(np.arange(1))
+        yield float(results.guaranteed_miss_m[0]), watched.max_miss_m(search.scenario), float(results.miss_m[0])
+
+
+def guaranteed(scenario: Scenario, strategy: str) -> Scenario:
+    """Return the scenario with the guaranteed model and a strategy."""
+    model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    return replace(scenario, **of_model(model), strategy=strategy)
+
+
+def main() -> None:
+    """Search with and without the range sensor."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenario", default="asteroid-1997")
+    parser.add_argument("--budget", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--strategy", default="least-effort")
+    parser.add_argument("--rate-error", type=float, help="add a rate sensor with this error, rad/s")
+    options = parser.parse_args()
+    scenario = guaranteed(load_scenario(options.scenario), options.strategy)
+    if options.rate_error is not None:
+        scenario = replace(scenario, rate_sensor=RateSensor(scenario.set_model.step_s, options.rate_error))
+    for sensor in (None, scenario.range_sensor):
+        sys.stdout.write(f"{options.strategy}, {'without' if sensor is None else 'with'} the range sensor\n")
+        measured = replace(scenario, range_sensor=sensor)
+        for phi_m, exact_m, miss_m in great_flights(measured, options.budget, options.seed, SHOWN):
+            sys.stdout.write(
+                f"Phi {phi_m:.3f} m, exact sections {exact_m:.3f} m, ratio {phi_m / exact_m:.4f}, miss {miss_m:.3f} m\n"
+            )
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
