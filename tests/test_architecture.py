@@ -14,6 +14,7 @@ from graphlib import TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import grimp
 import pytest
@@ -100,3 +101,16 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     graph = grimp.build_graph("infoset", "guidance", "sim", "rendezvous", "experiments", cache_dir=None)
     imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
     TopologicalSorter(imports).prepare()  # raises CycleError, which names the circle
+
+
+def test_a_measured_angle_reaches_the_cut_of_a_section_in_five_functions() -> None:
+    """Each function that ARCHITECTURE.md lists calls the next one."""
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    found = re.findall(r"^\d\. `([\w.]+)` \(`([\w/]+)\.py`\)", text, flags=re.MULTILINE)
+    assert len(found) == 5
+    for (name, file), (called, _) in pairwise(found):
+        owner: Any = importlib.import_module(file.replace("/", "."))
+        for part in name.split("."):
+            owner = getattr(owner, part)
+        source = inspect.getsource(getattr(owner, "py_func", owner))
+        assert re.search(rf"\b{called.rpartition('.')[2]}\(", source), f"{name} does not call {called}"

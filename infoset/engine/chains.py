@@ -32,6 +32,8 @@ from infoset.geometry import polygon, polygon_hull
 from infoset.geometry.polygon_exact import two_product, two_sum
 
 EPSILON = float(np.finfo(np.float64).eps)
+"""One ulp of 1. A coordinate of a vertex has an error of about one ulp of its terms, V tau and m; where two of them are
+compared, 4 ulp allow for both, and for the two origins."""
 CAPACITY = 256
 """Maximum number of vertices of a section, a power of two."""
 MAX_ADDED = 4
@@ -304,7 +306,7 @@ def cut_end(chain: Chain, rings: Floats, way: int, up: float, tau: float, level:
 
 @inlined
 def cut(section: SectionView, tau: float, lower: float, upper: float) -> tuple[bool, float]:
-    """Intersect a section at time to go `tau` with the band lower <= z <= upper.
+    """Intersect a section at time to go `tau` with the band lower <= z <= upper, the heights of the levels, m.
 
     Return whether it lives, and the smaller overlap of section and band at the two borders, m: minus their distance if
     they do not intersect. If the intersection is empty, the section is unchanged. A band with `lower` above `upper` is
@@ -336,6 +338,7 @@ def find_peak(chain: Chain, rings: Floats, sign: float, magnitude: float) -> int
     first, last = chain.begin, chain.end - 1
     peak = min(max(chain.peak, first), last)
     miss = sign * read(chain, rings, peak)[1]
+    # 16 ulp, as for a cut: more than the errors of two misses.
     rounding = 16.0 * EPSILON * (abs(miss) + magnitude)
     start_at = peak
     for way in (1, -1):
@@ -499,7 +502,7 @@ def cut_misses(
     bottom, top = polygon.extremes(points, count, -tau, 1.0)
     thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
     if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * right.reach):
-        # All heights are equal to within rounding: the vertices of extreme V are the ends of both chains.
+        # All heights are equal to within the slack of a cut: the vertices of extreme V are the ends of both chains.
         bottom, top = polygon.extremes(points, count, -1.0, 0.0)
     write_chain(right, rings, points, count, bottom, top)
     write_chain(left, rings, points, count, top, bottom)

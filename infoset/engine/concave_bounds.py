@@ -9,7 +9,8 @@ from infoset.arrays import Floats
 from infoset.engine.replays import Records
 
 CERTAIN = 1e-13
-"""Labels count as dead if their overlap is certainly less than minus this number times the label."""
+"""Labels count as dead if their overlap is certainly less than minus this number times the label: the rounding error of
+an overlap is a few ulp of the terms of a height, which are less than the label."""
 
 
 @allocation_free

@@ -50,6 +50,7 @@ MAX_DIVIDED = 400
 GROUPS = 3000
 """Labels that leave within this part of a flight are bounded together, if they need several steps."""
 SLACK = 1e-9
+"""Relative enlargement of a bound; the rounding errors of supports and lines are far smaller."""
 ROUNDING = 4.0 * chains.EPSILON
 """Rounding error of a miss, relative to the maximum label: of x at the closest approach, also if z is exactly zero."""
 PIECE = np.dtype([("near", np.float64), ("far", np.float64), ("step", np.int64), ("bound", np.float64)])

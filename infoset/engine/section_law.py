@@ -15,6 +15,7 @@ from infoset.model import Interval, SetModel
 BOUND_SLACK = 1e-9
 """Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
 ROUNDING = 16.0 * sys.float_info.epsilon
+"""Enlargement of the box, in the largest values that its coordinates take: that of a cut, which is 16 ulp."""
 
 
 class SectionLaw(NamedTuple):

@@ -38,6 +38,8 @@ from infoset.engine.section_life import (
 )
 
 TIE_TOLERANCE = 1e-9
+"""Misses of two vertices that differ by less than this part of the interval of misses count as equal, those of one
+edge; their rounding errors are far smaller."""
 
 MOVED, SUMMARISED, WITH_HEIGHTS = constants(3)
 """What `step_all` brings up to date: sections, and with each further value also summaries, and their columns of z."""

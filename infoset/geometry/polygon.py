@@ -21,8 +21,9 @@ from infoset._compile import compiled, inlined
 
 Points = NDArray[np.float64]
 
-# A difference of heights may be a rounding error if it is below this, relative to the products in the heights.
 ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
+"""A difference of heights may be a rounding error if it is below this, relative to the products in the heights: the
+slack of a cut."""
 
 MINIMUM = float(np.finfo(np.float64).tiny)
 

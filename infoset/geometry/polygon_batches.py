@@ -166,6 +166,7 @@ def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Fl
                 first, last = points[j if n > 2 else 0], points[(j + 1) % n if n > 2 else 1]
                 along_x, along_y = last[0] - first[0], last[1] - first[1]
                 length = math.hypot(along_x, along_y)
+                # Vertices of a tidy polygon differ, but their distance may underflow.
                 along_x, along_y = along_x / max(length, 1e-300), along_y / max(length, 1e-300)
                 x, y = (along_y, -along_x) if n > 2 else (x * along_y + y * along_x, y * along_y - x * along_x)
             normals[i, j, 0], normals[i, j, 1] = x, y

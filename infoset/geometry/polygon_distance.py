@@ -105,6 +105,7 @@ def max_disc(points: Points, count: int) -> tuple[float, float, float]:
             turn = normals[h, 0] * normals[i, 1] - normals[h, 1] * normals[i, 0]
             open_end |= turn <= 0.0
             # The tangent of half the turn, without cancellation for turns near half a revolution.
+            # 1e-300 only avoids a division by zero: the polygon is then open, and not used.
             half = turn / towards if towards > 0.5 else (2.0 - towards) / max(turn, 1e-300)
             speed[i, 0] = normals[i, 0] + half * normals[i, 1]
             speed[i, 1] = normals[i, 1] - half * normals[i, 0]

@@ -14,7 +14,9 @@ from infoset.geometry.polygon import MINIMUM, Points, append, put
 from infoset.geometry.polygon_hull import drop_repeats, sort_points
 
 _SPLIT = 134217729.0
+"""2^27 + 1, which splits a float into two halves of 26 bits."""
 _SINGLE = 4e-16
+"""A difference of two products of differences has an error of less than (3 + 16 u) u of their sizes, u = 1.1e-16."""
 
 
 @inlined
@@ -74,6 +76,7 @@ def orientation(ax: float, ay: float, bx: float, by: float, cx: float, cy: float
         return (left - right) + (left_low - right_low)
     difference, low = two_sum(left, -right)
     low += (left_low - right_low) + ((ux * vy_low + ux_low * vy) - (uy * vx_low + uy_low * vx))
+    # The neglected terms are products of two rounding errors; the margin keeps the result within a few ulp of itself.
     if abs(difference + low) > 1e-15 * (abs(left) + abs(right)):
         return difference + low
     terms = np.empty(16)

@@ -200,6 +200,7 @@ def farthest_along(side: Floats, points: Points) -> int:
     for i in range(1, len(points)):
         x, y = side[0, 0] * (points[i, 0] - points[best, 0]), side[1, 0] * (points[i, 1] - points[best, 1])
         farther = x + y
+        # The coefficients and the differences are rounded, each by half an ulp, as are the products.
         if abs(farther) <= 2e-15 * (abs(x) + abs(y)):
             made = add_products(side[0, :2], points[i, :1], 1.0, sums, 0)
             made = add_products(side[0, :2], points[best, :1], -1.0, sums, made)
