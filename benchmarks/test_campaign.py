@@ -137,7 +137,7 @@ def test_memory_does_not_grow_with_the_runs(tmp_path: Path, under: Check) -> Non
 
 
 def test_memory_of_a_real_campaign(tmp_path: Path, under: Check) -> None:
-    command = ("campaign", "--model", "paper", "--noise", NoiseKind.GAME.value, "-q", "--runs")
+    command = ("campaign", "--model", "paper", "--noise", NoiseKind.GAME.value, "-q", "--workers", 1, "--runs")
     few = peak_mb(_COMMAND, *command, 640, "--out", tmp_path / "few")
     many = peak_mb(_COMMAND, *command, FEW, "--out", tmp_path / "many")
     under(f"peak memory of {FEW} runs compared with 640", many / few, 1.2, "x")

@@ -72,16 +72,11 @@ class Flight:
     workers: Annotated[
         int | None,
         typer.Option(
-            metavar="W", min=1, max=MAX_WORKERS, help="Number of threads on this machine. Default: one per core."
-        ),
-    ] = None
-    processes: Annotated[
-        int | None,
-        typer.Option(
             metavar="W",
             min=1,
             max=MAX_WORKERS,
-            help="Number of processes on this machine, instead of threads; faster for long campaigns.",
+            help="Number of cores of this machine to use: by threads, or by processes in a long campaign. "
+            "Default: all.",
         ),
     ] = None
     dask: Annotated[

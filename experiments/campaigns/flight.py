@@ -50,7 +50,7 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
     say_warnings(warnings[: MAX_WARNINGS if campaign.cells else None], options.quiet, notes)
     with (
-        workers_of(options, partial(say, quiet=options.quiet)) as (executor, workers),
+        workers_of(options, campaign.engagements, partial(say, quiet=options.quiet)) as (executor, workers),
         progress_bar(options.quiet) as begin,
     ):
         began_s = time.perf_counter()

@@ -16,6 +16,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from experiments.campaigns import cluster
 from experiments.common.errors import InputError
 from experiments.interception.scenario_file import load_scenario, with_model
 from experiments.interception.strategies import load_strategy
@@ -108,7 +109,8 @@ def test_a_strategy_of_a_file_in_threads_and_processes(
     (tmp_path / "halved.py").write_text(OWN)
     asked = ["campaign", file, "--runs", 12, "--chunk", 4, "--strategy", "halved.py:Half", "-q"]
     assert infoset(*asked, "--out", "threads") == (0, "", "")
-    assert infoset(*asked, "--out", "processes", "--processes", 2) == (0, "", "")
+    monkeypatch.setattr(cluster, "RUNS_OF_A_PROCESS", 6)
+    assert infoset(*asked, "--out", "processes", "--workers", 2) == (0, "", "")
     assert stored_runs(Path("threads")).equals(stored_runs(Path("processes")))
     digest = hashlib.sha256(OWN.encode()).hexdigest()[:16]
     assert CampaignFolder.read(Path("threads")).manifest.strategy == f"halved.py:Half sha256:{digest}"
@@ -229,7 +231,7 @@ def test_killed_six_times_and_resumed(brief: Scenario, file: Path, tmp_path: Pat
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="this system does not list its processes")
 def test_processes_give_the_same_bits_and_end_with_their_parent(brief: Scenario, file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "runs"
-    asked = command(file, folder, 4000, "--processes", 2)
+    asked = command(file, folder, 4000, "--workers", 2)
     with subprocess.Popen(asked) as process:
         wait_for_shards(process, folder, 10)
         children = {child for child in processes() if parent(child) == process.pid}
