@@ -46,14 +46,14 @@ class InformationSet(InformationSetView):
     >>> from infoset import AngleSensor, InformationSet, SetModel, StateBox
     >>> known = StateBox(z_m=(-10e3, 10e3), x_m=(5.3e6, 6.3e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3))
     >>> sensor = AngleSensor(0.5, 0.00015, 0.00023, nominal_range_m=5.8e6)
-    >>> information = InformationSet(SetModel(58e3, 0.5, known, sensor, disturbance_m_s2=0.005, sections=3))
+    >>> information = InformationSet(SetModel(58e3, 0.5, known, sensor, disturbance_m_s2=0.005, sections=5))
     >>> information
     <InformationSet of 1 at t = 0 s>
     >>> information.measure_angle(0.0004)
     >>> information.shift(2.0)
     >>> information.predict()
-    >>> information.sections()[0].polygon
-    ConvexPolygons(shape=(), counts=6)
+    >>> information.sections()[0].polygons
+    ConvexPolygons(shape=(1,), counts=[6])
 
     Notes
     -----
