@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from infoset._compile import compiled, inlined
-from infoset.geometry.polygon import ROUNDING, Points, append, close, cross, extremes, put, unsigned
+from infoset.geometry.polygon import ROUNDING, Points, append, close, copy, cross, extremes, put, unsigned
 from infoset.geometry.polygon_hull import hull
 
 
@@ -54,92 +54,13 @@ def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
 
 @compiled
 def add_segment_carefully(points: Points, count: int, half_x: float, half_y: float) -> int:
-    """Minkowski sum, in place, with a segment, for all sets: thin ones, points, edges along the segment. O(count).
-
-    Heights are relative to a vertex, so that their rounding errors are relative to the size of the set. If the set is
-    longer along the segment than across it, rounding does not affect which vertices are first and last along the
-    segment: the lowest vertex is searched between the first and the last, and the highest between the last and the
-    first. Otherwise rounding does not affect which vertices are lowest and highest.
-    """
-    source = points[:count].copy()
-    scale = max(abs(half_x), abs(half_y))
-    x = half_x / scale
-    y = half_y / scale
-    origin_x = points[0, 0]
-    origin_y = points[0, 1]
-    bottom = top = hind = fore = 0
-    lowest = highest = minimum = maximum = 0.0
-    for i in range(1, count):
-        from_x = points[i, 0] - origin_x
-        from_y = points[i, 1] - origin_y
-        height = cross(x, y, from_x, from_y)
-        along = x * from_x + y * from_y
-        if height < lowest:
-            lowest = height
-            bottom = i
-        if height > highest:
-            highest = height
-            top = i
-        if along < minimum:
-            minimum = along
-            hind = i
-        if along > maximum:
-            maximum = along
-            fore = i
-    if maximum - minimum > highest - lowest:
-        bottom_first, bottom_last = lowest_between(points, count, hind, fore, x, y)
-        top_first, top_last = lowest_between(points, count, fore, hind, -x, -y)
-    else:
-        bottom_first, bottom_last = level_stretch(points, count, bottom, x, y)
-        top_first, top_last = level_stretch(points, count, top, x, y)
-    made = append_moved(source, count, bottom_last, top_first, half_x, half_y, points, 0)
-    made = append_moved(source, count, top_last, bottom_first, -half_x, -half_y, points, made)
-    return close(points, made)
-
-
-@compiled
-def lowest_between(points: Points, count: int, first: int, last: int, x: float, y: float) -> tuple[int, int]:
-    """First and last of the lowest vertices across (x, y) between two vertices, counter-clockwise."""
-    lowest = 0.0
-    lowest_first = lowest_last = first
-    i = first
-    while i != last:
-        i = i + 1 if i + 1 < count else 0
-        height = cross(x, y, points[i, 0] - points[first, 0], points[i, 1] - points[first, 1])
-        if height < lowest:
-            lowest = height
-            lowest_first = lowest_last = i
-        elif height == lowest:
-            lowest_last = i
-    return lowest_first, lowest_last
-
-
-@compiled
-def level_stretch(points: Points, count: int, i: int, x: float, y: float) -> tuple[int, int]:
-    """First and last of the vertices next to vertex i that have exactly its height across (x, y)."""
-    first = last = i
-    for _ in range(count - 1):
-        before = first - 1 if first > 0 else count - 1
-        if cross(x, y, points[before, 0] - points[i, 0], points[before, 1] - points[i, 1]) != 0.0:
-            break
-        first = before
-    for _ in range(count - 1):
-        after = last + 1 if last + 1 < count else 0
-        if cross(x, y, points[after, 0] - points[i, 0], points[after, 1] - points[i, 1]) != 0.0:
-            break
-        last = after
-    return first, last
-
-
-@compiled
-def append_moved(points: Points, count: int, first: int, last: int, x: float, y: float, out: Points, made: int) -> int:
-    """Append the vertices from first to last, counter-clockwise, moved by (x, y); return the new count."""
-    i = first
-    while True:
-        made = append(out, made, points[i, 0] + x, points[i, 1] + y)
-        if i == last:
-            return made
-        i = i + 1 if i + 1 < count else 0
+    """Minkowski sum, in place, with a segment, for all sets: thin ones, points, edges along the segment. O(count)."""
+    segment, out = np.empty((2, 2)), np.empty((count + 2, 2))
+    put(segment, 0, -half_x, -half_y)
+    put(segment, 1, half_x, half_y)
+    made = add_polygon(points, count, segment, 2, out)
+    copy(out, made, points)
+    return made
 
 
 @compiled
