@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
 from typing import Annotated
 
@@ -13,6 +14,7 @@ import numpy as np
 from infoset.arrays import Floats
 from infoset.limits import POSITIVE, WHOLE, NotNegative, Part, Positive, check_fields
 
+MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 STEP_TOLERANCE = 1e-9
 """Part of a step by which a time may be after a step and still belong to it, for times that are rounded decimals."""
 
@@ -120,7 +122,7 @@ class Thruster:
         size, limit = modulus(wanted_m_s), np.minimum(self.max_impulse_m_s, budget_left_m_s)
         given, over = wanted_m_s, size > limit
         if over.any():
-            given = np.where(over, wanted_m_s / np.where(over, size, 1.0) * limit, wanted_m_s)
+            given = np.where(over, wanted_m_s / np.maximum(size, MIN_FLOAT) * limit, wanted_m_s)
             # Rounding must not make the modulus greater than the limit.
             while (above := modulus(given) > limit).any():
                 given = np.where(above, np.nextafter(given, 0.0), given)
@@ -148,4 +150,4 @@ class Thruster:
 
 def modulus(lateral: Floats) -> Floats:
     """Return the moduli, shape (B,), of lateral values of shape (C, B)."""
-    return np.asarray(np.hypot.reduce(np.abs(lateral)))
+    return reduce(np.hypot, np.abs(lateral))

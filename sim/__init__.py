@@ -6,7 +6,7 @@ from sim.bound.lower_bound import LowerBound, lower_bound
 from sim.campaign import Campaign
 from sim.closed_form import possible_miss_of
 from sim.parallel import CampaignNoise
-from sim.record import Inconsistency, Record, StepRecord, fly_one
+from sim.record import Inconsistency, Record, fly_one
 from sim.requirement import HitRequirement, Requirement
 from sim.results import Outcome, Results
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
@@ -43,7 +43,6 @@ __all__ = [
     "Requirement",
     "Results",
     "Scenario",
-    "StepRecord",
     "StoppingRule",
     "Sun",
     "Target",

@@ -21,7 +21,7 @@ from guidance import (
 from guidance.least_effort import LeastEffort
 from guidance.noise import checked_measurements
 from guidance.strategy import checked_impulses
-from guidance.thruster import modulus
+from guidance.thruster import MIN_FLOAT, modulus
 from infoset import BearingSensor, InformationSet, InformationSetView, PredictedMiss
 from infoset.arrays import Flags, Floats
 from infoset.sensors import Measurements
@@ -37,7 +37,6 @@ from sim.target import TargetMotion, acceleration_m_s2, constant_side
 from sim.theorem_8 import Theorem8, has_theorem_8
 from sim.truth_section import TruthSection
 
-MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 Pending = tuple[tuple[float, Floats], ...]
 """Impulses that are decided and not given yet: times from now, s, and impulses, m/s."""
 

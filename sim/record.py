@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from guidance import MeasurementNoise, Strategy
 from infoset import Section
-from infoset.arrays import Floats
+from infoset.arrays import Flags, Floats
 from infoset.limits import WHOLE
 from infoset.sensors import Measurements
 from sim.draws import draw
@@ -18,37 +19,6 @@ from sim.results import Results, ending
 from sim.scenario import Scenario, strategy_name, with_strategy
 from sim.target import TargetMotion
 from sim.versions import versions
-
-
-@dataclass(frozen=True, eq=False)
-class StepRecord:
-    """One step of one engagement, with values along the C lateral axes of its scenario.
-
-    Parameters
-    ----------
-    measured : mapping of str to ndarray
-        Values measured in this step by sensor: "angle" (rad) and "rate" (rad/s), shape (C,), "range" (m), shape ().
-    true_angle_rad, true_rate_rad_s : ndarray, shape (C,)
-        True line of sight in the plane of x and each axis.
-    impulse_m_s : ndarray, shape (C,)
-        Impulse of the thruster, before errors of execution.
-    predicted_miss_m : ndarray, shape (C, 2), or None
-        (pi_*, pi^*) after the measurement and before the impulse; None without a set.
-    truth_margin_m : float or None
-        Signed margin of the true state in its section at the last measurement; None before the first.
-    sections : tuple of Section
-        Sections after the measurement, in ascending order of range.
-    """
-
-    time_s: float
-    measured: Measurements
-    true_angle_rad: Floats
-    true_rate_rad_s: Floats
-    true_range_m: float
-    impulse_m_s: Floats
-    predicted_miss_m: Floats | None
-    truth_margin_m: float | None
-    sections: tuple[Section, ...]
 
 
 @dataclass(frozen=True)
@@ -65,9 +35,11 @@ class Inconsistency:
     label_m: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Record:
-    """All steps of one engagement.
+    """One engagement, step by step: arrays have the shape (N, ...) for N steps, (N, C, ...) along C lateral axes.
+
+    NaN is an unknown value.
 
     Parameters
     ----------
@@ -75,6 +47,21 @@ class Record:
         Simulated scenario, with the noise, tie rule and range sensor of this engagement.
     seed, run : int
         Root seed and run number; the same values give the same engagement.
+    time_s, true_range_m : ndarray, shape (N,)
+        Time and true range.
+    true_angle_rad, true_rate_rad_s : ndarray, shape (N, C)
+        True line of sight in the plane of x and each axis.
+    measured : mapping of str to ndarray
+        Measured values by sensor: "angle" (rad) and "rate" (rad/s), shape (N, C), "range" (m), shape (N,). NaN where
+        the sensor did not measure.
+    predicted_miss_m : ndarray, shape (N, C, 2)
+        (pi_*, pi^*) after the measurement and before the impulse; NaN without a set.
+    impulse_m_s : ndarray, shape (N, C)
+        Impulses of the thruster, before errors of execution.
+    truth_margin_m : ndarray, shape (N,)
+        Signed margin of the true state in its section at the last measurement; NaN before the first.
+    sections : tuple of tuple of Section
+        Sections after the measurement of each step, in ascending order of range.
     noise : str or None
         Name of the noise that replaced that of the scenario; None if none did.
     inconsistency : Inconsistency or None
@@ -88,10 +75,28 @@ class Record:
     run: int
     strategy: str
     result: Results
-    steps: tuple[StepRecord, ...]
+    time_s: Floats
+    true_range_m: Floats
+    true_angle_rad: Floats
+    true_rate_rad_s: Floats
+    measured: Measurements
+    predicted_miss_m: Floats
+    impulse_m_s: Floats
+    truth_margin_m: Floats
+    sections: tuple[tuple[Section, ...], ...]
     noise: str | None = None
     inconsistency: Inconsistency | None = None
     versions: Mapping[str, str] = field(default_factory=versions)
+
+    @property
+    def steps(self) -> int:
+        """Number of steps N."""
+        return len(self.time_s)
+
+    def measures(self, sensor: str) -> Flags:
+        """Return the steps in which a sensor measured, shape (N,)."""
+        values = self.measured.get(sensor, np.full(self.steps, np.nan))
+        return np.asarray(~np.isnan(values.reshape(self.steps, -1)).any(axis=1))
 
     @property
     def noise_name(self) -> str:
@@ -108,7 +113,7 @@ class Record:
         inside = "inside" if result.truth_kept[0] else "not inside"
         return (
             f"<engagement of {self.scenario.name}, seed {self.seed}, run {self.run}: {self.strategy}, "
-            f"{self.noise_name} noise, {len(self.steps)} steps\n {self.ending}, "
+            f"{self.noise_name} noise, {self.steps} steps\n {self.ending}, "
             f"miss {result.miss_m[0]:.4g} m for {result.impulse_m_s[0]:.4g} m/s, "
             f"true state {inside} its section at every step>"
         )
@@ -152,23 +157,29 @@ def fly_one(
     scenario, own_strategy = with_strategy(scenario, strategy)
     draws = draw(scenario, [run], seed)
     flight = Engagements(scenario, draws, own_strategy, noise=noise, target=target)
-    recorded: list[StepRecord] = []
+    sensors = scenario.sensors
+    rows: list[dict[str, Any]] = []
+    measured: dict[str, list[Floats]] = {name: [] for name in sensors}
+    sections: list[tuple[Section, ...]] = []
+    shapes = {name: (len(scenario.set_model.axes),) if sensor.is_lateral else () for name, sensor in sensors.items()}
 
     def record(step: Step) -> None:
         miss = step.predicted_miss
-        recorded.append(
-            StepRecord(
-                time_s=step.time_s,
-                measured={name: values[..., 0] for name, values in step.measured.items()},
-                true_angle_rad=step.sight.alpha_rad[:, 0],
-                true_rate_rad_s=step.sight.omega_rad_s[:, 0],
-                true_range_m=float(step.sight.range_m[0]),
-                impulse_m_s=step.impulse_m_s[:, 0],
-                predicted_miss_m=np.stack([miss.lower_m, miss.upper_m], axis=-1)[:, 0] if miss.exists[0] else None,
-                truth_margin_m=None,
-                sections=tuple(step.information.sections()),
-            )
+        interval = np.stack([miss.lower_m, miss.upper_m], axis=-1)[:, 0]
+        rows.append(
+            {
+                "time_s": np.float64(step.time_s),
+                "true_range_m": step.sight.range_m[0],
+                "true_angle_rad": step.sight.alpha_rad[:, 0],
+                "true_rate_rad_s": step.sight.omega_rad_s[:, 0],
+                "predicted_miss_m": np.where(miss.exists[0], interval, np.nan),
+                "impulse_m_s": step.impulse_m_s[:, 0],
+            }
         )
+        for name, shape in shapes.items():
+            values = step.measured.get(name)
+            measured[name].append(np.full(shape, np.nan) if values is None else values[..., 0])
+        sections.append(tuple(step.information.sections()))
 
     while flight.flying:
         flight.advance(record)
@@ -178,8 +189,17 @@ def fly_one(
     own = None if noise is None else getattr(noise, "name", type(noise).__name__)
     at_step, label = flight.inconsistency
     inconsistency = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None
-    margins = flight.truth_margins_m()
-    steps = tuple(
-        replace(step, truth_margin_m=margin.tolist()[0]) for step, margin in zip(recorded, margins, strict=True)
+    columns: dict[str, Any] = {field: np.array([row[field] for row in rows]) for field in rows[0]}
+    return Record(
+        scenario,
+        seed,
+        run,
+        name,
+        flight.results(np.array([run])),
+        **columns,
+        measured={name: np.array(values) for name, values in measured.items()},
+        truth_margin_m=np.array([margin.filled(np.nan)[0] for margin in flight.truth_margins_m()]),
+        sections=tuple(sections),
+        noise=own,
+        inconsistency=inconsistency,
     )
-    return Record(scenario, seed, run, name, flight.results(np.array([run])), steps, own, inconsistency)

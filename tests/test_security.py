@@ -17,6 +17,7 @@ from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario
 from sim import Record, fly_one
 from tests.built_in import scenario_text
+from tests.records import first_steps
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 PACKAGES = {
@@ -90,7 +91,7 @@ def infoset(*arguments: object) -> int:
 @pytest.fixture(scope="module")
 def record() -> Record:
     whole = fly_one(load_scenario("asteroid-1997"), 3, seed=11)
-    return dataclasses.replace(whole, steps=whole.steps[:6])
+    return first_steps(whole, 6)
 
 
 def test_no_code_that_a_file_names_is_run(record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,10 +29,10 @@ flights = {
 
 figure, panels = plt.subplots(1, 2, figsize=(10, 4), sharey=True, layout="constrained")
 for axes, (title, record) in zip(panels, flights.items(), strict=True):
-    known = [step for step in record.steps if step.predicted_miss_m is not None]
-    times = [step.time_s for step in known]
-    lower, upper = np.array([step.predicted_miss_m[0] for step in known]).T
-    axes.fill_between(times, lower, upper, color="#c6d9ec", edgecolor="#08306b", label="predicted-miss interval")
+    lower, upper = record.predicted_miss_m[:, 0].T
+    axes.fill_between(
+        record.time_s, lower, upper, color="#c6d9ec", edgecolor="#08306b", label="predicted-miss interval"
+    )
     axes.axhline(0.0, color="#1a1a1a", linewidth=0.8)
     axes.set_yscale("symlog", linthresh=10.0)
     axes.set(title=f"{title}: miss {record.result.miss_m[0]:.1f} m", xlabel="time t, s")
@@ -47,7 +47,7 @@ plt.show()
 # and the interval shrinks late:
 
 for title, record in flights.items():
-    spent = np.abs([step.impulse_m_s for step in record.steps]).sum()
+    spent = np.abs(record.impulse_m_s).sum()
     print(f"{title}: miss {record.result.miss_m[0]:.1f} m, impulse {spent:.0f} m/s")
 
 # %%

@@ -36,14 +36,14 @@ class Clock:
     @classmethod
     def of(cls, records: Sequence[Record]) -> Clock:
         """Return the time axis for records: logarithmic for long flights, and if times before arrival are scheduled."""
-        return cls(any(len(record.steps) > MAX_STEPS or marks(record.scenario) for record in records))
+        return cls(any(record.steps > MAX_STEPS or marks(record.scenario) for record in records))
 
     def at(self, record: Record, times_s: ArrayLike | None = None) -> Floats:
         """Return the positions of times on the axis, s; None is the times of the steps.
 
         Times before the arrival are at least half a step, because a logarithmic axis has no zero.
         """
-        times = np.asarray([step.time_s for step in record.steps] if times_s is None else times_s, dtype=np.float64)
+        times = np.asarray(record.time_s if times_s is None else times_s, dtype=np.float64)
         if not self.counts_down:
             return times
         return np.maximum(record.scenario.nominal_arrival_s - times, min_to_go_s(record.scenario))
@@ -75,13 +75,13 @@ def kept_steps(record: Record) -> list[int]:
     The first and last step and image, and up to a quarter of `MAX_STEPS` impulses are among them. The others are
     evenly distributed, half over the steps and half over the logarithm of the time before arrival.
     """
-    count = len(record.steps)
+    count = record.steps
     if count <= MAX_STEPS:
         return list(range(count))
-    fired = np.flatnonzero(moduli(record))
+    fired = np.flatnonzero(record.impulse_m_s.any(axis=1))
     if len(fired) > MAX_STEPS // 4:
         fired = fired[evenly(np.arange(len(fired)), MAX_STEPS // 4)]
-    seen = np.flatnonzero(["angle" in step.measured for step in record.steps])
+    seen = np.flatnonzero(record.measures("angle"))
     kept = {0, count - 1, *fired.tolist(), *seen[[0, -1] if len(seen) else []].tolist()}
     places = -np.log(Clock(counts_down=True).at(record))
     half = (MAX_STEPS - len(kept)) // 2
@@ -108,45 +108,29 @@ def duration_text(seconds: float) -> str:
     return f"{seconds / unit:.3g} {name}"
 
 
-def along(record: Record, field: str) -> Floats:
-    """Return the values of a field of the steps along each lateral axis, shape (C, steps)."""
-    return np.stack([getattr(step, field) for step in record.steps], axis=1)
-
-
-def moduli(record: Record) -> Floats:
-    """Return the modulus of the impulse of each step, m/s, shape (steps,)."""
-    return modulus(along(record, "impulse_m_s"))
-
-
 def true_predicted_misses(record: Record) -> Floats:
-    """Return the miss of the true state without further impulses at each step, m, shape (C, steps).
+    """Return the miss of the true state without further impulses at each step, m, shape (N, C).
 
     Notes
     -----
     omega (x^2 + a^2) = V_a x - V_x a for the coordinate a of an axis, and a + V_a x / |V_x| is the miss.
     """
-    slopes, rates = np.tan(along(record, "true_angle_rad")), along(record, "true_rate_rad_s")
-    ranges = np.array([step.true_range_m for step in record.steps])
-    x_squared = ranges**2 / (1.0 + (slopes**2).sum(axis=0))
+    slopes = np.tan(record.true_angle_rad)
+    x_squared = record.true_range_m**2 / (1.0 + (slopes**2).sum(axis=1))
     speed = -float(record.result.velocity_m_s[0, -1])
-    return np.asarray(rates * x_squared * (1.0 + slopes**2) / speed)
+    return np.asarray(record.true_rate_rad_s * x_squared[:, None] * (1.0 + slopes**2) / speed)
 
 
-def possible_misses(record: Record) -> tuple[Integers, Floats]:
-    """Return the indices of steps with a complete set, and their predicted-miss intervals, m, shape (C, n, 2).
+def complete_steps(record: Record) -> Integers:
+    """Return the indices of the steps with a complete set.
 
     A set is complete until its nearest section reaches the range threshold and leaves.
     """
-    known, intervals = [], []
     model = record.scenario.set_model
     min_range_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
-    for index, step in enumerate(record.steps):
-        if step.predicted_miss_m is not None:
-            known.append(index)
-            intervals.append(step.predicted_miss_m)
-        if step.sections and step.sections[0].range_m < min_range_m:
-            break
-    return np.array(known, dtype=np.int64), np.reshape(intervals, (-1, len(model.axes), 2)).swapaxes(0, 1)
+    leaving = [bool(sections) and sections[0].range_m < min_range_m for sections in record.sections]
+    end = leaving.index(True) + 1 if True in leaving else record.steps
+    return np.flatnonzero(np.isfinite(record.predicted_miss_m[:end, 0, 0]))
 
 
 class Courses:

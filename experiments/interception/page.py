@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,19 +14,18 @@ from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
 from experiments.interception.course import (
     Clock,
-    along,
+    complete_steps,
     duration_text,
     kept_steps,
     marks,
     min_to_go_s,
-    moduli,
     outcome_title,
-    possible_misses,
     record_titles,
     true_predicted_misses,
 )
+from guidance.thruster import modulus
 from infoset import InformationSet, Section
-from infoset.arrays import Floats, Integers
+from infoset.arrays import Flags, Floats, Integers
 from infoset.sensors import SENSORS
 from sim import Record
 from sim.gravity import on_board_model
@@ -59,14 +59,13 @@ def _kept_steps_of(records: Sequence[Record]) -> list[list[int]]:
     if len({record.scenario.set_model.step_s for record in records}) > 1:
         return kept
     together = sorted(set().union(*kept))
-    return [[index for index in together if index < len(record.steps)] for record in records]
+    return [[index for index in together if index < record.steps] for record in records]
 
 
 def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
     scenario = record.scenario
-    steps = [record.steps[index] for index in kept]
     thruster, model = scenario.thruster, scenario.set_model
-    modulus_m_s = moduli(record)
+    modulus_m_s = modulus(record.impulse_m_s.T)
     stages = list(replayed(record, kept))
     states: list[tuple[Section, ...]] = []
     numbers: list[tuple[int, int, int]] = []
@@ -76,7 +75,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         states += [stages[index].measured, stages[index + 1].before]
         numbers.append((len(states) - 3, len(states) - 2, len(states) - 1))
     sections = [section for state in states for section in state]
-    thinned = f"; the page has {len(kept)} of {len(record.steps)} steps" if len(kept) < len(record.steps) else ""
+    thinned = f"; the page has {len(kept)} of {record.steps} steps" if len(kept) < record.steps else ""
     fired = np.flatnonzero(modulus_m_s)
     return {
         "title": title,
@@ -94,13 +93,15 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "max_impulse_m_s": thruster.max_impulse_m_s,
         "budget_m_s": thruster.budget_m_s,
         "radius_m": scenario.radius_m,
-        "time_s": [step.time_s for step in steps],
-        "measured_range_m": [float(step.measured["range"]) if "range" in step.measured else None for step in steps],
-        "complete_steps": int(np.searchsorted(kept, possible_misses(record)[0].max(initial=-1), side="right")),
-        "true_range_m": [step.true_range_m for step in steps],
-        "next_range_m": [record.steps[index].true_range_m for index in _next(record, kept)],
+        "time_s": record.time_s[kept].tolist(),
+        "measured_range_m": _known(record.measured["range"][kept])
+        if "range" in record.measured
+        else [None] * len(kept),
+        "complete_steps": int(np.searchsorted(kept, complete_steps(record).max(initial=-1), side="right")),
+        "true_range_m": record.true_range_m[kept].tolist(),
+        "next_range_m": record.true_range_m[_next(record, kept)].tolist(),
         "modulus_m_s": modulus_m_s[kept].tolist(),
-        "fired_s": [record.steps[index].time_s for index in fired],
+        "fired_s": record.time_s[fired].tolist(),
         "fired_modulus_m_s": modulus_m_s[fired].tolist(),
         "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(modulus_m_s), 0.0)[kept].tolist(),
         "sections": {
@@ -114,7 +115,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
                 "along": f" along {axis}" if scenario.is_spatial else "",
                 "measured_name": f"measured angle along {axis}" if scenario.is_spatial else "measured angle",
                 **_axis_data(record, number, kept),
-                "fired_m_s": along(record, "impulse_m_s")[number, fired].tolist(),
+                "fired_m_s": record.impulse_m_s[fired, number].tolist(),
                 "outlines": {
                     "predicted_miss_m": _packed(np.concatenate([stages[k].miss_m[number] for k in kept]), "<f8"),
                     **packed_outlines(
@@ -129,21 +130,17 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
 
 def _next(record: Record, kept: Sequence[int]) -> list[int]:
     """Return the steps after some steps; the last step follows itself."""
-    return [min(index + 1, len(record.steps) - 1) for index in kept]
+    return [min(index + 1, record.steps - 1) for index in kept]
 
 
 def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, object]:
     """Return what belongs to one lateral axis: the line of sight in its plane with x, impulses and predicted misses."""
-    steps, after, name = (
-        [record.steps[index] for index in kept],
-        _next(record, kept),
-        record.scenario.set_model.axes[axis],
-    )
+    name, after = record.scenario.set_model.axes[axis], _next(record, kept)
     model = on_board_model(record.scenario).axis(name)
-    misses = true_predicted_misses(record)[axis]
-    angles, rates, impulses = (
-        along(record, field)[axis] for field in ("true_angle_rad", "true_rate_rad_s", "impulse_m_s")
+    angles, rates, misses = (
+        values[:, axis] for values in (record.true_angle_rad, record.true_rate_rad_s, true_predicted_misses(record))
     )
+    unknown = np.full(record.true_angle_rad.shape, np.nan)
     return {
         "axis": name,
         "angle_error_rad": model.angle_sensor.constant_error_rad,
@@ -151,9 +148,7 @@ def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, obje
         "centroid_error_m": model.angle_sensor.centroid_error_m,
         "disturbance_m_s2": model.disturbance_m_s2,
         **{
-            f"measured_{kind.quantity}": [
-                float(step.measured[kind.name][axis]) if kind.name in step.measured else None for step in steps
-            ]
+            f"measured_{kind.quantity}": _known(record.measured.get(kind.name, unknown)[kept, axis])
             for kind in SENSORS
             if kind.is_lateral
         },
@@ -163,11 +158,15 @@ def _axis_data(record: Record, axis: int, kept: Sequence[int]) -> dict[str, obje
         "next_angle_rad": angles[after].tolist(),
         "next_rate_rad_s": rates[after].tolist(),
         "next_predicted_miss_m": misses[after].tolist(),
-        "predicted_miss_m": [
-            None if step.predicted_miss_m is None else step.predicted_miss_m[axis].tolist() for step in steps
-        ],
-        "impulse_m_s": impulses[kept].tolist(),
+        "predicted_miss_m": _known(record.predicted_miss_m[kept, axis]),
+        "impulse_m_s": record.impulse_m_s[kept, axis].tolist(),
     }
+
+
+def _known(values: Floats) -> list[Any]:
+    """Return the values of steps; None where they are not known."""
+    known: Flags = np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+    return [value if is_known else None for value, is_known in zip(values.tolist(), known, strict=True)]
 
 
 def _omega_alpha(section: Section, axis: int) -> Floats:
@@ -203,17 +202,17 @@ def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stag
     """
     scenario = record.scenario
     information = InformationSet(on_board_model(scenario))
-    wanted = set(range(len(record.steps)) if kept is None else kept)
-    empty = np.empty((len(information.axes), 0, 2))
-    for number, step in enumerate(record.steps):
+    wanted = set(range(record.steps) if kept is None else kept)
+    empty, seen = np.empty((len(information.axes), 0, 2)), {name: record.measures(name) for name in record.measured}
+    for number, recorded in enumerate(record.sections):
         before = tuple(information.sections()) if {number - 1, number} & wanted else ()
-        values = {name: step.measured[name][..., None] for name in scenario.sensors if name in step.measured}
+        values = {name: values[number, ..., None] for name, values in record.measured.items() if seen[name][number]}
         for name, sensor in scenario.sensors.items():
             if name in values:
                 sensor.cut(information, values, np.array([True]))
         if number in wanted:
             measured = tuple(information.sections())
-            if [section.label_m for section in measured] != [section.label_m for section in step.sections]:
+            if [section.label_m for section in measured] != [section.label_m for section in recorded]:
                 made = ", ".join(f"{name} {version}" for name, version in record.versions.items())
                 raise InputError(
                     f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; it was "
@@ -223,7 +222,7 @@ def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stag
             yield Stages(before, measured, intervals)
         else:
             yield Stages(before, (), empty)
-        information.shift(step.impulse_m_s[:, None])
+        information.shift(record.impulse_m_s[number, :, None])
         information.drop_below_threshold()
         information.predict()
     yield Stages(tuple(information.sections()), (), empty)

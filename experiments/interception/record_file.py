@@ -27,7 +27,7 @@ from infoset import ConvexPolygons, Section
 from infoset.limits import MAXIMUM
 from infoset.sensors import SENSORS
 from infoset.set_queries import MIN_RANGE_M
-from sim import Inconsistency, Outcome, Record, Results, Scenario, StepRecord
+from sim import Inconsistency, Outcome, Record, Results, Scenario
 from sim.columns import columns_of
 from sim.gravity import on_board_model
 from sim.storage.codec import from_json, to_json
@@ -49,7 +49,14 @@ class Member(NamedTuple):
 
 
 _MEASURED = {f"measured_{kind.quantity}": kind for kind in SENSORS}
-_OF_AXIS = ("true_angle_rad", "true_rate_rad_s", "impulse_m_s")
+_OF_STEPS = {
+    "time_s": Member(("steps",), minimum=0.0),
+    "true_range_m": Member(("steps",), minimum=0.0),
+    "truth_margin_m": Member(("steps",), nullable=True),
+    **dict.fromkeys(("true_angle_rad", "true_rate_rad_s", "impulse_m_s"), Member(("steps", "axes"))),
+    "predicted_miss_m": Member(("steps", "axes", 2), nullable=True),
+}
+"""Arrays of a record that are members as they are."""
 _RESULT = {
     f"result_{each.field}": each for each in columns_of(Results) if not each.derived and each.kind in (float, bool)
 }
@@ -58,17 +65,13 @@ _BY_AXIS = {"position_m": ("axes + 1",), "velocity_m_s": ("axes + 1",), "lateral
 _OF_HEADER = ("scenario", "versions", "seed", "run", "strategy", "noise", "inconsistency")
 MEMBERS = {
     "header": Member(("bytes",), "|u1"),
-    "time_s": Member(("steps",), minimum=0.0),
-    "true_range_m": Member(("steps",), minimum=0.0),
-    "truth_margin_m": Member(("steps",), nullable=True),
+    **_OF_STEPS,
     **{
         name: Member(("steps", "axes"), nullable=True)
         if kind.is_lateral
         else Member(("steps",), nullable=True, minimum=0.0)
         for name, kind in _MEASURED.items()
     },
-    **dict.fromkeys(_OF_AXIS, Member(("steps", "axes"))),
-    "predicted_miss_m": Member(("steps", "axes", 2), nullable=True),
     "section_offsets": Member(("steps + 1",), "<i8"),
     "section_label_m": Member(("sections",)),
     "section_range_m": Member(("sections",), minimum=MIN_RANGE_M),
@@ -140,22 +143,16 @@ def load_record(path: str | os.PathLike[str]) -> Record:
 
 
 def _to_arrays(record: Record) -> Arrays:
-    steps, axes = record.steps, record.scenario.set_model.axes
-    unknown = np.full(len(axes), np.nan)
-    sections = [section for step in steps for section in step.sections]
+    sections = [section for step in record.sections for section in step]
     polygons = [polygon.polygon() for section in sections for polygon in section.polygons]
+    unknown = np.full((record.steps, len(record.scenario.set_model.axes)), np.nan)
     arrays: dict[str, Any] = {
-        **{name: [getattr(step, name) for step in steps] for name in ("time_s", "true_range_m", "truth_margin_m")},
+        **{name: getattr(record, name) for name in _OF_STEPS},
         **{
-            name: [step.measured.get(kind.name, unknown if kind.is_lateral else np.nan) for step in steps]
+            name: record.measured.get(kind.name, unknown if kind.is_lateral else unknown[:, 0])
             for name, kind in _MEASURED.items()
         },
-        **{name: [getattr(step, name) for step in steps] for name in _OF_AXIS},
-        "predicted_miss_m": [
-            np.full((len(axes), 2), np.nan) if step.predicted_miss_m is None else step.predicted_miss_m
-            for step in steps
-        ],
-        "section_offsets": np.cumsum([0, *(len(step.sections) for step in steps)]),
+        "section_offsets": np.cumsum([0, *map(len, record.sections)]),
         "section_label_m": [section.label_m for section in sections],
         "section_range_m": [section.range_m for section in sections],
         "vertex_offsets": np.cumsum([0, *map(len, polygons)]),
@@ -165,7 +162,7 @@ def _to_arrays(record: Record) -> Arrays:
             for name, column in _RESULT.items()
         },
     }
-    return {name: np.asarray(values, dtype=MEMBERS[name].dtype) for name, values in arrays.items()}  # None is NaN
+    return {name: np.asarray(values, dtype=MEMBERS[name].dtype) for name, values in arrays.items()}
 
 
 def _read_arrays(content: bytes) -> Arrays:
@@ -231,12 +228,8 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
         )
         for index, (label_m, range_m) in enumerate(places)
     ]
-    steps = tuple(
-        _step_of(arrays, index, tuple(sections[start:end]))
-        for index, (start, end) in enumerate(pairwise(arrays["section_offsets"].tolist()))
-    )
     first = header.inconsistency
-    if first is not None and not (0 <= first.step < len(steps) and abs(first.label_m) <= MAXIMUM):
+    if first is not None and not (0 <= first.step < len(arrays["time_s"]) and abs(first.label_m) <= MAXIMUM):
         raise ValueError("inconsistency is not at a step of the record")
     fields: dict[str, Any] = {"runs": np.array([header.run]), "outcomes": (header.outcome,)}
     for name, column in _RESULT.items():
@@ -244,23 +237,10 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)
         fields[column.field] = np.ma.MaskedArray(values, mask=unknown) if column.nullable else values
     result = Results(**fields, guarantees=model.is_guaranteed)
-    return Record(**{name: getattr(header, name) for name in _OF_HEADER}, result=result, steps=steps)
-
-
-def _step_of(arrays: Arrays, index: int, sections: tuple[Section, ...]) -> StepRecord:
-    """Return one step; a value that is NaN along some axis is unknown."""
-    known: dict[str, Any] = {
-        name: None if np.isnan(arrays[name][index]).any() else arrays[name][index]
-        for name, member in MEMBERS.items()
-        if member.shape[0] == "steps"
-    }
-    margin_m = known["truth_margin_m"]
-    return StepRecord(
-        time_s=float(arrays["time_s"][index]),
-        measured={kind.name: known[name] for name, kind in _MEASURED.items() if known[name] is not None},
-        **{name: arrays[name][index] for name in _OF_AXIS},
-        true_range_m=float(arrays["true_range_m"][index]),
-        predicted_miss_m=known["predicted_miss_m"],
-        truth_margin_m=None if margin_m is None else float(margin_m),
-        sections=sections,
+    known: dict[str, Any] = {name: getattr(header, name) for name in _OF_HEADER}
+    return Record(
+        **known | {name: arrays[name] for name in _OF_STEPS},
+        result=result,
+        measured={kind.name: arrays[name] for name, kind in _MEASURED.items() if kind.name in header.scenario.sensors},
+        sections=tuple(tuple(sections[start:end]) for start, end in pairwise(arrays["section_offsets"].tolist())),
     )

@@ -19,8 +19,7 @@ Measurements = Mapping[str, Floats]
 class Geometry(Protocol):
     """True geometry of a batch of engagements, or other points with angles, rates and ranges.
 
-    Arrays of angles and rates have the shape (B,) in a plane, (2, B) along y and z in space; below, (..., B) means
-    both.
+    Arrays of angles and rates have the shape (C, B), along C lateral axes.
     """
 
     @property
@@ -33,7 +32,7 @@ class Geometry(Protocol):
 
     @property
     def range_m(self) -> Floats:
-        """Distance, m, shape (B,), or for points that differ by axis (2, B)."""
+        """Distance, m, shape (B,), or for points that differ by axis (C, B)."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ class Sensor(ABC):
     stream : int
         Its stream of random numbers: a number below 16 that no other kind and no stream of `sim.draws` has.
     is_lateral : bool
-        Whether it measures one value for each lateral axis; in space its arrays are of shape (2, B), not (B,).
+        Whether it measures one value for each lateral axis: its arrays have the shape (C, B), otherwise (B,).
     """
 
     name: ClassVar[str]
@@ -104,7 +103,7 @@ class Sensor(ABC):
 
     @abstractmethod
     def true_value(self, sight: Geometry) -> Floats:
-        """Return the measured quantity without error, shape (..., B); that of a range has shape (B,)."""
+        """Return the measured quantity without error, shape (C, B), or (B,) if it is not lateral."""
 
     @abstractmethod
     def bound(self, sight: Geometry) -> Floats | float:
@@ -118,7 +117,7 @@ class Sensor(ABC):
         ----------
         sets : Cuttable
             Sets of a batch, for example an `InformationSet`.
-        measured : mapping of str to ndarray, shape (..., B)
+        measured : mapping of str to ndarray, shape (C, B) or (B,)
             All measurements of the step (rad, m, rad/s), that of this sensor among them.
         where : ndarray of bool, shape (B,)
             Engagements that have measured.

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.interception.course import MAX_STEPS, kept_steps, possible_misses
+from experiments.interception.course import MAX_STEPS, complete_steps, kept_steps
 from experiments.interception.page import interception_page
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
@@ -43,7 +43,7 @@ def test_both_planes_show_the_sections_of_the_record(open_page: Open, page: str,
     for column, axis in enumerate(AXES):
         assert f"Sections of the set: line-of-sight rate ω and angle α along {axis}" in captions
         found = opened.page.evaluate(f"columns[{column}].sections.map((section) => section.points)")
-        sections = space[1].steps[STEP].sections
+        sections = space[1].sections[STEP]
         polygons = [section.omega_alpha[column] for section in sections]
         assert len(found) == len(polygons)
         for outline, polygon in zip(found, polygons, strict=True):
@@ -56,15 +56,13 @@ def test_the_b_plane_shows_the_predicted_misses_of_the_record(open_page: Open, p
     opened.page.evaluate(f"player.show({MEASURED})")
     panel = "engagements[0].joint[0]"
     boxes = np.array(opened.page.evaluate(f"{panel}.rectangles(MEASURED, true)"))
-    step = space[1].steps[STEP]
-    assert len(boxes) == len(step.sections)
+    assert len(boxes) == len(space[1].sections[STEP])
     bounding = [*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)]
-    ends = step.predicted_miss_m
-    assert ends is not None
+    ends = space[1].predicted_miss_m[STEP]
     assert bounding == ends.T.ravel().tolist()
     path = opened.page.evaluate(f"{panel}.path")
     assert path[STEP] == pytest.approx(ends.mean(axis=1).tolist(), rel=1e-12, abs=1e-9)
-    assert len(path) == len(space[1].steps)
+    assert len(path) == space[1].steps
     limits = opened.page.evaluate(f"[{panel}.chart.x, [{panel}.chart.low, {panel}.chart.high]]")
     factor = opened.page.evaluate(f"{panel}.unit[1]")
     for (low, high), (minimum, maximum) in zip(limits, ends, strict=True):
@@ -92,45 +90,45 @@ def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screensh
     record = long_flight
     html = interception_page([record])
     kept = kept_steps(record)
-    fired = [index for index, step in enumerate(record.steps) if step.impulse_m_s.any()]
-    assert len(record.steps) > 1000
+    fired = np.flatnonzero(record.impulse_m_s.any(axis=1)).tolist()
+    assert record.steps > 1000
     assert len(kept) <= MAX_STEPS
-    assert {0, len(record.steps) - 1, *fired} <= set(kept)
+    assert {0, record.steps - 1, *fired} <= set(kept)
     assert 1 <= len(fired) <= 4
     assert len(html.encode()) < 4_000_000
     opened = open_page(html)
     page = opened.page
     facts = page.locator("h2 ~ p").nth(1).inner_text()
-    assert facts.endswith(f"the page has {len(kept)} of {len(record.steps)} steps")
-    assert page.evaluate("DATA.records[0].fired_s") == [record.steps[index].time_s for index in fired]
+    assert facts.endswith(f"the page has {len(kept)} of {record.steps} steps")
+    assert page.evaluate("DATA.records[0].fired_s") == record.time_s[fired].tolist()
     assert page.evaluate("player.frames") == 4 * len(kept)
     for frame in (*range(0, 4 * len(kept), 97), 4 * len(kept) - 1):
         page.evaluate(f"player.show({frame})")
     number = kept.index(fired[1])
-    step, after = record.steps[fired[1]], record.steps[fired[1] + 1]
+    step, after = fired[1], fired[1] + 1
     page.evaluate(f"player.show({4 * number + 2})")
     assert opened.shown_at().endswith("before arrival), after the impulse")
     said = rows_of(opened)
-    assert numbers(said["impulse modulus"]) == pytest.approx([np.hypot(*step.impulse_m_s)], rel=SIX_DIGITS)
+    assert numbers(said["impulse modulus"]) == pytest.approx([np.hypot(*record.impulse_m_s[step])], rel=SIX_DIGITS)
     page.wait_for_timeout(50)
     page.screenshot(path=screenshots / "space-long.png", full_page=True)
     page.evaluate(f"player.show({4 * number + 3})")
     labels = page.evaluate("columns[0].sections.map(({ label }) => label)")
-    assert {section.label_m for section in after.sections} <= set(labels)
+    assert {section.label_m for section in record.sections[after]} <= set(labels)
     truth = [page.evaluate(f"columns[{k}].truth.angle") for k in (0, 1)]
-    assert truth == after.true_angle_rad.tolist()
+    assert truth == record.true_angle_rad[after].tolist()
 
 
 def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Record) -> None:
     record = long_flight
     opened = open_page(interception_page([record]))
-    steps = [record.steps[index] for index in kept_steps(record)]
-    complete, _ = possible_misses(record)
-    known = [number for number, index in enumerate(kept_steps(record)) if index in complete]
+    steps = kept_steps(record)
+    complete = complete_steps(record)
+    known = [number for number, index in enumerate(steps) if index in complete]
     kept = [steps[number] for number in known]
     assert len(kept) > 0.8 * len(steps)
     found = opened.page.evaluate("engagements[0].corridor")
-    intervals = np.array([step.predicted_miss_m for step in kept])
+    intervals = record.predicted_miss_m[kept]
     assert len(found["maximum"]) == len(steps)
     assert [number for number, value in enumerate(found["maximum"]) if value is not None] == known
     found["maximum"], found["centred"] = ([found[name][number] for number in known] for name in ("maximum", "centred"))
@@ -142,9 +140,9 @@ def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Rec
             opened.page.evaluate(f"engagements[0].projections[{number}].{name}")
             for name in ("places", "truth", "extents")
         )
-        np.testing.assert_allclose(10.0 ** -np.array(places), [step.true_range_m for step in steps])
+        np.testing.assert_allclose(10.0 ** -np.array(places), record.true_range_m[steps])
         truth, extents = ([values[number] for number in known] for values in (truth, extents))
-        heights = [[section.polygons[number].polygon()[:, 1] for section in step.sections] for step in kept]
+        heights = [[section.polygons[number].polygon()[:, 1] for section in record.sections[step]] for step in kept]
         ends = [(min(map(np.min, each)), max(map(np.max, each))) for each in heights]
         np.testing.assert_allclose(extents, ends, rtol=1e-6)
         inside = [low <= value <= high for value, (low, high) in zip(truth, ends, strict=True)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
 import zipfile
@@ -23,6 +22,7 @@ from experiments.pursuit.file import PursuitProblem, load_pursuit
 from experiments.reachability.file import Rendezvous, load_rendezvous, load_system
 from experiments.reachability.system_file import ReachableSystem
 from sim import Record, Scenario, fly_one
+from tests.records import first_steps
 
 Found = TypeVar("Found")
 
@@ -72,7 +72,7 @@ def text_files() -> Mapping[str, TextFile]:
 def small_record(scenario: str = "asteroid-1997") -> Record:
     """Return the beginning of an engagement."""
     whole = fly_one(load_scenario(scenario), 3, seed=11)
-    return dataclasses.replace(whole, steps=whole.steps[:6])
+    return first_steps(whole, 6)
 
 
 def same_records(one: Record, other: Record) -> bool:

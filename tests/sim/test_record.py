@@ -28,23 +28,22 @@ def test_the_measurement_that_empties_the_set_for_good_is_kept(brief: Scenario) 
     model = replace(brief.set_model, recovery=Recovery.NONE)
     ranging = replace(brief, **of_model(model), range_sensor=RangeSensor(model.step_s, 1e-3))
     record = fly_one(ranging, noise=RangeAlone())
-    first, later = record.steps[0], record.steps[1]
     assert record.result.outcomes == (Outcome.SET_EMPTY,)
-    assert first.measured == {"range": 10.0 * first.true_range_m}
-    assert later.measured == {}
+    assert record.measured["range"][0] == 10.0 * record.true_range_m[0]
+    assert record.measures("range").tolist()[:2] == [True, False]
+    assert not record.measures("angle").any()
 
 
 def test_a_record_in_space_has_both_axes(brief: Scenario) -> None:
     record = fly_one(in_space(brief), 2, seed=5)
     results = simulate(in_space(brief), 3, seed=5)
     assert record.result.miss_m[0] == results.miss_m[2]
-    spent = sum(np.hypot(*step.impulse_m_s) for step in record.steps)
-    assert spent == pytest.approx(float(results.impulse_m_s[2]), rel=1e-12)
-    first, (y, z, x) = record.steps[0], results.position_m[2]
-    assert first.true_angle_rad.tolist() == [np.arctan2(y, x), np.arctan2(z, x)]
-    bound = record.scenario.set_model.angle_sensor.error_bound(first.true_range_m)
-    assert (np.abs(first.measured["angle"] - first.true_angle_rad) <= bound).all()
-    assert {section.polygons.shape for section in first.sections} == {(2,)}
+    assert np.hypot(*record.impulse_m_s.T).sum() == pytest.approx(float(results.impulse_m_s[2]), rel=1e-12)
+    y, z, x = results.position_m[2]
+    assert record.true_angle_rad[0].tolist() == [np.arctan2(y, x), np.arctan2(z, x)]
+    bound = record.scenario.set_model.angle_sensor.error_bound(record.true_range_m[0])
+    assert (np.abs(record.measured["angle"][0] - record.true_angle_rad[0]) <= bound).all()
+    assert {section.polygons.shape for section in record.sections[0]} == {(2,)}
 
 
 @dataclass(frozen=True)
@@ -85,13 +84,10 @@ def test_a_new_kind_of_sensor_is_one_class(brief: Scenario, noise: NoiseKind) ->
     plain = replace(brief, noise=noise, **of_model(model))
     streaks = WithStreaks(**{field.name: getattr(plain, field.name) for field in fields(plain)})
     record = fly_one(streaks)
-    assert [("streak" in step.measured) for step in record.steps[:4]] == [True, False, True, False]
+    assert record.measures("streak")[:4].tolist() == [True, False, True, False]
     assert record.result.truth_kept.all()
     without = fly_one(plain)
-    assert record.steps[0].measured["angle"] == without.steps[0].measured["angle"]
-    width, wide = (
-        sum(np.ptp(step.predicted_miss_m) for step in flown.steps[1:9] if step.predicted_miss_m is not None)
-        for flown in (record, without)
-    )
+    assert record.measured["angle"][0] == without.measured["angle"][0]
+    width, wide = (np.nansum(np.diff(flown.predicted_miss_m[1:9])) for flown in (record, without))
     assert width < wide
     assert lower_bound(streaks).bound_m <= lower_bound(plain).bound_m

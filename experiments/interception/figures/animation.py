@@ -57,7 +57,7 @@ def animate(
         for axes, plane in zip(above, planes, strict=True):
             axes.clear()
             draw_plane(axes, plane)
-            axes.set_title(clock.text(plane.record, plane.step.time_s))
+            axes.set_title(clock.text(plane.record, float(plane.record.time_s[plane.step])))
         level_planes(above, planes)
         for line, (record, _) in zip(lines, traces, strict=True):
             line.set_xdata(clock.at(record, [time, time]))
@@ -73,7 +73,7 @@ def animate(
 
 def _frame_times(records: Sequence[Record], clock: Clock, most: int) -> Floats:
     """Return at most `most` times of steps, evenly distributed over the time axis or over the steps."""
-    times = np.unique([step.time_s for record in records for step in record.steps])
+    times = np.unique(np.concatenate([record.time_s for record in records]))
     last = max(records, key=lambda record: record.scenario.nominal_arrival_s)
     places = -np.log(clock.at(last, times)) if clock.counts_down else np.arange(len(times))
     return np.asarray(times[evenly(places, min(len(times), most))])

@@ -23,9 +23,8 @@ from experiments.common.figure_style import (
 )
 from experiments.interception.course import (
     Clock,
-    moduli,
+    complete_steps,
     outcome_title,
-    possible_misses,
     record_titles,
     true_predicted_misses,
 )
@@ -74,11 +73,11 @@ def draw_approach(records: Sequence[Record]) -> Figure:
 
 def _draw_possible(axes: Axes, record: Record) -> None:
     """Draw the possible miss, that after an impulse that centres the set, and the miss of the true state."""
-    known, misses = possible_misses(record)
-    times = Clock(counts_down=True).at(record)
-    maximum = modulus(np.abs(misses).max(axis=-1))
-    centred = modulus(0.5 * (misses[..., 1] - misses[..., 0]))
-    true = modulus(true_predicted_misses(record))
+    known = complete_steps(record)
+    misses, times = record.predicted_miss_m[known], Clock(counts_down=True).at(record)
+    maximum = modulus(np.abs(misses).max(axis=-1).T)
+    centred = modulus(0.5 * (misses[..., 1] - misses[..., 0]).T)
+    true = modulus(true_predicted_misses(record).T)
     levels = [level for level in (_guaranteed_m(record), record.scenario.radius_m) if level]
     top = max([*maximum, *true, *levels])
     bottom = max(min([*centred, *true, *levels]), _MIN_SHOWN * min([*centred, top]), 1e-6)
@@ -96,7 +95,7 @@ def _guaranteed_m(record: Record) -> float | None:
 
 
 def _draw_moduli(axes: Axes, record: Record) -> None:
-    sizes = moduli(record)
+    sizes = modulus(record.impulse_m_s.T)
     draw_impulses(axes, Clock(counts_down=True).at(record), sizes, color=IMPULSE, linewidth=0.9, label="impulse")
     if sizes.any():
         axes.set(yscale="log", ylim=(0.4 * sizes[sizes > 0.0].min(), 2.5 * sizes.max()))
@@ -105,16 +104,16 @@ def _draw_moduli(axes: Axes, record: Record) -> None:
 
 def _draw_b_plane(axes: Axes, record: Record) -> None:
     """Draw the B-plane of one engagement: the box of the last predicted misses, and the path of that of the truth."""
-    known, misses = possible_misses(record)
+    known = complete_steps(record)
     end = record.result.lateral_miss_m[0]
     guaranteed, radius = _guaranteed_m(record), record.scenario.radius_m
     sizes = [float(np.abs(end).max()), guaranteed or 0.0]
     if len(known):
-        y, z = misses[:, -1]
+        y, z = record.predicted_miss_m[known[-1]]
         sizes.append(float(np.abs([y, z]).max()))
         axes.add_patch(Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], label="last box of possible misses", **SET))
     if radius is not None and radius <= RADIUS_SHOWN * max(sizes):
         sizes.append(radius)
-    axes.plot(*true_predicted_misses(record), zorder=3.0, **_TRUE)
+    axes.plot(*true_predicted_misses(record).T, zorder=3.0, **_TRUE)
     draw_body(axes, 1.15 * max(sizes) or 1.0, guaranteed, radius)
     axes.plot(*end, zorder=4.0, label="closest approach", **_END)

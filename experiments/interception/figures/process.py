@@ -23,10 +23,10 @@ from experiments.common.figure_style import (
     plain,
     style,
 )
-from experiments.interception.course import Clock, along, outcome_title, record_titles, true_predicted_misses
+from experiments.interception.course import Clock, outcome_title, record_titles, true_predicted_misses
 from experiments.interception.figures.shared import MAX_VECTORS, count_down, draw_impulses
 from infoset import BearingSensor
-from infoset.arrays import Floats
+from infoset.arrays import Floats, Integers
 from sim import Record
 
 RANGE_SHARE = 0.1
@@ -50,7 +50,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
     if not records:
         raise ValueError("at least one record is needed")
     clock = Clock.of(records)
-    impulse_m_s = max(float(np.abs(along(record, "impulse_m_s")).max()) for record in records) or 1.0
+    impulse_m_s = max(float(np.abs(record.impulse_m_s).max()) for record in records) or 1.0
     figure = new_figure(190.0)
     parts = figure.subfigures(1, len(records), squeeze=False)[0]
     grids = []
@@ -102,29 +102,30 @@ def _name_rows(rows: Sequence[Axes], clock: Clock) -> None:
     rows[3].set_ylabel("predicted miss π, m")
 
 
-_SIGHT = {"angle": ("true_angle_rad", 1e3), "rate": ("true_rate_rad_s", 1e6)}
-"""Attribute of the true value, and the number per SI unit of the unit of its axis."""
+_SCALE = {"angle": 1e3, "rate": 1e6}
+"""Number per SI unit of the unit of its axis."""
 
 
 def _true(trace: Trace, sensor: str) -> Floats:
     """Return the true angle, mrad, or rate, µrad/s, at each step."""
-    field, scale = _SIGHT[sensor]
-    return np.asarray(scale * along(trace[0], field)[trace[1]])
+    record, axis = trace
+    values = record.true_angle_rad if sensor == "angle" else record.true_rate_rad_s
+    return np.asarray(_SCALE[sensor] * values[:, axis])
 
 
-def _measured(trace: Trace, sensor: str) -> tuple[list[int], Floats]:
+def _measured(trace: Trace, sensor: str) -> tuple[Integers, Floats]:
     """Return the steps with a measurement, and the measured angles, mrad, or rates, µrad/s."""
     record, axis = trace
-    steps = [index for index, step in enumerate(record.steps) if sensor in step.measured]
-    values = np.array([record.steps[index].measured[sensor][axis] for index in steps])
-    return steps, _SIGHT[sensor][1] * values
+    steps = np.flatnonzero(record.measures(sensor))
+    values = record.measured[sensor][steps, axis] if steps.size else np.zeros(0)
+    return steps, np.asarray(_SCALE[sensor] * values)
 
 
 def _draw_sight(axes: Axes, trace: Trace, clock: Clock, sensor: str, *, is_modulus: bool = False) -> None:
     """Draw the angle or the rate of the line of sight, or its modulus, and its measurements as dots."""
     times, change = clock.at(trace[0]), np.abs if is_modulus else np.asarray
     steps, values = _measured(trace, sensor)
-    if steps:
+    if steps.size:
         _dots(axes, times[steps], change(values), f"measured {sensor}")
     axes.plot(times, change(_true(trace, sensor)), color=TRUTH, label="true value")
 
@@ -138,8 +139,7 @@ def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
     """Draw the errors of the measured angle, µrad, in their bounds."""
     record, (steps, values) = trace[0], _measured(trace, "angle")
     times = clock.at(record)[steps]
-    ranges_m = np.array([record.steps[index].true_range_m for index in steps])
-    bounds = 1e6 * _sensor(trace).error_bound(ranges_m)
+    bounds = 1e6 * _sensor(trace).error_bound(record.true_range_m[steps])
     axes.axhline(0.0, **_ZERO)
     band: dict[str, Any] = {"facecolor": MEASURED, "alpha": 0.18, "linewidth": 0.0, "label": "bound of the angle error"}
     axes.fill_between(times, -bounds, bounds, **band)
@@ -155,7 +155,7 @@ def _sensor(trace: Trace) -> BearingSensor:
 def _level_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
     """Give axes of angle errors the same limits: logarithmic beyond the power of ten of the first bound."""
     bounds = [np.abs(axes.dataLim.intervaly).max() for axes in row]
-    firsts = [1e6 * float(_sensor(trace).error_bound(trace[0].steps[0].true_range_m)) for trace in traces]
+    firsts = [1e6 * float(_sensor(trace).error_bound(trace[0].true_range_m[0])) for trace in traces]
     maximum, first = max(bounds), 10.0 ** np.ceil(np.log10(max(firsts)))
     for axes in row:
         axes.set_yscale("symlog", linthresh=first)
@@ -179,21 +179,22 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) ->
         label = f"maximum {maximum:g} m/s, beyond the axis"
     for limit in (-maximum, maximum):
         axes.axhline(limit, label=label, **BOUND)
-    draw_impulses(axes, times, along(record, "impulse_m_s")[axis], color=IMPULSE, linewidth=0.9, label="impulse")
+    draw_impulses(axes, times, record.impulse_m_s[:, axis], color=IMPULSE, linewidth=0.9, label="impulse")
 
 
 def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
     """Draw the predicted-miss interval over time."""
     record, axis = trace
-    found = {i: step.predicted_miss_m[axis] for i, step in enumerate(record.steps) if step.predicted_miss_m is not None}
-    steps, times = [*found], clock.at(record)
-    lower, upper = np.reshape([*found.values()], (-1, 2)).T
+    times, (lower, upper) = clock.at(record), record.predicted_miss_m[:, axis].T
+    known = np.isfinite(lower)
     axes.axhline(0.0, **_ZERO)
-    axes.fill_between(times[steps], lower, upper, facecolor=SET_FILL, linewidth=0.0, label="predicted-miss interval")
+    axes.fill_between(
+        times[known], lower[known], upper[known], facecolor=SET_FILL, linewidth=0.0, label="predicted-miss interval"
+    )
     for bound in (lower, upper):
-        axes.plot(times[steps], bound, color=SET_EDGE, linewidth=0.9)
+        axes.plot(times[known], bound[known], color=SET_EDGE, linewidth=0.9)
     if clock.counts_down:
-        axes.plot(times, true_predicted_misses(record)[axis], color=TRUTH, linewidth=1.0, label="true value")
+        axes.plot(times, true_predicted_misses(record)[:, axis], color=TRUTH, linewidth=1.0, label="true value")
 
 
 def level_predicted_miss(row: Sequence[Axes]) -> None:
@@ -208,7 +209,7 @@ def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str, unit: str)
     """Give axes of a row the same limits, those of the first part of the way, and say what a curve beyond reaches."""
     values = []
     for trace in traces:
-        ranges = np.array([step.true_range_m for step in trace[0].steps])
+        ranges = trace[0].true_range_m
         shown, (steps, measured) = ranges >= RANGE_SHARE * ranges.max(), _measured(trace, sensor)
         values += [_true(trace, sensor)[shown], measured[shown[steps]]]
     far = np.concatenate(values)

@@ -18,7 +18,7 @@ from experiments.common.figure_style import HALO, INK, MEASURED, WIDTH_MM, legen
 from experiments.interception.course import Clock, evenly, record_titles
 from infoset import Section
 from infoset.arrays import Floats
-from sim import Record, StepRecord
+from sim import Record
 
 TRUTH_MARK = "true (ω, α)"
 MEASUREMENT_MARK = "measured α, drawn at the true ω"
@@ -66,7 +66,7 @@ class Plane:
     title: str
     record: Record
     axis: int
-    step: StepRecord
+    step: int
     chosen: Sequence[Section]
 
     @property
@@ -77,8 +77,7 @@ class Plane:
     @property
     def measured_rad(self) -> float | None:
         """The measured angle, if there is one."""
-        measured = self.step.measured.get("angle")
-        return None if measured is None else float(measured[self.axis])
+        return self.record.measured["angle"][self.step, self.axis] if self.record.measures("angle")[self.step] else None
 
     @property
     def outlines(self) -> list[Floats]:
@@ -90,11 +89,11 @@ def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[P
     """Return the planes of each record at its step nearest to a time, with at most so many sections."""
     planes, clock = [], Clock.of(records)
     for number, (record, name) in enumerate(zip(records, record_titles(records), strict=True)):
-        step = min(record.steps, key=lambda step: abs(step.time_s - time_s))
-        chosen = choose_sections(step.sections, sections)
+        step = int(np.abs(record.time_s - time_s).argmin())
+        chosen = choose_sections(record.sections[step], sections)
         ranges = f"{_km(chosen[0])} to {_km(chosen[-1])} km" if chosen else "no section is left"
         noise = name.removeprefix(f"({ascii_lowercase[number]}) ") if len(records) > 1 else name
-        title = plain(f"{noise},\n{clock.text(record, step.time_s)}, {ranges}")
+        title = plain(f"{noise},\n{clock.text(record, float(record.time_s[step]))}, {ranges}")
         planes += [Plane(title, record, axis, step, chosen) for axis in range(len(record.scenario.set_model.axes))]
     return planes
 
@@ -115,7 +114,8 @@ def draw_plane(axes: Axes, plane: Plane) -> None:
     colours = mpl.colormaps["Blues_r"](np.linspace(0.0, 0.55, len(plane.chosen)))
     for number, (outline, colour) in enumerate(zip(plane.outlines, colours, strict=True)):
         _draw_outline(axes, outline, colour, zorder=3.0 - 0.01 * number)
-    rate, angle = plane.step.true_rate_rad_s[plane.axis] * 1e6, plane.step.true_angle_rad[plane.axis] * 1e3
+    record, at = plane.record, (plane.step, plane.axis)
+    rate, angle = record.true_rate_rad_s[at] * 1e6, record.true_angle_rad[at] * 1e3
     if plane.measured_rad is not None:
         axes.plot(rate, plane.measured_rad * 1e3, zorder=5, label=MEASUREMENT_MARK, linestyle="none", **_SQUARE)
     axes.plot(rate, angle, zorder=6, label=TRUTH_MARK, path_effects=HALO, **_TRUTH)

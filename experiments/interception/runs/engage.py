@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
 
+import numpy as np
+
 from experiments.common.output import Cell, outcome_columns, to_csv
 from experiments.common.screen import figure_files, show
 from experiments.interception.command import Engage
@@ -22,8 +24,7 @@ from experiments.interception.scenario_file import scenario_with
 from experiments.interception.strategies import own_strategy
 from guidance import NoiseKind
 from guidance.thruster import modulus
-from infoset.sensors import SENSORS
-from sim import Record, StepRecord, fly_one
+from sim import Record, fly_one
 
 
 def run(options: Engage) -> None:
@@ -64,7 +65,7 @@ def run(options: Engage) -> None:
 
 def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
     scenario, first = record.scenario, record.inconsistency
-    contradiction = first and {"step": first.step, "time_s": record.steps[first.step].time_s, "label_m": first.label_m}
+    contradiction = first and {"step": first.step, "time_s": float(record.time_s[first.step]), "label_m": first.label_m}
     return {
         "seed": record.seed,
         "run": record.run,
@@ -88,43 +89,29 @@ def steps_csv(records: Sequence[Record]) -> str:
 
 def _step_rows(record: Record) -> list[dict[str, Cell]]:
     """Return the numbers of each step by name."""
+    unknown = np.full((record.steps, len(record.scenario.set_model.axes)), np.nan)
+    columns = {
+        "time_s": record.time_s,
+        "true_range_m": record.true_range_m,
+        "measured_range_m": record.measured.get("range", unknown[:, 0]),
+        "impulse_m_s": modulus(record.impulse_m_s.T),
+    }
+    for number, axis in enumerate(record.scenario.set_model.axes):
+        columns |= {
+            f"measured_angle_{axis}_rad": record.measured["angle"][:, number],
+            f"measured_rate_{axis}_rad_s": record.measured.get("rate", unknown)[:, number],
+            f"true_angle_{axis}_rad": record.true_angle_rad[:, number],
+            f"true_rate_{axis}_rad_s": record.true_rate_rad_s[:, number],
+            f"impulse_{axis}_m_s": record.impulse_m_s[:, number],
+            f"predicted_miss_{axis}_lower_m": record.predicted_miss_m[:, number, 0],
+            f"predicted_miss_{axis}_upper_m": record.predicted_miss_m[:, number, 1],
+        }
+    columns["truth_margin_m"] = record.truth_margin_m
     return [
         {
-            "step": number,
-            "time_s": step.time_s,
-            "true_range_m": step.true_range_m,
-            **{
-                f"measured_{kind.quantity}": float(step.measured[kind.name]) if kind.name in step.measured else None
-                for kind in SENSORS
-                if not kind.is_lateral
-            },
-            "impulse_m_s": float(modulus(step.impulse_m_s)),
-            **{
-                name: value
-                for index, axis in enumerate(record.scenario.set_model.axes)
-                for name, value in _along_axis(step, index, axis).items()
-            },
-            "truth_margin_m": step.truth_margin_m,
-            "sections": len(step.sections),
+            "step": step,
+            **{name: None if np.isnan(values[step]) else float(values[step]) for name, values in columns.items()},
+            "sections": len(record.sections[step]),
         }
-        for number, step in enumerate(record.steps)
+        for step in range(record.steps)
     ]
-
-
-def _along_axis(step: StepRecord, index: int, axis: str) -> dict[str, Cell]:
-    """Return the numbers of a step along one lateral axis by name."""
-    lower, upper = (None, None) if step.predicted_miss_m is None else step.predicted_miss_m[index].tolist()
-    return {
-        **{
-            f"measured_{kind.quantity.replace(kind.name, f'{kind.name}_{axis}')}": (
-                float(step.measured[kind.name][index]) if kind.name in step.measured else None
-            )
-            for kind in SENSORS
-            if kind.is_lateral
-        },
-        f"true_angle_{axis}_rad": float(step.true_angle_rad[index]),
-        f"true_rate_{axis}_rad_s": float(step.true_rate_rad_s[index]),
-        f"impulse_{axis}_m_s": float(step.impulse_m_s[index]),
-        f"predicted_miss_{axis}_lower_m": lower,
-        f"predicted_miss_{axis}_upper_m": upper,
-    }

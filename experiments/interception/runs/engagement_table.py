@@ -38,7 +38,7 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
             "true state inside the set\nat every step": _yes(result["truth_kept"]),
             "smallest distance from the true\nstate to the set's boundary, m": number(result["truth_margin_m"]),
             "miss within the bound Phi": _yes(result["phi_held"]),
-            "steps": str(len(record.steps)),
+            "steps": str(record.steps),
             "seed, run": f"{record.seed}, {record.run}",
             "strategy": record.strategy,
         }
@@ -62,7 +62,7 @@ def _yes(value: bool | None) -> str:
 def _outcome(record: Record) -> str:
     outcome, contradiction = record.result.outcomes[0].value, record.inconsistency
     if contradiction is not None:
-        time_s, label_km = record.steps[contradiction.step].time_s, contradiction.label_m / 1e3
+        time_s, label_km = float(record.time_s[contradiction.step]), contradiction.label_m / 1e3
         outcome = f"{outcome} at {time_s:g} s, section {label_km:.0f} km"
     return ending(outcome, record.result.hit.tolist()[0])
 

@@ -71,15 +71,14 @@ def test_process_has_four_rows_of_equal_limits_and_units(records: list[Record]) 
     limit = records[0].scenario.thruster.max_impulse_m_s
     assert low < -limit < limit < high
     for column, record in zip((figure.axes[:4], figure.axes[4:]), records, strict=True):
-        steps = record.steps
-        true = [1e3 * each.true_angle_rad[0] for each in steps]
-        np.testing.assert_allclose(points(column[0], "true value")[:, 1], true)
-        measured = [1e3 * each.measured["angle"][0] for each in steps if "angle" in each.measured]
+        np.testing.assert_allclose(points(column[0], "true value")[:, 1], 1e3 * record.true_angle_rad[:, 0])
+        measured = 1e3 * record.measured["angle"][record.measures("angle"), 0]
         np.testing.assert_allclose(points(column[0], "measured angle")[:, 1], measured)
         (bars,) = column[2].collections
         heights = np.array([np.asarray(path.vertices)[1, 1] for path in bars.get_paths()])
-        np.testing.assert_allclose(heights, np.array([each.impulse_m_s[0] for each in steps if each.impulse_m_s[0]]))
-        misses = [each.predicted_miss_m[0] for each in steps if each.predicted_miss_m is not None]
+        given, misses = record.impulse_m_s[:, 0], record.predicted_miss_m[:, 0]
+        np.testing.assert_allclose(heights, given[given != 0.0])
+        misses = misses[np.isfinite(misses[:, 0])]
         lower, upper = (data(line)[:, 1] for line in column[3].lines[1:])
         np.testing.assert_array_equal(np.stack([lower, upper], axis=1), misses)
 
@@ -89,15 +88,17 @@ def test_sets_show_truth_measurement_and_sections(records: list[Record]) -> None
     assert len(figure.axes) == 6
     assert_units(figure)
     for position, axes in enumerate(figure.axes):
-        step = records[position % 2].steps[(1, 8, 16)[position // 2]]
-        true = np.array([[step.true_rate_rad_s[0] * 1e6, step.true_angle_rad[0] * 1e3]])
+        record, step = records[position % 2], (1, 8, 16)[position // 2]
+        true = np.array([[record.true_rate_rad_s[step, 0] * 1e6, record.true_angle_rad[step, 0] * 1e3]])
         np.testing.assert_allclose(points(axes, TRUTH_MARK), true)
-        np.testing.assert_allclose(points(axes, MEASUREMENT_MARK), [[true[0, 0], step.measured["angle"][0] * 1e3]])
-        chosen = choose_sections(step.sections, 5)
+        np.testing.assert_allclose(
+            points(axes, MEASUREMENT_MARK), [[true[0, 0], record.measured["angle"][step, 0] * 1e3]]
+        )
+        chosen = choose_sections(record.sections[step], 5)
         outlines = [np.asarray(patch.get_xy()) for patch in axes.patches if isinstance(patch, Polygon)]
         for outline, section in zip(outlines, chosen, strict=True):
             np.testing.assert_allclose(outline[:-1], section.omega_alpha[0].polygon() * [1e6, 1e3])
-        name = f"({'abcdef'[position]}) {('random', 'game')[position % 2]} noise,\nt = {step.time_s:g} s"
+        name = f"({'abcdef'[position]}) {('random', 'game')[position % 2]} noise,\nt = {record.time_s[step]:g} s"
         assert axes.get_title("left") == f"{name}, {chosen[0].range_m / 1e3:.0f} to {chosen[-1].range_m / 1e3:.0f} km"
     for first, second in zip(figure.axes[::2], figure.axes[1::2], strict=True):
         assert (first.get_xlim(), first.get_ylim()) == (second.get_xlim(), second.get_ylim())
@@ -105,7 +106,7 @@ def test_sets_show_truth_measurement_and_sections(records: list[Record]) -> None
 
 
 def test_chosen_sections_keep_the_ends(records: list[Record]) -> None:
-    sections = records[0].steps[0].sections
+    sections = records[0].sections[0]
     for most in (2, 3, 5, 100):
         chosen = choose_sections(sections, most)
         assert (chosen[0], chosen[-1]) == (sections[0], sections[-1])

@@ -21,10 +21,11 @@ from experiments.interception import record_file
 from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario
 from guidance import LineOfSight, NoiseKind, Situation
-from infoset import InformationSetView, RateSensor
-from sim import Record, StepRecord, fly_one
+from infoset import InformationSetView, RateSensor, Section
+from sim import Record, fly_one
 from sim.versions import versions
 from tests.long_steps import with_long_steps
+from tests.records import first_steps
 from tests.space import in_space
 
 Arrays = dict[str, Any]
@@ -56,7 +57,7 @@ class Outlier:
 def record() -> Record:
     """The beginning of an engagement in space."""
     whole = fly_one(in_space(load_scenario("asteroid-1997")), 3, seed=11)
-    return dataclasses.replace(whole, steps=whole.steps[:6])
+    return first_steps(whole, 6)
 
 
 @pytest.fixture(scope="module")
@@ -80,18 +81,10 @@ def refused(content: bytes, tmp_path: Path) -> str:
     return message
 
 
-def assert_same_step(one: StepRecord, other: StepRecord) -> None:
-    for field in dataclasses.fields(StepRecord):
-        if field.name not in ("sections", "measured"):
-            assert np.array_equal(getattr(one, field.name), getattr(other, field.name))
-    assert {name: values.tolist() for name, values in one.measured.items()} == {
-        name: values.tolist() for name, values in other.measured.items()
-    }
-    assert len(one.sections) == len(other.sections)
-    for a, b in zip(one.sections, other.sections, strict=True):
-        assert (a.label_m, a.range_m, a.closing_speed_m_s) == (b.label_m, b.range_m, b.closing_speed_m_s)
-        assert np.array_equal(a.polygons.counts, b.polygons.counts)
-        assert np.array_equal(a.polygons.vertices, b.polygons.vertices)
+def assert_same_section(one: Section, other: Section) -> None:
+    assert (one.label_m, one.range_m, one.closing_speed_m_s) == (other.label_m, other.range_m, other.closing_speed_m_s)
+    assert np.array_equal(one.polygons.counts, other.polygons.counts)
+    assert np.array_equal(one.polygons.vertices, other.polygons.vertices)
 
 
 def assert_same(one: Record, other: Record) -> None:
@@ -104,9 +97,16 @@ def assert_same(one: Record, other: Record) -> None:
             a, b = a.filled(0.0), b.filled(0.0)
         assert np.array_equal(a, b)
         assert getattr(a, "dtype", None) == getattr(b, "dtype", None)
-    assert len(one.steps) == len(other.steps)
-    for a, b in zip(one.steps, other.steps, strict=True):
-        assert_same_step(a, b)
+    for name in ("time_s", "true_range_m", "true_angle_rad", "true_rate_rad_s", "impulse_m_s"):
+        assert np.array_equal(getattr(one, name), getattr(other, name))
+    for name in ("predicted_miss_m", "truth_margin_m"):
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
+    assert one.measured.keys() == other.measured.keys()
+    assert all(np.array_equal(one.measured[name], other.measured[name], equal_nan=True) for name in one.measured)
+    assert [*map(len, one.sections)] == [*map(len, other.sections)]
+    for mine, others in zip(one.sections, other.sections, strict=True):
+        for a, b in zip(mine, others, strict=True):
+            assert_same_section(a, b)
 
 
 def with_rates(name: str) -> Any:
@@ -141,11 +141,17 @@ def test_a_record_comes_back_bit_for_bit(name: str, tmp_path: Path) -> None:
 
 
 def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Path) -> None:
-    first = record.steps[0]
-    blank = dataclasses.replace(first, measured={}, predicted_miss_m=None, truth_margin_m=None, sections=())
+    begun = first_steps(record, 3)
     unknown = np.ma.MaskedArray([0.0], mask=[True])
     result = dataclasses.replace(record.result, guaranteed_miss_m=unknown, truth_margin_m=unknown)
-    changed = dataclasses.replace(record, steps=(blank, *record.steps[1:3]), result=result)
+    changed = dataclasses.replace(
+        begun,
+        measured={name: values * np.nan for name, values in begun.measured.items()},
+        predicted_miss_m=begun.predicted_miss_m * np.nan,
+        truth_margin_m=begun.truth_margin_m * np.nan,
+        sections=((), *begun.sections[1:]),
+        result=result,
+    )
     write_record(changed, tmp_path / "x.npz")
     assert_same(load_record(tmp_path / "x.npz"), changed)
 

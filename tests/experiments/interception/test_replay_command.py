@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from experiments.interception.record_file import write_record
 from experiments.interception.scenario_file import load_scenario
 from sim import Record, fly_one
 from tests.experiments.command_line import Command
+from tests.records import first_steps
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def file(record: Record, infoset: Command, tmp_path: Path) -> Path:
 
 
 def test_a_page_is_written_whole_and_replaced_only_when_told(file: Path, record: Record, infoset: Command) -> None:
-    record = shortened(record, 20)
+    record = first_steps(record, 20)
     file.unlink()
     write_record(record, file)
     assert infoset("replay", file, "--html", "page.html", "--quiet") == (0, "", "")
@@ -39,13 +39,8 @@ def test_a_page_is_written_whole_and_replaced_only_when_told(file: Path, record:
     assert sorted(each.name for each in file.parent.iterdir()) == ["a.npz", "page.html"]
 
 
-def shortened(record: Record, steps: int) -> Record:
-    """The first steps of an engagement."""
-    return replace(record, steps=record.steps[:steps])
-
-
 def test_an_animation_has_a_picture_a_moment(record: Record, tmp_path: Path) -> None:
-    short = shortened(record, 3)
+    short = first_steps(record, 3)
     told: list[float] = []
     file = tmp_path / "a.gif"
     file.write_bytes(animate([short, short], progress=told.append))

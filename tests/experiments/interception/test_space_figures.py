@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.common.figure_style import figure_bytes
-from experiments.interception.course import Courses, moduli, possible_misses, true_predicted_misses
+from experiments.interception.course import Courses, complete_steps, true_predicted_misses
 from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse
 from experiments.interception.figures.corridor import draw_corridor
@@ -97,19 +97,19 @@ def test_process_has_the_courses_of_both_axes(records: list[Record]) -> None:
     figure = draw_process(records)
     assert len(figure.axes) == 16
     for number, axes in enumerate(figure.axes):
-        steps, axis = records[number // 8].steps, number % 2
+        record, axis = records[number // 8], number % 2
         row = number % 8 // 2
         if row < 2:
             field, scale = (("true_angle_rad", 1e3), ("true_rate_rad_s", 1e6))[row]
-            true = [scale * getattr(step, field)[axis] for step in steps]
-            np.testing.assert_allclose(drawn(axes)["true value"][:, 1], true)
+            np.testing.assert_allclose(drawn(axes)["true value"][:, 1], scale * getattr(record, field)[:, axis])
         if row == 2:
             (bars,) = axes.collections
-            given = np.array([step.impulse_m_s[axis] for step in steps])
+            given = record.impulse_m_s[:, axis]
             heights = [np.asarray(path.vertices)[1, 1] for path in bars.get_paths()]
             np.testing.assert_allclose(heights, given[given != 0.0])
         if row == 3:
-            lower = [step.predicted_miss_m[axis, 0] for step in steps if step.predicted_miss_m is not None]
+            lower = record.predicted_miss_m[:, axis, 0]
+            lower = lower[np.isfinite(lower)]
             assert any(np.array_equal(np.asarray(line.get_ydata()), lower) for line in axes.lines)
         assert axes.get_ylim() == figure.axes[2 * row].get_ylim()
 
@@ -132,20 +132,18 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     shown = lines["miss of the true state without further impulses"]
     model = record.scenario.set_model
     near_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
-    last = next(number for number, step in enumerate(record.steps) if step.sections[0].range_m < near_m)
-    steps = record.steps[: last + 1]
-    assert 0.8 * len(record.steps) < len(steps) < len(record.steps)
-    intervals = np.array([step.predicted_miss_m for step in steps])
+    count = 1 + next(number for number, sections in enumerate(record.sections) if sections[0].range_m < near_m)
+    assert 0.8 * record.steps < count < record.steps
+    intervals = record.predicted_miss_m[:count]
     np.testing.assert_allclose(known[:, 1], np.hypot(*np.abs(intervals).max(axis=2).T))
     np.testing.assert_allclose(centred[:, 1], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
-    before = record.scenario.nominal_arrival_s - np.array([step.time_s for step in record.steps])
-    np.testing.assert_allclose(known[:, 0], np.maximum(before[: len(steps)], 0.25))
+    before = record.scenario.nominal_arrival_s - record.time_s
+    np.testing.assert_allclose(known[:, 0], np.maximum(before[:count], 0.25))
     np.testing.assert_allclose(shown[:, 0], np.maximum(before, 0.25))
-    end_step = record.steps[-1]
-    seconds = end_step.true_range_m / model.closing_speed_m_s
-    end = true_predicted_misses(record)[:, -1] - seconds * end_step.impulse_m_s
+    seconds = record.true_range_m[-1] / model.closing_speed_m_s
+    end = true_predicted_misses(record)[-1] - seconds * record.impulse_m_s[-1]
     np.testing.assert_allclose(end, record.result.lateral_miss_m[0], atol=0.01)
-    assert (shown[: len(steps), 1] < 1.001 * known[:, 1]).all()
+    assert (shown[:count, 1] < 1.001 * known[:, 1]).all()
     assert possible.get_xlim()[0] > possible.get_xlim()[1]
     assert [text.get_text() for text in possible.texts] == ["cut-off, 10 s", "last image, 4 s"]
     assert moduli.get_xlabel() == "time to go"
@@ -166,13 +164,12 @@ def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.
     assert courses.possible_m.shape == courses.impulse_m_s.shape == (3, len(courses.steps))
     for run in range(3):
         record = fly_one(scenario, run)
-        _, misses = possible_misses(record)
-        maximum = modulus(np.abs(misses).max(axis=-1))
+        maximum = modulus(np.abs(record.predicted_miss_m[complete_steps(record)]).max(axis=-1).T)
         stored = courses.possible_m[run]
         maximum = maximum[: min(len(maximum) - 1, len(stored))]
         np.testing.assert_array_equal(stored[: len(maximum)], maximum)
         assert np.isnan(stored[len(maximum) :]).all()
-        given = moduli(record)[: len(stored)]
+        given = modulus(record.impulse_m_s.T)[: len(stored)]
         np.testing.assert_allclose(courses.impulse_m_s[run, : len(given)], given, rtol=1e-12)
 
 
@@ -189,7 +186,7 @@ def test_courses_of_long_flights_keep_the_max_impulses(monkeypatch: pytest.Monke
     every = load_scenario("asteroid-1997-space")
     courses = Courses(every, 1)
     simulate(every, 1, observe=courses.observe)
-    assert courses.impulse_m_s.max() == pytest.approx(moduli(fly_one(every)).max(), rel=1e-12)
+    assert courses.impulse_m_s.max() == pytest.approx(modulus(fly_one(every).impulse_m_s.T).max(), rel=1e-12)
 
 
 def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
@@ -209,7 +206,7 @@ def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
 
 
 def test_a_long_flight_shows_the_errors_of_its_angles_within_their_bound_over_the_time_to_go() -> None:
-    scenario = load_scenario("dart-2022", ["step_s=120", "angle_sensor.period_s=120"])
+    scenario = load_scenario("dart-2022", ["step_s=120", "camera.period_s=120"])
     record = fly_one(scenario)
     panels = [
         (axes, line)
@@ -219,11 +216,10 @@ def test_a_long_flight_shows_the_errors_of_its_angles_within_their_bound_over_th
     ]
     bound = scenario.set_model.angle_sensor.error_bound
     for axis, (axes, line) in enumerate(panels):
-        steps = [step for step in record.steps if "angle" in step.measured]
-        errors = [step.measured["angle"][axis] - step.true_angle_rad[axis] for step in steps]
-        to_go_s = [scenario.nominal_arrival_s - step.time_s for step in steps]
-        assert line.get_xdata() == pytest.approx(np.array(to_go_s))
-        assert line.get_ydata() == pytest.approx(1e6 * np.array(errors), abs=1e-6)
-        distances_m = np.array([step.true_range_m for step in steps])
+        seen = record.measures("angle")
+        errors = (record.measured["angle"] - record.true_angle_rad)[seen, axis]
+        assert line.get_xdata() == pytest.approx(scenario.nominal_arrival_s - record.time_s[seen])
+        assert line.get_ydata() == pytest.approx(1e6 * errors, abs=1e-6)
+        distances_m = record.true_range_m[seen]
         assert (np.abs(line.get_ydata()) <= 1e6 * bound(distances_m) * (1.0 + 1e-9)).all()
         assert axes.get_ylabel() in ("", "error of α, µrad")
