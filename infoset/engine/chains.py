@@ -26,7 +26,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from infoset._compile import allocation_free, constants, inlined
+from infoset._compile import FALSE, allocation_free, constants, inlined
 from infoset.arrays import Floats
 from infoset.geometry import polygon, polygon_hull
 from infoset.geometry.polygon_exact import two_product, two_sum
@@ -412,8 +412,8 @@ def margin_in(section: SectionView, tau: float, v: float, z: float) -> float:
     last = vertex_from(right, rings, right.begin, tau, v, z)
     # The edge between the chains: a start rounded to absolute coordinates may be beyond the state in a section that is
     # thinner than this rounding. It is used for the distance only, which keeps the last digit of published margins.
-    nearest, _ = polygon.pass_edge(np.inf, False, rounded, last, 0.0, 0.0)
-    _, inside = polygon.pass_edge(np.inf, False, end, last, 0.0, 0.0)
+    nearest, _ = polygon.pass_edge(np.inf, FALSE, rounded, last, 0.0, 0.0)
+    _, inside = polygon.pass_edge(np.inf, FALSE, end, last, 0.0, 0.0)
     for chain in (right, left):
         for i in range(chain.begin, chain.end):
             end = vertex_from(chain, rings, i, tau, v, z)

@@ -220,7 +220,7 @@ def locate_living(
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
     # The limits, and the stored labels between them.
     slots, stored, known = sections.slots, sections.used[b], past.room.known
-    end = 1
+    end = FIRST + 1
     first = last = 0
     known[0].label = limit_below
     for s in range(stored):
