@@ -69,9 +69,10 @@ class Kernels:
         return kernel
 
     def pasted(self, function: F) -> F:
-        """Paste a small kernel into the code of those that call it, before it is compiled.
+        """Paste a kernel into the code of those that call it, before it is compiled.
 
-        For kernels that return addresses of records in a tuple, which a compiled function cannot.
+        For kernels that return addresses of records in a tuple, which a compiled function cannot, and for a large one
+        that is called in one place, which would be compiled twice.
         """
         kernel: F = JIT(inline="always", **self._inner_options)(function)
         return kernel

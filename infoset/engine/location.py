@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import allocation_free, constants, entry
+from infoset._compile import allocation_free, constants, entry, pasted
 from infoset.arrays import Flags, Floats
 from infoset.engine.chain_storage import copy_section, room_of, view_of
 from infoset.engine.chains import CAPACITY, count_of
@@ -202,7 +202,7 @@ def search_everywhere(lower: float, upper: float, past: Past, errors: Floats | N
     return False, lower
 
 
-@allocation_free
+@pasted
 def locate_living(
     b: int,
     limit_below: float,
