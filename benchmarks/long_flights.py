@@ -78,8 +78,8 @@ def of_steps(scenario: Scenario, steps: int) -> Scenario:
 
 def vertices(flight: Engagements) -> NDArray[np.int64]:
     """Return the numbers of vertices of all living sections."""
-    stack = flight._information._state.stack
-    records, living = stack.sections.chains.records.reshape(-1, 2), np.tile(stack.living.ravel(), len(stack.laws))
+    state = flight._information._state
+    records, living = state.sections.chains.records.reshape(-1, 2), np.tile(state.living.ravel(), len(state.laws))
     counts = (records["end"] - records["begin"])[: living.size]
     return np.asarray(counts.sum(axis=1)[living])
 

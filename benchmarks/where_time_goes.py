@@ -92,7 +92,7 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
     means, maximum = [], 0
     while flight.flying:
         flight.advance()
-        sections = flight._information._state.stack.sections
+        sections = flight._information._state.sections
         records = sections.chains.records.reshape(-1, 2)[sections.slots["living"].ravel()]
         if len(records):
             count = (records["end"] - records["begin"]).sum(axis=1)

@@ -7,10 +7,8 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats
 from infoset.engine import section_life, section_passes
-from infoset.engine.guaranteed_miss import GuaranteedMiss
-from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, RATE, WIDENING, History
-from infoset.engine.section_law import BOUND_SLACK, section_laws
-from infoset.engine.section_stack import SectionStack
+from infoset.engine.history import ANGLE, IMPULSE, RATE, WIDENING
+from infoset.engine.section_law import BOUND_SLACK
 from infoset.engine.set_state import SetState, SetStatus
 from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, shown
 from infoset.model import Recovery, SetModel
@@ -65,27 +63,7 @@ class InformationSet(InformationSetView):
         if not isinstance(model, SetModel):
             raise TypeError(f"model must be a SetModel: got {shown(model)}")
         COUNT.need("batch", batch)
-        minimum, maximum = model.label_limits_m
-        slots = max(model.sections, 2 * model.fewest_sections + 1)
-        labels = np.full((batch, slots), maximum)
-        labels[:, : model.sections] = (
-            np.linspace(minimum, maximum, model.sections) if model.sections > 1 else 0.5 * (minimum + maximum)
-        )
-        laws = section_laws(model)
-        has_phi = guarantee and model.is_guaranteed and model.starts_as_box
-        state = SetState(
-            model=model,
-            stack=SectionStack(laws, labels, np.full(batch, model.sections)),
-            history=History(len(laws), batch),
-            lower_label=np.full(batch, minimum),
-            upper_label=np.full(batch, maximum),
-            status=np.full(batch, SetStatus.TRACKING.value, dtype=np.int64),
-            some_left=np.zeros(batch, dtype=bool),
-            lost_step=np.full(batch, -1, dtype=np.int64),
-            lost_label=np.zeros(batch),
-            phi=GuaranteedMiss(laws[0], batch, model.speed_error) if has_phi else None,
-        )
-        super().__init__(state)
+        super().__init__(SetState(model, batch, guarantee))
 
     def guaranteed_miss(self) -> tuple[Floats, Flags]:
         """Return the guaranteed miss Phi: an upper bound of the true miss if all errors are within their bounds.
@@ -105,7 +83,7 @@ class InformationSet(InformationSetView):
         state = self._state
         if state.phi is None:
             return np.zeros(self.batch), np.zeros(self.batch, dtype=bool)
-        phi_m, exists = state.phi.bound(state.stack, state.history)
+        phi_m, exists = state.phi.bound(state.table, state.history)
         return phi_m, exists & ~self.inconsistent
 
     def view(self) -> InformationSetView:
@@ -157,21 +135,21 @@ class InformationSet(InformationSetView):
         before = state.lower_label.copy(), state.upper_label.copy()
         state.lower_label[active] = np.maximum(state.lower_label, lower)[active]
         state.upper_label[active] = np.minimum(state.upper_label, upper)[active]
-        _, removed = state.stack.keep_labels(state.lower_label, state.upper_label, active)
+        _, removed = state.keep_labels(active)
         if removed:
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, None, *before)
 
     def _min_cosine(self, measured_rad: ArrayLike | None) -> Floats:
         """Lower bound of x over the distance, shape (B,): from measured angles, or from the maximum velocity."""
-        stack, travelled = self._state.stack, self.model.closing_speed_m_s * self.time_s
+        state, travelled = self._state, self.model.closing_speed_m_s * self.time_s
         if measured_rad is not None:
             alpha, steepest = self._lateral("alpha_rad", measured_rad), np.empty((2, self.batch))
-            section_passes.steepest_all(alpha, stack.law.label_max - travelled, stack.table, steepest)
+            section_passes.steepest_all(alpha, state.law.label_max - travelled, state.table, steepest)
             return np.asarray(np.cos(steepest[0]) * np.cos(steepest[1]))
         box = self.model.bounds
         impulses = self._state.history.total_impulse() * (1.0 + self.model.execution_error_relative)
-        disturbance = float(np.hypot.reduce([law.disturbance for law in stack.laws]))
+        disturbance = float(np.hypot.reduce([law.disturbance for law in state.laws]))
         fastest = impulses + box.lateral_speed_m_s + disturbance * self.time_s
         offset = box.offset_m + fastest * self.time_s
         nearest = np.maximum((self._state.lower_label - travelled) * (1.0 - self.model.speed_error), 0.0)
@@ -191,7 +169,7 @@ class InformationSet(InformationSetView):
         state, active = self._state, self._active(where)
         event = state.history.record(ANGLE, measured, active)
         before = state.lower_label.copy(), state.upper_label.copy()
-        elapsed, sections, laws = state.history.elapsed, state.stack.sections, state.stack.table
+        elapsed, sections, laws = state.history.elapsed, state.sections, state.table
         if section_passes.step_all(active, measured, event, elapsed, section_passes.MOVED, sections, laws):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, event, *before)
@@ -218,7 +196,7 @@ class InformationSet(InformationSetView):
         error = error_rad_s * (1.0 + BOUND_SLACK)
         event = state.history.record(RATE, measured, active, error)
         before = state.lower_label.copy(), state.upper_label.copy()
-        if state.stack.measure_rate(error, state.history):
+        if state.measure_rate(error):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, event, *before)
 
@@ -233,11 +211,11 @@ class InformationSet(InformationSetView):
             Engagements with an impulse.
         """
         impulse = self._lateral("impulse_m_s", impulse_m_s)
-        state, elapsed = self._state, self._state.history.elapsed
+        state = self._state
         active = self._computes_phi & flags("where", where, (self.batch,)) & impulse.any(axis=0)
         if active.any():
             state.history.record(IMPULSE, impulse, active)
-            state.stack.shift(active, impulse, elapsed)
+            state.shift(active, impulse)
 
     def drop_below_threshold(self) -> Flags:
         """Remove the sections whose range will be below the threshold after the next step.
@@ -250,15 +228,15 @@ class InformationSet(InformationSetView):
         state, active, min_label = self._state, self.tracking, self._min_label_next()
         computes_phi = self._computes_phi
         if state.phi is not None:
-            state.phi.leave(computes_phi, state.lower_label, state.upper_label, state.stack, state.history)
+            state.phi.leave(computes_phi, state.lower_label, state.upper_label, state.sections, state.history)
         if self.model.is_guaranteed:
             # A label between the stored ones may pass the threshold. The status must not depend on whether Phi is
             # computed.
             state.some_left |= active & (state.lower_label < min_label)
         np.maximum(state.lower_label, min_label, out=state.lower_label, where=computes_phi)
-        if state.stack.min_label >= min_label:
-            return np.zeros(state.stack.labels.shape, dtype=bool)
-        left, removed = state.stack.keep_labels(state.lower_label, state.upper_label, active)
+        if state.min_label >= min_label:
+            return np.zeros(state.labels.shape, dtype=bool)
+        left, removed = state.keep_labels(active)
         if removed:
             state.some_left |= left.any(axis=1)
             self._refine_if_few(active, emptied=SetStatus.FINISHED)
@@ -267,9 +245,9 @@ class InformationSet(InformationSetView):
     def sections_are_leaving(self) -> bool:
         """Return whether `drop_below_threshold` would remove a stored section now."""
         min_label = self._min_label_next()
-        if self._state.stack.min_label >= min_label:
+        if self._state.min_label >= min_label:
             return False
-        return bool(((self._state.stack.labels < min_label) & self.living).any())
+        return bool(((self._state.labels < min_label) & self.living).any())
 
     def _min_label_next(self) -> float:
         """Minimum label, m, whose range is not below the threshold after the next step."""
@@ -281,9 +259,7 @@ class InformationSet(InformationSetView):
 
         The exact set of disturbances is a thin lens in (V, z). As in the paper, the segment between its ends is used.
         """
-        active = self.tracking
-        self._state.history.record(PREDICTION)
-        self._state.stack.predict(active, self._state.history.elapsed)
+        self._state.predict(self.tracking)
 
     @property
     def _computes_phi(self) -> Flags:
@@ -333,8 +309,8 @@ class InformationSet(InformationSetView):
             history.retract(event, empty)
         history.record(WIDENING, applies=empty)
         # The sections that this measurement emptied live again; the refinement below recomputes their polygons.
-        slots = state.stack.sections.slots
-        stored = np.arange(slots.shape[1]) < state.stack.sections.used[:, None]
+        slots = state.sections.slots
+        stored = np.arange(slots.shape[1]) < state.sections.used[:, None]
         killed = (slots["died"] == section_life.ALIVE) | (slots["died"] == (-1 if event is None else event))
         slots["living"][empty] = (stored & killed)[empty]
         state.lower_label[empty], state.upper_label[empty] = lower[empty], upper[empty]
@@ -344,7 +320,7 @@ class InformationSet(InformationSetView):
 
     def _nearest_to_living(self, b: int, event: int | None, lower: float, upper: float) -> float:
         """Label, m, whose section was closest to the band of a measurement that emptied the set."""
-        state, sections = self._state, self._state.stack.sections
+        state, sections = self._state, self._state.sections
         slots = sections.slots[b, : sections.used[b]]
         killed = slots["died"] == event
         if event is not None and killed.any():

@@ -13,7 +13,6 @@ from infoset.arrays import Flags, Floats
 from infoset.engine import section_life
 from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.engine.replays import PROBE, ROWS, past_of, replay_label
-from infoset.engine.section_stack import outline
 from infoset.engine.set_state import SetState, SetStatus
 from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, POSITIVE, WHOLE, Limits
@@ -100,7 +99,7 @@ class SetQueries:
     @property
     def batch(self) -> int:
         """Number of engagements B."""
-        return int(self._state.stack.batch)
+        return int(self._state.batch)
 
     @property
     def time_s(self) -> float:
@@ -134,26 +133,26 @@ class SetQueries:
     @property
     def living(self) -> Flags:
         """Whether each stored section lives, that is, is not empty, shape (B, S)."""
-        living = self._state.stack.living.view()
+        living = self._state.living.view()
         living.flags.writeable = False
         return living
 
     @property
     def labels_m(self) -> Floats:
         """Labels of all stored sections, m, shape (B, S)."""
-        labels = self._state.stack.labels.view()
+        labels = self._state.labels.view()
         labels.flags.writeable = False
         return labels
 
     @property
     def ranges_m(self) -> Floats:
         """Ranges of all stored sections now, m, shape (B, S)."""
-        return self._state.stack.ranges(self._state.history.elapsed)
+        return self._state.ranges
 
     @property
     def section_counts(self) -> NDArray[np.int64]:
         """Number of living sections, shape (B,)."""
-        return np.asarray(np.count_nonzero(self._state.stack.living, axis=1))
+        return np.asarray(np.count_nonzero(self._state.living, axis=1))
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
         """Return the minimum and the maximum range of the living sections, m; zeros where none lives."""
@@ -172,7 +171,7 @@ class SetQueries:
         alpha_min, alpha_max, range_of_min, range_of_max : ndarray, shape (C, B)
             rad and m; zeros where no section lives.
         """
-        minimum, maximum, of_min, of_max = self._state.stack.extreme_angles(self._state.history.elapsed)
+        minimum, maximum, of_min, of_max = self._state.extreme_angles()
         return minimum, maximum, of_min, of_max
 
     def predicted_miss(self, pending: Sequence[tuple[float, Floats]] = ()) -> PredictedMiss:
@@ -187,27 +186,23 @@ class SetQueries:
         ----------
         Kumkov and Patsko (1997), equations (13) and (14).
         """
-        exists, ends = self._state.stack.widest(self._state.history.elapsed, pending)
+        exists, ends = self._state.widest(pending)
         lower, upper = ([ends[..., end, column] for column in range(4)] for end in (0, 1))
         return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
         """Return minimum and maximum predicted miss of each section, m, each (C, B, S); zeros if it is empty."""
-        summaries, living = self._state.stack.summaries, self.living
+        summaries, living = self._state.summaries, self.living
         lower, upper = summaries[..., section_life.LOWER_MISS], summaries[..., section_life.UPPER_MISS]
         return np.where(living, lower, 0.0), np.where(living, upper, 0.0)
 
     def sections(self, engagement: int = 0) -> list[Section]:
         """Return the living sections of one engagement in order of increasing range."""
         self._need_engagement(engagement)
-        stack, elapsed = self._state.stack, self._state.history.elapsed
-        labels, ranges = stack.labels[engagement].tolist(), self.ranges_m[engagement].tolist()
+        state, axes = self._state, range(len(self.axes))
+        labels, ranges = state.labels[engagement].tolist(), self.ranges_m[engagement].tolist()
         return [
-            self._section(
-                labels[s],
-                ranges[s],
-                [stack.polygon(axis, engagement, s, elapsed) for axis in range(len(self.axes))],
-            )
+            self._section(labels[s], ranges[s], [state.polygon(axis, engagement, s) for axis in axes])
             for s in np.flatnonzero(self.living[engagement]).tolist()
         ]
 
@@ -235,14 +230,14 @@ class SetQueries:
         """
         NUMBER.need("label_m", label_m)
         self._need_engagement(engagement)
-        history, stack, label = self._state.history, self._state.stack, float(label_m)
-        past = past_of(history, stack.table)
+        state, label = self._state, float(label_m)
+        past = past_of(state.history, state.table)
         died = replay_label(label, engagement, past)
         outlines = [np.empty((0, 2)) for _ in self.axes]
         if died == section_life.ALIVE:
             rows = [ROWS * axis + PROBE for axis in range(len(self.axes))]
-            outlines = [outline(past.room.chains, row, label, history.elapsed, stack.law) for row in rows]
-        x = label - stack.law.closing_speed * (stack.law.step * history.elapsed)
+            outlines = [state.outline(past.room.chains, row, label) for row in rows]
+        x = label - state.law.closing_speed * (state.law.step * state.elapsed)
         return self._section(label, x, outlines)
 
     def _need_engagement(self, engagement: int) -> None:

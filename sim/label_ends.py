@@ -11,8 +11,7 @@ import numpy as np
 
 from infoset import SetModel
 from infoset.arrays import Flags, Floats
-from infoset.engine.section_law import section_laws
-from infoset.engine.section_stack import impulse_doubts
+from infoset.engine.section_law import impulse_doubts, section_laws
 from sim.results import Results
 
 

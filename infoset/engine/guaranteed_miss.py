@@ -33,9 +33,9 @@ from infoset.engine.replays import (
     select,
     with_window,
 )
-from infoset.engine.section_law import SectionLaw, law_of
+from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import ALIVE, across_of, impulse_doubt, range_of, time_to_go
-from infoset.engine.section_stack import SectionStack
+from infoset.engine.section_passes import Sections
 
 LABELS = 3
 """Labels replayed for one window; one more on each side serves for extrapolation."""
@@ -384,7 +384,7 @@ class GuaranteedMiss:
         twin._bounded_below, twin._leaving = self._bounded_below.copy(), self._leaving.copy()
         return twin
 
-    def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
+    def leave(self, active: Flags, lower: Floats, upper: Floats, sections: Sections, history: History) -> None:
         """Note that the living labels from `lower` to `upper`, shape (B,), m, leave in this step.
 
         Labels that leave during the following steps of a group are noted too, so that their number of windows does not
@@ -397,20 +397,20 @@ class GuaranteedMiss:
         below = self._min_label(history.elapsed + self._group_steps)
         near, far = np.where(active, lower, np.inf), np.minimum(upper, below)
         self._bounded_below = np.where(active, below, self._bounded_below)
-        slots = stack.sections.slots
+        slots = sections.slots
         lives = slots["living"] & (slots["label"] >= near[:, None]) & (slots["label"] <= far[:, None])
-        lives &= np.arange(slots.shape[1]) < stack.sections.used[:, None]
+        lives &= np.arange(slots.shape[1]) < sections.used[:, None]
         known = np.where(lives, slots["label"], -np.inf).max(axis=1)
         events, elapsed = np.array(history.events), np.array(history.elapsed)
         self._leaving.append(Leaving(near, far, known, events, elapsed))
 
-    def bound(self, stack: SectionStack, history: History) -> tuple[Floats, Flags]:
+    def bound(self, laws: Laws, history: History) -> tuple[Floats, Flags]:
         """Return Phi so far, m, and whether a label has left, both of shape (B,).
 
         The labels that have left are replayed from the start; the impulses that followed act on them. The time is
         linear in the number of events and in that of the steps in which labels leave.
         """
-        batch, channels, windows = len(self._bounded_below), len(stack.laws), len(self._leaving)
+        batch, channels, windows = len(self._bounded_below), len(laws), len(self._leaving)
         phi = np.full(batch, -np.inf)
         if windows:
             outlines = Outlines(
@@ -421,7 +421,7 @@ class GuaranteedMiss:
             )
             leaving = Leaving(*(np.stack(each) for each in zip(*self._leaving, strict=True)))
             pieces = np.recarray(PIECES * (windows + MAX_DIVIDED), PIECE)
-            bound_all(leaving, past_of(history, stack.table), outlines, pieces, phi)
+            bound_all(leaving, past_of(history, laws), outlines, pieces, phi)
         exists = phi >= 0.0
         factor = (1.0 + self._speed_error) * (1.0 + SLACK)
         return np.where(exists, (phi + ROUNDING * self._law.label_max) * factor, 0.0), exists

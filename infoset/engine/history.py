@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -141,10 +142,8 @@ class History:
 
     def copy(self) -> History:
         """Return an independent copy."""
-        twin = History.__new__(History)
-        twin.kinds, twin.errors = self.kinds.copy(), self.errors.copy()
-        twin.values, twin.applies = self.values.copy(), self.applies.copy()
-        twin.events, twin.elapsed = self.events, self.elapsed
-        twin.sights, twin.seen = self.sights.copy(), self.seen
-        twin._has_rates, twin._fired, twin._summed = self._has_rates, self._fired, self._summed
+        twin = copy.copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                setattr(twin, name, value.copy())
         return twin

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset._compile import inlined, record_of
+from infoset.arrays import Floats
 from infoset.model import Interval, SetModel
 
 BOUND_SLACK = 1e-9
@@ -126,6 +127,15 @@ def law_of(laws: Laws, channel: int) -> SectionLaw:
     """Return the constants of one axis from the array of all."""
     law: SectionLaw = laws[np.uint64(channel)]
     return law
+
+
+def impulse_doubts(impulse: Floats, law: SectionLaw) -> Floats:
+    """Return the error bounds of impulses of shape (C, B) along an axis, m/s, shape (B,), as `impulse_doubt` does."""
+    along = np.abs(impulse[law.channel])
+    if law.pointing_across == 0.0:
+        return np.asarray(law.impulse_error * along)
+    size = np.hypot.reduce(impulse, axis=0)
+    return np.asarray(law.impulse_error * along + (law.pointing_along * along + law.pointing_across * size))
 
 
 def _law(model: SetModel) -> SectionLaw:
