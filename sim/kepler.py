@@ -159,8 +159,7 @@ class KeplerMotion:
             self._manoeuvre = np.ascontiguousarray(manoeuvre_m_s2.T)
             accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
         batch, _, axes, _ = self._motion.shape
-        passed = np.zeros(batch, dtype=bool)
-        arrival, closest = np.zeros(batch), np.zeros((axes, batch))
+        passage = passed, arrival, closest = np.zeros(batch, dtype=bool), np.zeros(batch), np.zeros((axes, batch))
         advance_all(
             self._motion,
             self._manoeuvre,
@@ -168,9 +167,7 @@ class KeplerMotion:
             self._acceleration_error,
             float(step_s),
             self._scratch,
-            passed,
-            arrival,
-            closest,
+            passage,
         )
         minimum = np.where(passed, np.hypot.reduce(closest), np.inf)
         return Passage(passed, minimum, arrival, closest[:X])
@@ -378,16 +375,16 @@ def advance_all(
     acceleration_error_m_s2: Floats,
     step_s: float,
     scratch: Floats,
-    passed: Flags,
-    arrival_s: Floats,
-    closest_m: Floats,
+    passage: tuple[Flags, Floats, Floats],
 ) -> None:
     """Advance all states by a step, and write the closest approaches within it: see `Passage`.
 
     The length of a leap depends on the state of the engagement alone, so a run does not depend on the others of its
-    batch. `closest_m`, shape (A + 1, B), are the relative positions at the closest approach.
+    batch. `passage` is whether the closest approach is within the step, the time of arrival, s, and the relative
+    positions at the closest approach, m, shape (A + 1, B).
     """
     before, trial, stage = scratch[0], scratch[1], scratch[2]
+    passed, arrival_s, closest_m = passage
     for b in range(len(motion)):
         state, manoeuvre, error = motion[b], manoeuvre_m_s2[b], acceleration_error_m_s2[b]
         left = step_s

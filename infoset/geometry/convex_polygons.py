@@ -90,8 +90,8 @@ class ConvexPolygons(PolygonArrays):
         if not np.logical_or.reduce(normals, axis=-1).all():
             raise ValueError("the normal of a strip must not be zero")
         not_negative("slack_ulp", slack_ulp)
-        bounds = self._scalars(lower, "lower"), self._scalars(upper, "upper")
-        return self._make(2, kernels.cut, normals, *bounds, float(slack_ulp))
+        bounds = np.stack([self._scalars(lower, "lower"), self._scalars(upper, "upper")], axis=-1)
+        return self._make(2, kernels.cut, normals, bounds, float(slack_ulp))
 
     def linear_map(self, matrix: ArrayLike) -> ConvexPolygons:
         """Return the image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives segments or points.

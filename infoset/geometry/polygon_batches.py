@@ -64,11 +64,10 @@ def cut(
     out: Floats,
     made: Integers,
     normal: Floats,
-    lower: Floats,
-    upper: Floats,
+    bounds: Floats,
     slack: float,
 ) -> None:
-    """Cuts by bands, widened by `slack` units of rounding of the heights of the vertices."""
+    """Cuts by bands with `bounds` of shape (B, 2), widened by `slack` units of rounding of the vertices' heights."""
     for i in range(counts.size):
         polygon.copy(vertices[i], counts[i], out[i])
         wider = 0.0
@@ -77,7 +76,7 @@ def cut(
                 wider = max(wider, abs(normal[i, 0] * out[i, j, 0]) + abs(normal[i, 1] * out[i, j, 1]))
             wider *= slack * 2.0**-52
         made[i], _ = polygon.clip_to_band(
-            out[i], counts[i], normal[i, 0], normal[i, 1], lower[i] - wider, upper[i] + wider
+            out[i], counts[i], normal[i, 0], normal[i, 1], bounds[i, 0] - wider, bounds[i, 1] + wider
         )
 
 
