@@ -157,7 +157,7 @@ class _Notice(event.Listener):
             how = f"in every process, because the cache folder cannot be written: set {VARIABLE} to a folder that can"
         else:
             how = f"for this and later runs; the machine code is stored in {folder.parent}"
-        LOGGER.warning("compiling the numerical kernels (up to about 20 s), %s", how)
+        LOGGER.warning("compiling the numerical kernels (up to about 25 s), %s", how)
 
     def on_end(self, event: Any) -> None:
         """Do nothing."""
