@@ -488,9 +488,14 @@ def cut_misses(
     """Intersect a section with the band lower <= m + V tilt <= upper; returns are those of `cut`.
 
     This band is not parallel to the level, so that it may cut any edge: the chains are computed anew. O(vertices).
-    `points` is a working array of CAPACITY + 2 vertices.
+    If the extreme misses and the bound of |V| show that it cuts none, the section is unchanged, and the overlap is a
+    lower bound. `points` is a working array of CAPACITY + 2 vertices.
     """
     right, left, rings, _ = section
+    upper_miss, lower_miss = max_and_min_miss(section, tau)
+    reach = abs(tilt) * right.reach
+    if lower <= lower_miss - reach and upper_miss + reach <= upper:
+        return True, min(upper_miss - reach - lower, upper - (lower_miss + reach))
     count = ZERO
     for chain in (right, left):
         for i in range(chain.begin, chain.end):
