@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from infoset.geometry.polytope import null_space_basis, relative_interior
 from rendezvous._arrays import Flags, Floats, Places
 from rendezvous.reachability.admissible import Lifted, deep_point, lift, min_relaxation
 from rendezvous.reachability.conic import MAX_GAP, MAX_VIOLATION, ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import Block
+from rendezvous.reachability.relative_interior import null_space_basis, relative_interior
 
 _REACHED = 1e-9
 """Constraints that are broken by less than this, relative to their sizes, count as kept."""
@@ -95,7 +95,7 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
         optimal = face.within(minimum.point, null_space_basis(face.equal))
         optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
         return BlockOptimum(block, terminal, minimum.reached, optimal, deep_point(optimal)[0])
-    hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True, member=minimum.point)
+    hull = relative_interior(face.rows, face.limits, face.equal, face.levels, minimum.point)
     optimal = face.within(hull.point, hull.basis).only(hull.kept)
     return BlockOptimum(block, terminal, minimum.reached, optimal, hull.centre)
 

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UncertainHullError, relative_interior
+from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UncertainHullError
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, min_l1, min_peak, min_sum_of_norms, quadratic
 from rendezvous.reachability.conic import NoSolutionError
+from rendezvous.reachability.relative_interior import relative_interior
 from rendezvous.reachability.solve import OptimalControls
 
 MAX_VERTICES = 2000
@@ -85,7 +86,7 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
     turned, fixed = (scale[:, None] * space.control_response)[moving], (scale * space.control_free)[moving]
     rows = np.vstack([space.rows, turned, -turned])
     limits = np.concatenate([space.limits, bound - fixed, bound + fixed])
-    face = relative_interior(rows, limits, space.equal, space.levels, bounded=True, member=point)
+    face = relative_interior(rows, limits, space.equal, space.levels, point)
     inner = replace(space.within(face.point, face.basis), rows=face.rows, limits=face.limits)
     return optimal.at(face.point + face.basis @ _nearest(inner, scale))
 
@@ -184,7 +185,7 @@ def vertices(optimal: OptimalControls, most: int = MAX_VERTICES) -> Floats:
             corners.append(np.zeros((1, 0)))
             continue
         try:
-            inside = Polytope.from_constraints(part.optimal.rows, part.optimal.limits, bounded=True)
+            inside = Polytope.from_constraints(part.optimal.rows, part.optimal.limits)
             corners.append(inside.needed().vertices)
         except EmptyPolytopeError as error:  # the centre is inside
             raise UncertainHullError(

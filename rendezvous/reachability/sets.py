@@ -8,6 +8,9 @@ from enum import Enum
 from time import perf_counter
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from infoset.geometry.polytope import Polytope, polytope_from_support
 from rendezvous._arrays import Floats
@@ -19,6 +22,7 @@ from rendezvous.reachability.problem import ReachabilityProblem
 MAX_SECONDS, MAX_MEGABYTES, MAX_DIMENSION = 5.0, 500.0, 6
 """Limits of the exact route: the computing time of all blocks, the memory for one step, and the states of a block."""
 _FEW_CONTROLS = 24
+_TOGETHER = 1e-7
 _AT_BOUND = 1.0 - 1e-10
 _SHARP = 1e-7
 _GAP = 1e-3
@@ -78,7 +82,7 @@ class ReachableSets:
         if len(sets) < len(self.parts):
             return None
         return SetCounts(
-            int(np.prod([polytope.essential_vertices() for polytope in sets])),
+            int(np.prod([essential_vertices(polytope.vertices) for polytope in sets])),
             sum(len(polytope.normals) for polytope in sets),
             sum(polytope.dimension for polytope in sets),
         )
@@ -159,7 +163,7 @@ class ExactSets:
         rows = np.vstack([np.eye(len(block.controls)), -np.eye(len(block.controls))])
         corners = np.zeros((1, 0))
         if len(rows):  # not `from_box`: the last digits of results depend on the order of these corners
-            corners = Polytope.from_constraints(rows, np.ones(len(rows)), bounded=True).vertices
+            corners = Polytope.from_constraints(rows, np.ones(len(rows))).vertices
         forward = [Polytope.from_vertices(block.initial[None, :])]
         for t in range(block.periods):
             moved = forward[-1].vertices @ block.transition[t].T
@@ -197,7 +201,6 @@ class ExactSets:
                 np.concatenate([before.offsets, ends]),
                 before.across @ block.transition[t],
                 before.levels,
-                bounded=True,
             ).needed()
             tube.append(forward[t].intersection(backward).needed())
         return [forward[0], *reversed(tube)]
@@ -206,11 +209,19 @@ class ExactSets:
         optimal = self._optimum.optimal
         corners = np.zeros((1, 0))
         if optimal.size:
-            corners = Polytope.from_constraints(optimal.rows, optimal.limits, bounded=True).needed().vertices
+            corners = Polytope.from_constraints(optimal.rows, optimal.limits).needed().vertices
         return [
             self._meter.hull(free + corners @ response.T)
             for free, response in zip(optimal.free, optimal.response, strict=True)
         ]
+
+
+def essential_vertices(vertices: Floats) -> int:
+    """Return the number of vertices; those within 1e-7 of each other in every coordinate count once."""
+    # Scipy 1.11.0 looks for components among indices of 32 bits only.
+    pairs = cKDTree(vertices).query_pairs(_TOGETHER, p=np.inf, output_type="ndarray").astype(np.int32)
+    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(vertices), len(vertices)))
+    return int(connected_components(graph, directed=False)[0])
 
 
 def _sums(first: Floats, second: Floats) -> Floats:

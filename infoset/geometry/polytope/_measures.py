@@ -1,61 +1,102 @@
-"""Volume, division into simplices and largest ball of polytopes, and the shortest difference between two hulls.
-
-`axes` are coordinates in which the set is about one wide, None if its own do not differ much.
-"""
+"""Division into simplices, largest ball, orthonormal bases, and the shortest difference between two hulls."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, Delaunay
+from numpy.typing import NDArray
+from scipy.linalg import qr, solve_triangular
+from scipy.optimize import linprog
 
-from infoset.arrays import Floats
-from infoset.geometry.polytope._affine_hull import chebyshev_ball, frame_of
-from infoset.geometry.polytope._scaling import LocalAxes
+from infoset.arrays import Floats, Integers
+from infoset.geometry.polytope.errors import UncertainHullError
 
+HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+"""Options of HiGHS for linear programs on the scale of a polytope: feasibility tolerances of 1e-10."""
 _MAX_STEPS = 1000
 _PRECISION = 1e-14
 
 
-def volume_of(vertices: Floats, axes: LocalAxes | None) -> float:
-    """Return the volume within the affine hull of vertices, shape (v, n); 1 for a point."""
-    frame = frame_of(vertices if axes is None else axes.inward(vertices))
-    scale = float(np.prod(frame.extents)) if axes is None else axes.volume(frame.basis * frame.extents)
-    if frame.dimension < 2:
-        return scale * 2.0 if frame.dimension else 1.0
-    inner = frame.inward(vertices if axes is None else axes.inward(vertices))
-    return float(ConvexHull(inner).volume) * scale
+def simplices_of(sides: NDArray[np.uint64], dimension: int) -> Integers:
+    """Return the vertices of simplices that divide a polytope, shape (k, d + 1).
+
+    `sides` are the bits of the vertices of each facet. A face is the union of the pyramids over those of its own facets
+    that do not contain its first vertex, which are intersections of it with others.
+
+    References
+    ----------
+    B. Bueler, A. Enge and K. Fukuda, Exact volume computation for polytopes, in Polytopes (2000).
+    """
+    known: dict[int, list[tuple[int, ...]]] = {}
+
+    def divide(face: int, facets: list[int], size: int) -> list[tuple[int, ...]]:
+        if face not in known:
+            first = (face & -face).bit_length() - 1
+            if face.bit_count() <= size + 1:
+                known[face] = [tuple(i for i in range(face.bit_length()) if face >> i & 1)]
+            else:
+                known[face] = [
+                    (first, *rest)
+                    for facet in facets
+                    if not facet >> first & 1
+                    for rest in divide(facet, _facets_of(facet, facets, size - 1), size - 1)
+                ]
+        return known[face]
+
+    sets = [int.from_bytes(bits.astype("<u8").tobytes(), "little") for bits in sides]
+    whole = 0
+    for side in sets:
+        whole |= side
+    return np.array(divide(whole, sets, dimension))
 
 
-def simplices_of(vertices: Floats, axes: LocalAxes | None) -> tuple[Floats, Floats]:
-    """Return simplices that divide the hull, shape (k, d + 1, n), and their shares of the volume, shape (k,)."""
-    scaled = vertices if axes is None else axes.inward(vertices)
-    frame = frame_of(scaled)
-    if len(vertices) == frame.dimension + 1:
-        return vertices[None], np.ones(1)
-    inner = frame.inward(scaled)
-    corners = Delaunay(inner, qhull_options="QJ").simplices
-    sizes = np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
-    return vertices[corners], sizes / sizes.sum()
+def _facets_of(face: int, others: list[int], size: int) -> list[int]:
+    """Return the facets of a face of some dimension: the maximal intersections with other faces."""
+    parts = sorted({face & other for other in others} - {face}, key=int.bit_count, reverse=True)
+    found: list[int] = []
+    for part in parts:
+        if part.bit_count() >= size and not any(part & ~one == 0 for one in found):
+            found.append(part)
+    return found
 
 
-def max_ball(vertices: Floats, normals: Floats, offsets: Floats, axes: LocalAxes | None) -> tuple[Floats, float]:
-    """Return the centre, shape (n,), and the radius of a largest ball within the affine hull."""
-    frame = frame_of(vertices if axes is None else axes.inward(vertices))
-    if not frame.dimension:
-        return vertices[0], 0.0
-    if axes is not None:  # in coordinates of the frame; the unit of the radius is the minimum distance of a facet
-        steps = axes.spread((frame.basis * frame.extents).T)
-        middle, rows = vertices.mean(axis=0), normals @ steps.T
-        sizes = np.abs(rows).max(axis=1)
-        minimum = float(sizes.min())
-        inner, radius = chebyshev_ball(rows / sizes[:, None], (offsets - normals @ middle) / sizes, minimum / sizes)
-        return middle + inner @ steps, minimum * max(0.0, radius)
-    scale = float(frame.extents.max())
-    rows = normals @ frame.basis
-    sizes = np.linalg.norm(rows, axis=1)
-    limits = (offsets - normals @ frame.centre) / (scale * sizes)
-    centre, radius = chebyshev_ball(rows / sizes[:, None], limits)
-    return frame.centre + scale * frame.basis @ centre, scale * max(0.0, radius)
+def largest_ball(rows: Floats, limits: Floats, scale: Floats | float = 1.0) -> tuple[Floats, float]:
+    """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}.
+
+    The distance of a facet is measured for rows as if of unit length; `scale`, shape (d,), are sizes of coordinates.
+    The radius is negative if the set is empty; its absolute value is the minimum relaxation of the rows that has a
+    point. An UncertainHullError is raised if the linear program (HiGHS) was not solved, for example because the set has
+    balls of any size.
+    """
+    inner = rows * scale
+    units = np.abs(inner).max(axis=1, initial=1e-300)
+    minimum = float(units.min(initial=1.0))  # the unit of the radius
+    matrix = np.column_stack([inner / units[:, None], minimum / units])
+    cost = np.zeros(matrix.shape[1])
+    cost[-1] = -1.0
+    optimum = linprog(cost, A_ub=matrix, b_ub=limits / units, bounds=(None, None), method="highs", options=HIGHS)
+    if optimum.status != 0:
+        raise UncertainHullError("the linear program of a largest ball inside was not solved: is the set unbounded?")
+    return optimum.x[:-1] * scale, float(optimum.x[-1]) * minimum
+
+
+def triangle_of(columns: Floats) -> tuple[Floats, Integers]:
+    """Return the triangle and the order of columns of a QR factorization; the sizes of the rows may differ much."""
+    order = np.argsort(-np.abs(columns).max(axis=1))
+    triangle, pivots = qr(columns[order], mode="r", pivoting=True)
+    return triangle[: columns.shape[1]], pivots
+
+
+def orthonormal(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
+    """Return an orthonormal basis of the span of columns, shape (n, d), and linear functions for its coefficients.
+
+    `rows`, shape (k, d), are such functions for the coefficients of the columns. Each row of the basis is exact to
+    rounding of itself: the sizes of the rows may differ much.
+    """
+    if columns.shape[1]:
+        for _ in range(2):  # the second pass corrects angles
+            triangle, pivots = triangle_of(columns)
+            columns, rows = (solve_triangular(triangle.T, part[:, pivots].T, lower=True).T for part in (columns, rows))
+    return columns, rows
 
 
 def nearest_difference(one: Floats, two: Floats) -> Floats:

@@ -1,224 +1,497 @@
-"""Polytopes of full dimension by vertices, facets and their incidence: cuts and sums without a hull.
+"""Double description: the extreme rays of a polyhedral cone from its rows, one row after the other, compiled.
 
-A cut makes new vertices on edges, and the Minkowski sum with a segment makes new facets on ridges; edges and ridges
-follow from the incidence. Each new vertex is an interpolation between two others, so that the result is exact to a few
-ulp, where a hull merges points that are nearer than 1e-10. Tolerances do not depend on the units of the coordinates:
-they are relative to the terms of a scalar product, or to the sizes of the set along the axes.
+A polytope {y: a . y <= b} is the cone {(y, t): b t - a . y >= 0, t >= 0}; its vertices are the extreme rays with t = 1
+(`affine`). In the dual, points y are the rows (-y, 1) of a cone whose extreme rays are the facets (a, b). Incidence is
+stored as bits: bit i of a ray is set if the ray lies on row i. A row's longest entry is about one.
+
+References
+----------
+K. Fukuda and A. Prodon, Double description method revisited, in Combinatorics and Computer Science (1996).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry.polytope._scaling import powers_of_two
-from infoset.geometry.polytope.polytope import Polytope
+from infoset.kernels import Kernels
 
-EPSILON = float(np.finfo(np.float64).eps)
-_ON = 64.0 * EPSILON
-"""Distance of a vertex from a plane that contains it, relative to the terms of the distance."""
-_THIN = 3e-8
-"""Minimum thickness of a set, relative to its coordinates."""
-_ENTRIES = 20_000_000
-"""Maximum size of a working array."""
-_PARALLEL = 1e-14
-_INCIDENT = 1e-8
-_SINGULAR = 1e-6
-"""Minimum singular value of a matrix, relative to the largest one, with which facets are mapped."""
-_HULL = 1e-8
-"""Enlargement of a hull, relative to the size of the set along each axis: it may have merged points."""
-_ROUNDED = 1e-13
-"""Depth of a facet, relative to the terms of normal . x, below which rounding errors determine the set."""
-_WIDENED = 1e-12
-"""Widening of such a set, relative to its coordinates."""
+Bits = NDArray[np.uint64]
+_kernels = Kernels()
+ON = 1e-12
+"""Distance of a ray from a row that contains it, relative to the ray: 5000 roundings."""
+COLLINEAR = 1e-9
+"""Distance of a ray from the plane of two others that contains it. A wrong one adds only points of the set."""
+TIP = 1e-12
+"""Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
+EPS = float(np.finfo(np.float64).eps)
+
+_1, _2, _4, _56 = np.uint64(1), np.uint64(2), np.uint64(4), np.uint64(56)
+_FIVES, _THREES = np.uint64(0x5555555555555555), np.uint64(0x3333333333333333)
+_FIFTEENS, _ONES = np.uint64(0x0F0F0F0F0F0F0F0F), np.uint64(0x0101010101010101)
 
 
-@dataclass(frozen=True, eq=False)
-class FacetsAndVertices:
-    """A polytope of full dimension n that is not empty: v vertices, and f facets normal . x <= offset.
+@_kernels.inlined
+def _ones(x: Any) -> Any:
+    """Return the number of bits of a word that are set."""
+    x = x - ((x >> _1) & _FIVES)
+    x = (x & _THREES) + ((x >> _2) & _THREES)
+    return (((x + (x >> _4)) & _FIFTEENS) * _ONES) >> _56
 
-    No vertex is redundant, and the normals have unit length. `incidence`, shape (v, f), is whether a vertex lies on a
-    facet.
+
+@_kernels.inlined
+def _common(one: Bits, other: Bits) -> int:
+    """Return the number of common bits."""
+    count = 0
+    for word in range(len(one)):
+        count += int(_ones(one[word] & other[word]))
+    return count
+
+
+@_kernels.inlined
+def _within(one: Bits, other: Bits, holder: Bits) -> bool:
+    """Whether a set of bits holds all common bits of two others."""
+    for word in range(len(one)):  # noqa: SIM110 - Numba compiles no generator
+        if one[word] & other[word] & ~holder[word]:
+            return False
+    return True
+
+
+@_kernels.allocation_free
+def _forbids(rays: Floats, signs: Integers, p: Any, q: Any, k: int) -> bool:
+    """Whether a third ray k, on all rows on which p and q lie, shows that p and q span no edge.
+
+    Rounding can leave three rays in the plane of one edge: k forbids the edge only if it is between p and q or
+    outside their plane. Of equal rays on the same side of the new row the first one has the edge.
     """
-
-    vertices: Floats
-    normals: Floats
-    offsets: Floats
-    incidence: Flags
-
-    @classmethod
-    def of(cls, polytope: Polytope, sizes: Floats | float = 0.0) -> FacetsAndVertices:
-        """Return a polytope; a flat one is widened by 3e-8 of its maximum coordinates, or of `sizes`, shape (n,)."""
-        vertices, normals = polytope.vertices, polytope.normals
-        depth = (heights := vertices @ normals.T).max(axis=0) - heights
-        incidence, offsets = depth <= _INCIDENT * depth.max(axis=0), heights.max(axis=0)
-        sizes = np.maximum(np.abs(vertices).max(axis=0), sizes)
-        for row, level in zip(polytope.across, polytope.levels, strict=True):
-            # Where the coordinates are rounding errors, the layer is thicker than these.
-            rounding = float(np.abs(vertices @ row - level).max())
-            half = max(_THIN * float(np.abs(row) @ sizes), rounding / _THIN) or _THIN
-            along = half * row / (row @ row)
-            above = np.repeat([False, True], len(vertices))
-            vertices = np.vstack([vertices - along, vertices + along])
-            normals, offsets = np.vstack([normals, row, -row]), np.append(offsets, [level + half, half - level])
-            incidence = np.column_stack([np.vstack([incidence, incidence]), above, ~above])
-        return cls(vertices, normals, offsets, incidence)
-
-    @property
-    def polytope(self) -> Polytope:
-        """The same set as a `Polytope`."""
-        size = self.vertices.shape[1]
-        return Polytope(self.vertices, self.normals, self.offsets, np.zeros((0, size)), np.zeros(0))
-
-    def enlarged(self, slack: float, sizes: Floats | float = 0.0) -> FacetsAndVertices:
-        """Return the set scaled about its centre, so that each facet moves outward by at least `slack` ulp.
-
-        The ulp is that of the terms of normal . x, in which x has the maximum coordinates of the set or `sizes`, shape
-        (n,), if these are greater. A set about as thin as rounding errors is widened by 1e-12 of these coordinates.
-        """
-        sizes = np.maximum(np.abs(self.vertices).max(axis=0), sizes)
-        depths, terms = self._depths, np.abs(self.normals) @ sizes
-        if (depths < _ROUNDED * terms).any():
-            wide = self
-            for half in np.diag(_WIDENED * sizes):
-                wide = wide.plus_segment(half)
-            return wide
-        return self._scaled(1.0 + slack * EPSILON * (1.0 + float((terms / depths).max())))
-
-    @property
-    def _depths(self) -> Floats:
-        """Distances of the facets from the mean of the vertices, shape (f,)."""
-        return np.asarray(self.offsets - self.normals @ self.vertices.mean(axis=0))
-
-    def _scaled(self, factor: float) -> FacetsAndVertices:
-        """Return the set scaled about the mean of its vertices."""
-        centre = self.vertices.mean(axis=0)
-        offsets = self.normals @ centre + factor * self._depths
-        return FacetsAndVertices(centre + factor * (self.vertices - centre), self.normals, offsets, self.incidence)
-
-    def affine_image(self, matrix: Floats, shift: Floats) -> FacetsAndVertices:
-        """Return {matrix x + shift}; the image under a singular matrix is widened by 1e-6 of its size."""
-        before = np.abs(self.vertices).max(axis=0)
-        before = powers_of_two(np.where(before > 0.0, before, 1.0))
-        after = np.abs(matrix) @ before
-        after = powers_of_two(np.where(after > 0.0, after, before))
-        left, sizes, right = np.linalg.svd(matrix * before / after[:, None])
-        floor = _SINGULAR * (float(sizes[0]) or 1.0)
-        small = sizes < floor
-        start = self
-        if small.any():
-            # A regular matrix, and segments that contain the difference of both images. They are added before the map:
-            # it makes the set so thin that rounding decides which facets the segments are parallel to.
-            reach = np.abs((self.vertices / before) @ right[small].T).max(axis=0)
-            lengths = np.maximum(reach, _THIN * float(np.abs(self.vertices / before).max()))
-            for axis, length in zip(right[small], lengths, strict=True):
-                start = start.plus_segment(length * axis * before)
-            matrix = (left * np.maximum(sizes, floor)) @ right * after[:, None] / before
-        vertices = start.vertices @ matrix.T + shift
-        scaled = matrix * before / after[:, None]
-        normals = np.array(np.linalg.solve(scaled.T, (start.normals * before).T).T, dtype=np.float64) / after
-        normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
-        # The offsets follow from the vertices, so that rounding errors of both do not add up over many steps.
-        return FacetsAndVertices(vertices, normals, (vertices @ normals.T).max(axis=0), start.incidence)
-
-    def plus(self, other: Polytope) -> FacetsAndVertices:
-        """Return the Minkowski sum with a polytope: a hull, enlarged by 1e-8 of its size."""
-        scale = powers_of_two(np.ptp(self.vertices, axis=0))
-        sums = (self.vertices[:, None, :] + other.vertices).reshape(-1, len(scale)) / scale
-        hull = FacetsAndVertices.of(Polytope.from_vertices(sums))._scaled(1.0 + _HULL)
-        return hull.in_units(scale)
-
-    def in_units(self, scale: Floats) -> FacetsAndVertices:
-        """Return the set whose coordinates are those of this one times powers of two, shape (n,): exact."""
-        normals = self.normals / scale
-        lengths = np.sqrt((normals**2).sum(axis=1))
-        return FacetsAndVertices(
-            self.vertices * scale, normals / lengths[:, None], self.offsets / lengths, self.incidence
-        )
-
-    def plus_segment(self, half: Floats) -> FacetsAndVertices:
-        """Return the Minkowski sum with the segment from -half to +half.
-
-        Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet.
-        """
-        if not half.any():
-            return self
-        along, widths = self.normals @ half, np.ptp(self.vertices, axis=0) + np.abs(half)
-        share = half / np.where(widths > 0.0, widths, 1.0)
-        rounding = _PARALLEL * np.linalg.norm(share) * np.linalg.norm(self.normals * widths, axis=1)
-        ahead, behind = along > rounding, along < -rounding
-        opposite = np.flatnonzero(behind) if len(half) > 1 else np.zeros(0, dtype=np.int64)  # an interval has no ridges
-        first, second, common = _adjacent(self.incidence.T, np.flatnonzero(ahead), opposite, len(half))
-        weight, other = -along[second], along[first]
-        normals = weight[:, None] * self.normals[first] + other[:, None] * self.normals[second]
-        lengths = np.linalg.norm(normals, axis=1)
-        offsets = (weight * self.offsets[first] + other * self.offsets[second]) / lengths
-        upper, lower = self.incidence[:, ahead].any(axis=1), self.incidence[:, behind].any(axis=1)
-        incidence = np.hstack([self.incidence, common.T])
-        new = np.zeros(len(first), dtype=bool)
-        on_upper, on_lower = np.concatenate([~behind, ~new]), np.concatenate([~ahead, ~new])
-        return FacetsAndVertices(
-            np.vstack([self.vertices[upper] + half, self.vertices[lower] - half]),
-            np.vstack([self.normals, normals / lengths[:, None]]),
-            np.concatenate([self.offsets + np.abs(along), offsets]),
-            np.vstack([incidence[upper] & on_upper, incidence[lower] & on_lower]),
-        )
-
-    def cut(self, normal: Floats, offset: float) -> tuple[FacetsAndVertices | None, float]:
-        """Return the part with normal . x <= offset, None if it is empty, and the excess of the lowest vertex."""
-        height = self.vertices @ normal - offset
-        lowest = float(height.min())
-        on = _ON * (np.abs(self.vertices) @ np.abs(normal) + abs(offset))
-        above, below = height > on, height < -on
-        if not above.any():
-            return self, lowest
-        if lowest > 0.0:
-            return None, lowest
-        thin = _THIN * float(on.max()) / _ON
-        if lowest > -0.5 * thin:  # the plane touches the set: keep a layer that is thicker than rounding errors
-            return self.cut(normal, offset + lowest + thin)[0], lowest
-        first, second, common = _adjacent(self.incidence, np.flatnonzero(above), np.flatnonzero(below), len(normal))
-        share = height[first] / (height[first] - height[second])
-        new = self.vertices[first] + share[:, None] * (self.vertices[second] - self.vertices[first])
-        kept = ~above
-        vertices = np.vstack([self.vertices[kept], new])
-        on_new = np.concatenate([~below[kept], np.ones(len(new), dtype=bool)])
-        incidence = np.column_stack([np.vstack([self.incidence[kept], common]), on_new])
-        length = float(np.linalg.norm(normal))
-        normals = np.vstack([self.normals, normal / length])
-        offsets = np.append(self.offsets, offset / length)
-        facets = _facets(incidence, self.vertices.shape[1])
-        return FacetsAndVertices(vertices, normals[facets], offsets[facets], incidence[:, facets]), lowest
+    pp = pq = pk = kk = 0.0
+    for i in range(rays.shape[1]):
+        pp += rays[p, i] * rays[p, i]
+        pq += rays[p, i] * rays[q, i]
+        pk += rays[p, i] * rays[k, i]
+        kk += rays[k, i] * rays[k, i]
+    uu = uk = 0.0  # u is the part of q orthogonal to p
+    for i in range(rays.shape[1]):
+        u = rays[q, i] - pq / pp * rays[p, i]
+        uu += u * u
+        uk += u * rays[k, i]
+    if uu == 0.0:
+        return False
+    beta = uk / uu
+    alpha = (pk - beta * pq) / pp
+    away = qq = 0.0
+    for i in range(rays.shape[1]):
+        rest = rays[k, i] - alpha * rays[p, i] - beta * rays[q, i]
+        away += rest * rest
+        qq += rays[q, i] * rays[q, i]
+    if away > COLLINEAR**2 * kk:
+        return True
+    near_p, near_q = abs(beta) * math.sqrt(qq / kk) < COLLINEAR, abs(alpha) * math.sqrt(pp / kk) < COLLINEAR
+    if near_p:
+        return bool(signs[k] == signs[p] and k < p)
+    if near_q:
+        return bool(signs[k] == signs[q] and k < q)
+    return alpha > 0.0 and beta > 0.0
 
 
-def _adjacent(incidence: Flags, first: Integers, second: Integers, size: int) -> tuple[Integers, Integers, Flags]:
-    """Return the pairs of rows, one of each list, that span an edge, and what both lie on.
+@_kernels.allocation_free
+def _combine(p: Floats, q: Floats, alpha: float, beta: float, affine: bool, result: Floats) -> None:
+    """Write the ray alpha q + beta p; with t = 1 if it is a point. Coordinates that both points share stay exact."""
+    last = len(p) - 1
+    if affine and p[last] == 1.0 and q[last] == 1.0:
+        share = beta / (alpha + beta)
+        if share > 0.5:
+            share = alpha / (alpha + beta)
+            p, q = q, p
+        for i in range(len(p)):
+            result[i] = q[i] + share * (p[i] - q[i])
+    elif affine and p[last] + q[last] == 1.0:
+        share = beta / alpha
+        if p[last] == 1.0:
+            share = alpha / beta
+            p, q = q, p
+        for i in range(len(p)):
+            result[i] = q[i] + share * p[i]
+    else:
+        size = 0.0
+        for i in range(len(p)):
+            result[i] = alpha * q[i] + beta * p[i]
+            size = max(size, abs(result[i]))
+        size = math.ldexp(1.0, -math.frexp(size)[1])
+        for i in range(len(p)):
+            result[i] *= size
 
-    Two vertices span an edge if no third vertex lies on all facets on which both lie. With rows and columns exchanged,
-    two facets meet in a ridge. In `size` dimensions both lie on size - 1 facets at least.
+
+@_kernels.compiled
+def sides(rays: Floats, row: Floats, slack: float) -> tuple[Floats, Integers]:
+    """Return the heights row . z of rays, and their signs, 0 for rays on the row: within `slack` tolerances."""
+    heights, signs = np.empty(len(rays)), np.zeros(len(rays), np.int64)
+    for i in range(len(rays)):
+        height, length = 0.0, 0.0
+        for j in range(len(row)):
+            height += row[j] * rays[i, j]
+            length = max(length, abs(rays[i, j]))
+        heights[i] = height
+        if abs(height) > ON * slack * length:
+            signs[i] = 1 if height > 0.0 else -1
+    return heights, signs
+
+
+@_kernels.compiled
+def crossings(
+    rays: Floats, bits: Bits, heights: Floats, signs: Integers, least: int, affine: bool
+) -> tuple[Floats, Bits]:
+    """Return the rays in which edges cross a row, and the common bits of the ends of the edges.
+
+    `heights` and `signs` are those of `sides`, and `least` is the minimum number of rows on which an edge lies.
+    O(above below (words + k words)) at worst.
     """
-    numbers = incidence.astype(np.float32)
-    i, j = np.nonzero(numbers[first] @ numbers[second].T >= size - 1)
-    common = incidence[first[i]] & incidence[second[j]]
-    edge = np.zeros(len(i), dtype=bool)
-    rows = max(1, _ENTRIES // len(incidence))
-    for start in range(0, len(i), rows):
-        part = common[start : start + rows]
-        holders = part.astype(np.float32) @ numbers.T >= part.sum(axis=1)[:, None]
-        edge[start : start + rows] = holders.sum(axis=1) == 2
-    return first[i[edge]], second[j[edge]], common[edge]
+    k, size = rays.shape
+    counts = np.empty(k, np.int64)
+    for i in range(k):
+        counts[i] = _common(bits[i], bits[i])
+    room, count, blocker = 2 * k + 16, 0, 0
+    result, marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)
+    for p in np.flatnonzero(signs > 0):
+        for q in np.flatnonzero(signs < 0):
+            shared = _common(bits[p], bits[q])
+            if shared < least:
+                continue
+            # Two simple vertices with a common line of facets are its ends.
+            if shared > least or counts[p] > least + 1 or counts[q] > least + 1:
+                edge = True
+                for step in range(-1, k):
+                    third = blocker if step < 0 else step  # the last one that forbade an edge often does it again
+                    if third in (p, q) or not _within(bits[p], bits[q], bits[third]):
+                        continue
+                    if _forbids(rays, signs, p, q, third):
+                        edge, blocker = False, third
+                        break
+                if not edge:
+                    continue
+            if count == room:
+                room *= 2
+                more, more_marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)
+                more[:count], more_marks[:count] = result, marks
+                result, marks = more, more_marks
+            _combine(rays[p], rays[q], heights[p], -heights[q], affine, result[count])
+            for w in range(bits.shape[1]):
+                marks[count, w] = bits[p, w] & bits[q, w]
+            count += 1
+    return result[:count], marks[:count]
 
 
-def _facets(incidence: Flags, size: int) -> Integers:
-    """Return the columns that are facets: with at least `size` vertices that do not all lie on another column."""
-    counts = incidence.sum(axis=0)
-    wide = np.flatnonzero(counts >= size)
-    columns = incidence[:, wide].astype(np.float32)
-    shared = columns.T @ columns
-    within = (shared >= counts[wide][:, None]) & ~np.eye(len(wide), dtype=bool)
-    # Of equal columns the last one, which is the newest, is kept.
-    same = within & within.T
-    within &= ~same | np.triu(np.ones_like(same))
-    return np.asarray(wide[~within.any(axis=1)])
+@_kernels.compiled
+def insert(
+    rays: Floats, bits: Bits, row: Floats, slack: float, number: int, least: int, affine: bool
+) -> tuple[Floats, Bits]:
+    """Return the rays with row . z >= 0, shape (k, D), and their bits, shape (k, words), for one more row.
+
+    One step of the double description: rays on the wrong side go; each edge that crosses the row gives a ray. `number`
+    is the bit of the row; see `sides` and `crossings`.
+    """
+    heights, signs = sides(rays, row, slack)
+    word, bit = number // 64, _1 << np.uint64(number % 64)
+    on, above = signs == 0, signs > 0
+    marks = bits.copy()
+    for i in range(len(rays)):
+        if on[i]:
+            marks[i, word] |= bit
+    if on.sum() + above.sum() == len(rays):
+        return rays, marks
+    new, new_marks = crossings(rays, bits, heights, signs, least, affine)
+    for i in range(len(new)):
+        new_marks[i, word] |= bit
+    # New rays are compared with those on the row, which come first.
+    return _merged(
+        np.concatenate((rays[on], rays[above], new)),
+        np.concatenate((marks[on], marks[above], new_marks)),
+        on.sum(),
+        on.sum() + above.sum(),
+    )
+
+
+@_kernels.compiled
+def _merged(rays: Floats, bits: Bits, on: int, old: int) -> tuple[Floats, Bits]:
+    """Return rays without new ones (from number `old`) that equal another new one or one of the first `on` ones.
+
+    The ray that stays lies on the rows of both. Equal rays are neighbours in the order of one coordinate.
+    """
+    k, size = rays.shape
+    if k - old + on < 2 or k == old:
+        return rays.copy(), bits.copy()
+    numbers, keys = np.empty(on + k - old, np.int64), np.empty(on + k - old)
+    lengths = np.empty(on + k - old)
+    for n in range(len(numbers)):
+        i = n if n < on else old + n - on
+        numbers[n] = i
+        length, key = 0.0, 0.0
+        for j in range(size):
+            length = max(length, abs(rays[i, j]))
+            key += rays[i, j] * (1.0 + 0.618 * j)  # a direction that is not an axis
+        keys[n], lengths[n] = key / length, length
+    order = np.argsort(keys)
+    gone = np.zeros(k, np.bool_)
+    for place in range(len(order)):
+        one = order[place]
+        i = numbers[one]
+        if gone[i]:
+            continue
+        for after in range(place + 1, len(order)):
+            two = order[after]
+            if keys[two] - keys[one] > 4.0 * size * ON:
+                break
+            j = numbers[two]
+            if gone[j] or (i < old and j < old):
+                continue
+            near = True
+            for c in range(size):
+                if abs(rays[i, c] / lengths[one] - rays[j, c] / lengths[two]) > ON:
+                    near = False
+                    break
+            if near:
+                stays, goes = (j, i) if j < i else (i, j)
+                for w in range(bits.shape[1]):
+                    bits[stays, w] |= bits[goes, w]
+                gone[goes] = True
+                if goes == i:
+                    break
+    return rays[~gone], bits[~gone]
+
+
+@_kernels.compiled
+def pivots(rows: Floats, tolerance: float, first: int) -> tuple[Integers, Integers]:
+    """Return rows and columns of a regular part of a matrix, shapes (r,), by complete pivoting.
+
+    A pivot up to `tolerance` ends it. If `first` >= 0, the first pivot is the last entry of that row.
+    """
+    table = rows.copy()
+    k, size = table.shape
+    chosen, columns = np.empty(min(k, size), np.int64), np.empty(min(k, size), np.int64)
+    used_row, used_column = np.zeros(k, np.bool_), np.zeros(size, np.bool_)
+    for step in range(min(k, size)):
+        best, row, column = tolerance, -1, -1
+        if step == 0 and first >= 0:
+            row, column = first, size - 1
+        else:
+            for i in range(k):
+                if not used_row[i]:
+                    for j in range(size):
+                        if not used_column[j] and abs(table[i, j]) > best:
+                            best, row, column = abs(table[i, j]), i, j
+        if row < 0:
+            return chosen[:step].copy(), columns[:step].copy()
+        chosen[step], columns[step] = row, column
+        used_row[row], used_column[column] = True, True
+        for i in range(k):
+            if not used_row[i]:
+                factor = table[i, column] / table[row, column]
+                if factor != 0.0:
+                    for j in range(size):
+                        table[i, j] -= factor * table[row, j]
+                    table[i, column] = 0.0
+    return chosen, columns
+
+
+@_kernels.compiled
+def extreme_rays(rows: Floats, slack: Floats, affine: bool, tolerance: float) -> tuple[Floats, Bits, int]:
+    """Return the extreme rays, shape (k, D), of {z: rows z >= 0}, their bits, and the rank of the rows, shape (m, D).
+
+    If `affine`, the first row is t >= 0, and rays with t > 0 have t = 1. It starts with the simplicial cone of D rows
+    and inserts the others in their order; if the rank is below D to a `tolerance`, it returns no rays.
+    """
+    m, size = rows.shape
+    chosen, _ = pivots(rows, tolerance, 0 if affine else -1)
+    if len(chosen) < size:
+        return np.empty((0, size)), np.empty((0, 1), np.uint64), len(chosen)
+    rays = np.ascontiguousarray(np.linalg.inv(rows[chosen]).T)
+    bits = np.zeros((size, (m + 63) // 64), np.uint64)
+    inside = np.zeros(m, np.bool_)
+    for i in range(size):
+        inside[chosen[i]] = True
+        length = 0.0
+        if affine:
+            rays[i, size - 1] = 1.0 if i == 0 else 0.0
+        for j in range(size):
+            length = max(length, abs(rays[i, j]))
+            if i != j:
+                bits[i, chosen[j] // 64] |= np.uint64(1) << np.uint64(chosen[j] % 64)
+        if not affine or i > 0:
+            rays[i] *= math.ldexp(1.0, -math.frexp(length)[1])
+    for i in range(m):
+        if not inside[i]:
+            rays, bits = insert(rays, bits, rows[i], slack[i], i, size - 2, affine)
+            if len(rays) == 0:
+                break
+    return rays, bits, size
+
+
+def packed(flags: Flags) -> Bits:
+    """Return rows of flags, shape (k, m), as bits, shape (k, words)."""
+    octets = np.zeros((len(flags), 8 * ((flags.shape[1] + 63) // 64)), np.uint8)
+    bits = np.packbits(flags, axis=1, bitorder="little")
+    octets[:, : bits.shape[1]] = bits
+    return octets.view("<u8").astype(np.uint64, copy=False)
+
+
+def unpacked(bits: Bits, count: int) -> Flags:
+    """Return the first `count` bits of rows as flags, shape (k, count)."""
+    octets = np.ascontiguousarray(bits).astype("<u8", copy=False).view(np.uint8)
+    return np.unpackbits(octets, axis=1, count=count, bitorder="little").view(np.bool_)
+
+
+def transposed(bits: Bits, count: int) -> Bits:
+    """Return the bits of `count` columns, shape (count, words), from those of rows."""
+    return packed(unpacked(bits, count).T)
+
+
+@_kernels.compiled
+def maximal(bits: Bits, least: int) -> Flags:
+    """Return which sets of bits have at least `least` bits and are in no other set; the first of equal ones is kept."""
+    k = len(bits)
+    counts, kept = np.empty(k, np.int64), np.zeros(k, np.bool_)
+    for i in range(k):
+        counts[i] = _common(bits[i], bits[i])
+    for i in range(k):
+        if counts[i] < least:
+            continue
+        kept[i] = True
+        for j in range(k):
+            if (counts[j] > counts[i] or (counts[j] == counts[i] and j < i)) and _within(bits[i], bits[i], bits[j]):
+                kept[i] = False
+                break
+    return kept
+
+
+@_kernels.compiled
+def have_neighbours(bits: Bits, dimension: int) -> bool:
+    """Whether each set of bits shares `dimension` - 1 bits with `dimension` others: a vertex has as many edges."""
+    k = len(bits)
+    found = np.zeros(k, np.int64)
+    for i in range(k):
+        for j in range(i):
+            if (found[i] < dimension or found[j] < dimension) and _common(bits[i], bits[j]) >= dimension - 1:
+                found[i] += 1
+                found[j] += 1
+    return bool((found >= dimension).all())
+
+
+@_kernels.allocation_free
+def _product(a: float, b: float) -> tuple[float, float]:
+    """Return a b and its rounding error (Dekker)."""
+    c, d = 134217729.0 * a, 134217729.0 * b
+    a_high, b_high = c - (c - a), d - (d - b)
+    a_low, b_low = a - a_high, b - b_high
+    p = a * b
+    return p, ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+@_kernels.allocation_free
+def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
+    """Return start + a . b as the sum of two numbers, as exact as with doubled digits (Ogita, Rump and Oishi)."""
+    high, low = start, 0.0
+    for i in range(len(b)):
+        p, e = _product(a[i], b[i])
+        total = high + p
+        part = total - high
+        low += ((high - (total - part)) + (p - part)) + e
+        high = total
+    total = high + low
+    return total, low - (total - high)
+
+
+@_kernels.compiled
+def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats, Floats]:
+    """Return matrix x + shift of points, shape (k, m), rounded once, and the maximum rounding errors, shape (m,)."""
+    image, errors = np.empty((len(points), len(matrix))), np.zeros(len(matrix))
+    for j in range(len(matrix)):
+        for i in range(len(points)):
+            image[i, j], low = precise_dot(matrix[j], points[i], shift[j])
+            errors[j] = max(errors[j], abs(low))
+    return image, errors
+
+
+@_kernels.compiled
+def supports(points: Floats, normals: Floats) -> Floats:
+    """Return max normal . point of each normal, shape (f,), rounded up from nearly exact products."""
+    result = np.empty(len(normals))
+    for f in range(len(normals)):
+        highest = -np.inf
+        for i in range(len(points)):
+            height, terms = 0.0, 0.0
+            for j in range(points.shape[1]):
+                height += normals[f, j] * points[i, j]
+                terms += abs(normals[f, j] * points[i, j])
+            # Only points that may be highest are worth the precise product.
+            if height + 8.0 * EPS * terms >= highest:
+                high, low = precise_dot(normals[f], points[i], 0.0)
+                if low > 0.0:
+                    high = math.nextafter(high, math.inf)
+                highest = max(highest, high)
+        result[f] = highest
+    return result
+
+
+@_kernels.compiled
+def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bool, most: float) -> Floats:
+    """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
+
+    Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
+    its outer side covers the set. A point that is exactly on its facets stays. The others move to the common point of n
+    facets that are moved outward by rounding; to the outer sides of more than n facets, one after the other (Agmon and
+    Motzkin); those of a `flat` set move away from the centre. No point moves by more than `most`: at a sharp corner,
+    where rounding moves facets more than the vertex, the hull may lack the very tip.
+    """
+    v, n = points.shape
+    result, middle = points.copy(), np.zeros(n)
+    for i in range(v):
+        middle += points[i] / v
+    mine, needs = np.empty(len(facets), np.int64), np.empty(len(facets))
+    for i in range(v):
+        moved = 0.0
+        for attempt in range(3 if chosen[i] else 0):
+            count, inside = 0, False
+            for word in range(bits.shape[1]):
+                left, f = bits[i, word], 64 * word
+                while left:
+                    if left & _1:
+                        high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
+                        inside |= high < 0.0 or (high == 0.0 and low < 0.0)
+                        terms = 0.0
+                        for j in range(n):
+                            terms += abs(facets[f, j] * points[i, j])
+                        mine[count], needs[count] = f, 0.4 * attempt * EPS * terms - high  # rounding of coordinates
+                        count += 1
+                    left >>= _1
+                    f += 1
+            if not inside:
+                break
+            step = points[i] - middle if flat else np.zeros(n)
+            if count == n and not flat and np.linalg.det(facets[mine[:n], :n]) != 0.0:
+                step = np.linalg.solve(facets[mine[:n], :n], needs[:n])
+            for _ in range(0 if flat else 50):
+                done = True
+                for m in range(count):
+                    row = facets[mine[m], :n]
+                    gap = needs[m] - (row * step).sum()
+                    if gap > 0.0:
+                        step += (gap + 0.25 * abs(needs[m])) / (row**2).sum() * row
+                        done = False
+                if done:
+                    break
+            factor = 0.0 if flat else 1.0
+            for m in range(count):
+                along = (facets[mine[m], :n] * step).sum()
+                if needs[m] > factor * along:
+                    factor = needs[m] / along if along > 0.0 else np.inf
+            length = math.sqrt((step**2).sum())
+            if length == 0.0 or moved >= most:
+                break
+            factor = min(factor, (most - moved) / length)
+            moved += factor * length
+            result[i] += factor * step
+    return result

@@ -9,6 +9,7 @@ from scipy.linalg import block_diag
 
 from infoset.arrays import Floats
 from infoset.geometry._set_arguments import need_set
+from infoset.geometry.polytope.double_description import packed, unpacked
 from infoset.geometry.polytope.polytope import Polytope
 
 _MAX_ROUNDS = 200
@@ -68,14 +69,18 @@ def product(*polytopes: Polytope) -> Polytope:
     """
     if not [need_set("each factor", factor, Polytope) for factor in polytopes]:
         raise ValueError("a product needs at least one polytope")
-    vertices = polytopes[0].vertices
+    if any(factor.is_empty for factor in polytopes):
+        return Polytope.empty(sum(factor.space for factor in polytopes))
+    points, on = polytopes[0].points, unpacked(polytopes[0].incidence, len(polytopes[0].facets))
     for factor in polytopes[1:]:
-        left = np.repeat(vertices, len(factor.vertices), axis=0)
-        vertices = np.hstack([left, np.tile(factor.vertices, (len(vertices), 1))])
-    return Polytope(
-        vertices,
-        block_diag(*[factor.normals for factor in polytopes]),
-        np.concatenate([factor.offsets for factor in polytopes]),
-        block_diag(*[factor.across for factor in polytopes]),
-        np.concatenate([factor.levels for factor in polytopes]),
+        count, more = len(factor.points), unpacked(factor.incidence, len(factor.facets))
+        on = np.hstack([np.repeat(on, count, axis=0), np.tile(more, (len(points), 1))])
+        points = np.hstack([np.repeat(points, count, axis=0), np.tile(factor.points, (len(points), 1))])
+    facets, equations = (
+        np.column_stack(
+            [block_diag(*[rows[:, :-1] for rows in tables]), np.concatenate([rows[:, -1] for rows in tables])]
+        )
+        for tables in ([one.facets for one in polytopes], [one.equations for one in polytopes])
     )
+    centre, scale = (np.concatenate([getattr(one, name) for one in polytopes]) for name in ("centre", "scale"))
+    return Polytope(points, facets, equations, packed(on), centre, scale)

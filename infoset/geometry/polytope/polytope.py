@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
+from math import factorial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry._set_arguments import (
     axis_numbers,
     bound_values,
@@ -18,14 +20,17 @@ from infoset.geometry._set_arguments import (
     need_set,
     not_negative,
 )
-from infoset.geometry.polytope._affine_hull import EmptyPolytopeError, min_relaxation
-from infoset.geometry.polytope._measures import max_ball, nearest_difference, simplices_of, volume_of
-from infoset.geometry.polytope._scaling import LocalAxes, described, tightened, without_far
-from infoset.geometry.polytope.arrays import PolytopeArrays
+from infoset.geometry.polytope import double_description as dd
+from infoset.geometry.polytope._measures import largest_ball, nearest_difference, simplices_of, triangle_of
+from infoset.geometry.polytope.arrays import FLAT, SMALL, PolytopeArrays, coordinates
+from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.limits import Limits, real_values
 
-_FLAT_WIDTH = 1e-12
-_EPS = float(np.finfo(np.float64).eps)
+_MAX_CONDITION = 1e6
+"""Condition of a matrix, in scaled coordinates, up to which facets are mapped; beyond, they are those of a hull."""
+
+_THICK = 3e-8
+"""Thickness of a flat set that is enlarged, relative to its coordinates: rounding does not lose it again."""
 
 
 class Polytope(PolytopeArrays):
@@ -34,18 +39,21 @@ class Polytope(PolytopeArrays):
     It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v, n), without redundant
     points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
     rows of `across` are orthonormal. Construct it with `from_vertices`, `from_constraints`, `from_box`, `from_ball` or
-    `from_zonotope`. A set that is 1e9 times thinner than it is long counts as flat. The units of the axes do not
-    matter, except that points whose width along one axis is 3e-12 times that along another one, or less, count as flat.
-    Rounding of the coordinates limits sets far from the origin: a thickness below 1e-13 of a coordinate counts as flat.
+    `from_zonotope`.
+
+    One algorithm, the double description, computes all sets: a half-space is added by one step, which finds the edges
+    that cross it from the incidence of vertices and facets. Vertices and facets that are given are kept; those that are
+    computed are rounded outward, so that the set contains the exact one, and exceeds it by about 1e-12 of its size. A
+    set that is 1e11 times thinner than it is long, in units in which it is one wide along each axis, counts as flat;
+    the hull of points in such a set is their affine hull to rounding. A set that sticks out by less than 1e-12 of its
+    size from a half-space touches it.
 
     An empty set has no vertices; `relaxation` is then the minimum relaxation of the constraints that made it empty,
     their normals of unit length, with which a point satisfies them; 0 if it is not known. Operations on it give the
     empty set; points such as its centroid do not exist, and an EmptyPolytopeError is raised.
 
     All arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
-    (ValueError). Operations are exact up to rounding: about 1e-12 of the size of the set, and 2e-9 at most. Their cost
-    is that of a convex hull: O(k log k) for k points or half-spaces in up to three dimensions, O(k^(n/2)) at worst in
-    n.
+    (ValueError). An UncertainHullError is raised if vertices and facets do not agree because of rounding.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
     `point in P`, `P <= Q` (subset, to rounding). `P == Q` compares objects; `equals` compares sets. The vertices are in
@@ -57,53 +65,167 @@ class Polytope(PolytopeArrays):
     # Sets -----------------------------------------------------------------------------------------------------------
 
     def linear_map(self, matrix: ArrayLike) -> Polytope:
-        """Return {matrix x}, with a matrix of shape (m, n), singular or not: the hull of the images of the vertices."""
+        """Return {matrix x}, with a matrix of shape (m, n), singular or not."""
         return self.affine_map(matrix)
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {matrix x + offset} in R^m, with a matrix of shape (m, n), singular or not, and an offset of shape
         (m,) or 0.
 
-        The hull of the images of the vertices, each rounded n + 1 times.
+        Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull.
         """
         rows = finite_values("matrix", matrix, "m", self.space)
-        moved = self._shift(offset, len(rows))
+        return self._mapped(rows, self._shift(offset, len(rows)), np.zeros(len(rows)))
+
+    def _mapped(self, rows: Floats, moved: Floats, errors: Floats) -> Polytope:
+        """Return {rows x + moved}, known to `errors`, shape (m,)."""
         if self.is_empty:
-            return self.empty(len(rows), self.relaxation)
-        return self.from_vertices(self.vertices @ rows.T + moved)
+            return self.empty(len(rows), self.conflict if len(rows) == self.space else None)
+        shift, rounded = dd.affine_image(self.centre[None], rows, moved)
+        points, centre, scale, errors = _image(self.points, rows * self.scale, shift[0], rounded + errors)
+        if len(rows) == self.dimension == self.space:
+            mapped = rows * self.scale / scale[:, None]
+            inverse = _inverse(mapped, _MAX_CONDITION)
+            if inverse is not None:
+                facets = np.empty_like(self.facets)
+                facets[:, :-1] = self.facets[:, :-1] @ inverse
+                # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding.
+                normals = np.ascontiguousarray(facets[:, :-1])
+                back, _ = dd.affine_image(normals, np.ascontiguousarray(mapped.T), np.zeros(self.space))
+                away = np.abs(back - self.facets[:, :-1]) @ np.abs(self.points).max(axis=0)
+                ends, low = dd.affine_image((shift - centre) / scale, normals, self.facets[:, -1])
+                facets[:, -1] = ends[0] + (low + away)
+                moved_set = replace(self, points=points, facets=facets, centre=centre, scale=scale)
+                return moved_set._around(errors)
+        return self._hull(points, centre, scale, FLAT, errors)
+
+    def _around(self, errors: Floats) -> Polytope:
+        """Return a set that contains this one, whose vertices are known to `errors`, shape (n,)."""
+        facets, points = self.facets.copy(), self.points
+        facets[:, -1] += np.abs(facets[:, :-1]) @ errors
+        facets *= np.ldexp(1.0, -np.frexp(np.abs(facets).max(axis=1))[1])[:, None]
+        if errors.any():
+            points = dd.push_out(points, facets, self.incidence, np.ones(len(points), bool), False, dd.TIP)
+        return replace(self, points=points, facets=facets)
 
     @staticmethod
     def _shift(offset: ArrayLike, space: int) -> Floats:
         """Return an offset, shape (space,), from such an array or from one number for all coordinates."""
         shift = real_values("offset", offset)
-        return np.broadcast_to(finite_values("offset", shift, *[space] * min(shift.ndim, 1)), (space,))
+        shift = finite_values("offset", shift, *[space] * min(shift.ndim, 1))
+        return np.ascontiguousarray(np.broadcast_to(shift, (space,)))
 
     def translate(self, offset: ArrayLike) -> Polytope:
-        """Return the set moved by an offset, shape (n,). O((v + f) n): no hull is needed."""
-        by = finite_values("offset", offset, self.space)
-        if self.is_empty:
-            return self
-        offsets, levels = self.offsets + self.normals @ by, self.levels + self.across @ by
-        return Polytope(self.vertices + by, self.normals, offsets, self.across, levels)
+        """Return the set moved by an offset, shape (n,): O((v + f) n)."""
+        return self.affine_map(np.eye(self.space), finite_values("offset", offset, self.space))
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
-        """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m): its facets, mapped.
+        """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m).
 
-        An UnboundedPolytopeError is raised if the preimage is unbounded: the matrix has a null space.
+        The image under the inverse of a regular matrix; otherwise from the facets, mapped. An UnboundedPolytopeError is
+        raised if the preimage is unbounded: the matrix has a null space.
         """
-        rows, moved = finite_values("matrix", matrix, self.space, "m"), self._shift(offset, self.space)
+        factor, moved = finite_values("matrix", matrix, self.space, "m"), self._shift(offset, self.space)
         if self.is_empty:
-            return self.empty(rows.shape[1], self.relaxation)
-        offsets, levels = self.offsets - self.normals @ moved, self.levels - self.across @ moved
-        return self.from_constraints(self.normals @ rows, offsets, self.across @ rows, levels)
+            return self.empty(factor.shape[1])
+        inverse = _inverse(factor, 1.0 / FLAT) if len(factor) == factor.shape[1] else None
+        if inverse is not None:
+            product, _ = dd.affine_image(np.ascontiguousarray(inverse.T), factor, np.zeros(self.space))
+            reach = np.abs(self.vertices - moved).max(axis=0)
+            errors = 1.01 * np.abs(inverse) @ (np.abs(product.T - np.eye(self.space)) @ reach)
+            shift, rounded = dd.affine_image(-moved[None], inverse, np.zeros(self.space))
+            return self._mapped(inverse, shift[0], errors + rounded)
+        rows, limits = self._rows()
+        mapped, rounded = dd.affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
+        terms = np.abs(rows) @ np.abs(factor), np.abs(limits) + np.abs(rows) @ np.abs(moved)
+        found = self._of_rows(mapped, limits - rows @ moved, terms)
+        if found.is_empty or len(found.equations) or not (rounded.any() or moved.any()):
+            return found
+        return found.enlarged(2.0 * dd.EPS * np.abs(found.vertices).max(axis=0))
 
     def minkowski_sum(self, other: Polytope) -> Polytope:
         """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two vertices."""
         self._need_other(other)
         if self.is_empty or other.is_empty:
             return self if self.is_empty else other
-        sums = self.vertices[:, None, :] + other.vertices[None, :, :]
-        return self._hull(sums.reshape(-1, self.space), solid=self.space in (self.dimension, other.dimension))
+        pairs = [np.repeat(self.points, len(other.points), axis=0), np.tile(other.points, (len(self.points), 1))]
+        matrix = np.hstack([np.diag(self.scale), np.diag(other.scale)])
+        shift, rounded = dd.affine_image(self.centre[None], np.eye(self.space), other.centre)
+        points, centre, scale, errors = _image(np.hstack(pairs), matrix, shift[0], rounded)
+        return self._hull(points, centre, scale, FLAT, errors)
+
+    def add_segment(self, half: ArrayLike) -> Polytope:
+        """Return the Minkowski sum with the segment from -half to +half, shape (n,).
+
+        Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet:
+        no hull is needed if the set has an interior.
+        """
+        along = finite_values("half", half, self.space)
+        if self.is_empty or not along.any():
+            return self
+        if self.dimension < self.space:
+            return self.minkowski_sum(self.from_vertices([-along, along]))
+        along = along / self.scale
+        row = np.append(along / np.abs(along).max(), 0.0)
+        heights, signs = dd.sides(self.facets, row, 1.0)
+        ridges = dd.transposed(self.incidence, len(self.facets))
+        new, common = dd.crossings(self.facets, ridges, heights, signs, self.space - 1, False)
+        directed = np.abs(new[:, :-1]).max(axis=1, initial=0.0) > dd.ON  # not of two opposite facets
+        new, common = new[directed], common[directed]
+        on, on_new = dd.unpacked(self.incidence, len(signs)), dd.unpacked(common, len(self.points)).T
+        upper, lower = on[:, signs > 0].any(axis=1), on[:, signs < 0].any(axis=1)
+        incidence = np.vstack(
+            [
+                np.hstack([on[upper] & (signs >= 0), on_new[upper]]),
+                np.hstack([on[lower] & (signs <= 0), on_new[lower]]),
+            ]
+        )
+        ends = np.repeat([1.0, -1.0], [upper.sum(), lower.sum()])
+        starts = np.column_stack([np.vstack([self.points[upper], self.points[lower]]), ends])
+        points, errors = dd.affine_image(starts, np.column_stack([np.eye(self.space), along]), np.zeros(self.space))
+        facets = np.vstack([self.facets, new])
+        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1] @ along) + 2.0 * dd.EPS * np.abs(facets[:, -1])
+        whole = replace(self, points=points, facets=facets, incidence=dd.packed(incidence))
+        try:
+            whole = whole._around(errors)._reduced(np.zeros(len(points), bool))
+        except UncertainHullError:
+            return self._hull(points, self.centre, self.scale, FLAT, errors)
+        return whole if np.abs(points).max() < 64.0 else whole.affine_map(np.eye(self.space))
+
+    def enlarged(self, by: ArrayLike) -> Polytope:
+        """Return a set that contains {x + e: |e_i| <= by_i}, shape (n,): each facet moves outward by as much.
+
+        A flat set becomes 3e-8 of its coordinates thick. O((v + f) n) for a set with an interior.
+        """
+        margin = finite_values("by", by, self.space)
+        not_negative("by", float(margin.min()))
+        if self.is_empty or not margin.any():
+            return self
+        start = self if self.dimension == self.space else self._prism(margin)
+        facets = start.facets.copy()
+        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ (margin / self.scale)
+        most = dd.TIP + 32.0 * float((margin / self.scale).max())
+        points = dd.push_out(start.points, facets, start.incidence, np.ones(len(start.points), bool), False, most)
+        return replace(start, points=points, facets=facets)
+
+    def _prism(self, margin: Floats) -> Polytope:
+        """Return a flat set with its translations across the affine hull by a `margin`, shape (n,), or 3e-8 of its size.
+
+        The other coordinates have the coefficient one in one equation alone.
+        """
+        sizes = np.maximum(margin / self.scale, _THICK * np.abs(self.vertices / self.scale).max(axis=0))
+        heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, _THICK)
+        points, on = self.points, dd.unpacked(self.incidence, len(self.facets))
+        others = np.delete(np.arange(self.space), self._own)
+        for axis, height in zip(others, heights, strict=True):
+            along, above = np.eye(self.space)[axis] * height, np.repeat([False, True], len(points))
+            points = np.vstack([points - along, points + along])
+            on = np.column_stack([np.vstack([on, on]), above, ~above])
+        ends = np.stack([self.equations, -self.equations], axis=1)
+        ends[:, :, -1] += heights[:, None]
+        sides = np.vstack([self.facets, ends.reshape(-1, self.space + 1)])
+        sides *= np.ldexp(1.0, -np.frexp(np.abs(sides).max(axis=1))[1])[:, None]
+        return replace(self, points=points, facets=sides, equations=self.equations[:0], incidence=dd.packed(on))
 
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
@@ -120,52 +242,42 @@ class Polytope(PolytopeArrays):
             return self
         if other.is_empty:
             raise ValueError("the difference with an empty set is unbounded")
-        rows, limits = self.constraints()
-        limits = limits - other.support_function(rows)
-        most, minimum = np.split(limits[len(self.normals) :], 2)
-        sizes = np.maximum(np.abs(self.vertices).max(axis=0), np.abs(other.vertices).max(axis=0))
-        if (most + minimum < -_FLAT_WIDTH * np.abs(self.across) @ sizes).any():
-            return self.empty(self.space, min_relaxation(rows, limits))
+        rows, limits = self._rows(self.centre)
+        widths = dd.supports(other.vertices, rows)
+        less = limits - widths
+        less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
         (lower, upper), (start, end) = self.bounding_box(), other.bounding_box()
-        sides = self.normals, limits[: len(self.normals)], self.across, 0.5 * (most - minimum)
-        return self._in_box(sides, lower - start, upper - end, upper - lower, solid=self.dimension == self.space)
+        terms = np.abs(rows), np.abs(limits) + np.abs(widths)
+        box = lower - start, np.maximum(upper - end, lower - start)
+        return self._of_rows(rows, less, terms, box, self.centre)
 
     def intersection(self, *others: Polytope) -> Polytope:
-        """Return the intersection with one or more polytopes, from the facets of all."""
-        sets = (self, *map(self._need_other, others))
-        for one in sets:
-            if one.is_empty:
-                return one
-        boxes = np.array([one.bounding_box() for one in sets])
-        widths = np.min(boxes[:, 1] - boxes[:, 0], axis=0)
-        names = ("normals", "offsets", "across", "levels")
-        sides = tuple(np.concatenate([getattr(one, name) for one in sets]) for name in names)
-        solid = all(one.dimension == one.space for one in sets)
-        return self._in_box(sides, boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0), widths, solid=solid)
+        """Return the intersection with one or more polytopes: one step of the double description for each facet."""
+        sets = sorted((self, *map(self._need_other, others)), key=lambda one: (one.dimension, -len(one.facets)))
+        if sets[0].is_empty:
+            return sets[0]
+        found = sets[0]
+        for one in sets[1:]:
+            found = found._meet(one)
+            if found.is_empty:
+                rows, limits = zip(*(one.constraints() for one in sets), strict=True)
+                return self.empty(self.space, (np.vstack(rows), np.concatenate(limits)))
+        return found
 
-    @classmethod
-    def _in_box(
-        cls, sides: tuple[Floats, ...], lower: Floats, upper: Floats, widths: Floats, *, solid: bool
-    ) -> Polytope:
-        """Return {x: rows x <= limits, across x = levels}, which is known to lie between `lower` and `upper`.
-
-        `widths` are those of sets that contain it; `solid` is whether these have an interior.
-        """
-        rows, limits, across, levels = sides
-        axes = LocalAxes.needed(lower, upper, widths if solid else None, widths)
-        try:
-            if axes is not None:
-                return cls(*axes.intersection(rows, limits, across, levels, widths))
-            near, box = without_far(rows, limits, lower, upper), np.array([lower, upper, widths])
-            return cls(*described(*near, across, levels, bounded=True, box=box))
-        except EmptyPolytopeError as error:
-            return cls.empty(len(lower), error.relaxation)
+    def _meet(self, other: Polytope) -> Polytope:
+        """Return the intersection with one polytope; neither is empty."""
+        boxes = np.array([self.bounding_box(), other.bounding_box()])
+        lower, upper, widths = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0), boxes[0, 1] - boxes[0, 0]
+        if not (SMALL * (upper - lower) < widths).any():
+            return self._with_rows(*other._rows(other.centre), other.centre)
+        rows, limits = zip(*(one._rows(self.centre) for one in (self, other)), strict=True)
+        box = lower, np.maximum(lower, upper)
+        return self._of_rows(np.vstack(rows), np.concatenate(limits), box=box, origin=self.centre)
 
     def convex_hull(self, *others: Polytope) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
-        points = np.vstack([self.vertices, *(self._need_other(one).vertices for one in others)])
-        solid = self.space in (self.dimension, *(one.dimension for one in others))
-        return self._hull(points, solid=solid) if len(points) else self
+        sets = [one for one in (self, *map(self._need_other, others)) if not one.is_empty]
+        return self._of_points(np.vstack([one.vertices for one in sets])) if sets else self
 
     def cut(
         self,
@@ -191,20 +303,15 @@ class Polytope(PolytopeArrays):
         not_negative("slack_ulp", slack_ulp)
         if self.is_empty:
             return self
-        wider = slack_ulp * _EPS * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
+        wider = slack_ulp * dd.EPS * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
         rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - minimum])
-        cuts = self.support_function(rows) > limits
-        if not cuts.any():
-            return self
-        if np.isneginf(limits).any() or (minimum > most).any():
-            own_rows, own_limits = self.constraints()
-            rows, limits = np.vstack([own_rows, rows[cuts]]), np.concatenate([own_limits, limits[cuts]])
-            return self.empty(self.space, min_relaxation(rows, limits))
-        lower, upper = self.bounding_box()
-        sides = np.vstack([self.normals, rows[cuts]]), np.concatenate([self.offsets, limits[cuts]])
-        ends = tightened(rows[cuts], limits[cuts], lower, upper)
-        solid = self.dimension == self.space
-        return self._in_box((*sides, self.across, self.levels), *ends, upper - lower, solid=solid)
+        if np.isneginf(limits).any():
+            return self.empty(self.space)
+        limited = limits < np.inf
+        if (minimum > most + 2.0 * wider).any():
+            own, ends = self.constraints()
+            return self.empty(self.space, (np.vstack([own, rows[limited]]), np.append(ends, limits[limited])))
+        return self._with_rows(rows[limited], limits[limited])
 
     def project(self, axes: ArrayLike) -> Polytope:
         """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
@@ -220,22 +327,29 @@ class Polytope(PolytopeArrays):
         rest = np.delete(np.arange(self.space), numbers)
         return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(rest)
 
-    def reduce_outward(self, cap: int) -> Polytope:
+    def reduce_outward(self, cap: int, max_vertices: int | None = None) -> Polytope:
         """Return a polytope with at most `cap` (>= 2n) facets that contains the set.
 
-        It starts with the bounding box. Then it is cut by the facet of the set beyond which a vertex is farthest,
-        until it has `cap` facets: one intersection for each.
+        It starts with the bounding box. Then it is cut by the facet with the greatest excess, relative to the width of
+        the set along its normal, until it has `cap` facets.
         """
         Limits(minimum=2 * self.space, whole=True).need("cap", cap)
-        if self.is_empty or len(self.normals) <= cap:
+        most = 10**9 if max_vertices is None else max_vertices
+        if self.is_empty or (len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= most):
             return self
+        if self.dimension == self.space:
+            from infoset.geometry.polytope.reduction import reduced_outward
+
+            return reduced_outward(self, cap, most)
         outer = self.from_box(*self.bounding_box())
-        rows, limits = self.constraints()
+        rows, limits = self._rows()
+        widths = np.ptp(self.vertices @ rows.T, axis=0)
+        widths = np.maximum(widths, dd.EPS * np.abs(rows) @ np.abs(self.vertices).max(axis=0))
         for _ in range(cap):
-            beyond = outer.support_function(rows) - limits
-            worst = int(beyond.argmax())
-            tighter = outer.cut(rows[worst], upper=limits[worst])
-            if beyond[worst] <= 0.0 or len(tighter.normals) + 2 * len(tighter.across) > cap:
+            beyond = (outer.vertices @ rows.T).max(axis=0) - limits
+            worst = int((beyond / widths).argmax())
+            tighter = outer._with_rows(rows[worst : worst + 1], limits[worst : worst + 1])
+            if beyond[worst] <= 0.0 or len(tighter.facets) + 2 * len(tighter.equations) > cap:
                 break
             outer = tighter
         return outer
@@ -247,14 +361,6 @@ class Polytope(PolytopeArrays):
         return other
 
     # Measures ---------------------------------------------------------------------------------------------------------
-
-    def constraints(self) -> tuple[Floats, Floats]:
-        """Return normals, shape (k, n), of unit length, and offsets, shape (k,): the set is normals x <= offsets.
-
-        An equation of a flat set gives two rows; an empty set is 0 x <= -1.
-        """
-        rows = np.vstack([self.normals, self.across, -self.across])
-        return rows, np.concatenate([self.offsets, self.levels, -self.levels])
 
     def support_function(self, directions: ArrayLike) -> Floats:
         """Return the maximum of direction . x, shape (...), for `directions` of shape (..., n); -inf for the empty set.
@@ -276,13 +382,9 @@ class Polytope(PolytopeArrays):
         x = self.vertices
         beyond = (x @ self.normals.T - self.offsets).max(axis=0, initial=0.0)
         away = np.abs(x @ self.across.T - self.levels).max(axis=0, initial=0.0)
+        # Points within a few tolerances of the double description count as in the affine hull.
+        away = away + 4.0 * dd.ON * (np.abs(self.across) @ np.abs(x).max(axis=0, initial=0.0))
         return beyond, away
-
-    @cached_property
-    def _axes(self) -> LocalAxes | None:
-        """Coordinates in which the set is about one wide, if its own differ much."""
-        lower, upper = self.bounding_box()
-        return LocalAxes.needed(lower, upper, upper - lower if self.dimension == self.space else None)
 
     def excess(self, points: ArrayLike) -> Floats:
         """Return the maximum distance of `points`, shape (..., n), beyond a facet or from the affine hull.
@@ -293,7 +395,7 @@ class Polytope(PolytopeArrays):
         x = finite_values("points", points, "...", self.space)
         if self.is_empty:
             return np.full(x.shape[:-1], np.inf)
-        reach = (self.space + 2) * _EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
+        reach = (self.space + 2) * dd.EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
         over, apart = self._misfits
         beyond = x @ self.normals.T - self.offsets - over - _bent(reach, self.normals)
         away = np.abs(x @ self.across.T - self.levels) - apart - _bent(reach, self.across)
@@ -330,7 +432,20 @@ class Polytope(PolytopeArrays):
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
-        return 0.0 if self.is_empty else volume_of(self.vertices, self._axes)
+        if self.is_empty:
+            return 0.0
+        # Along each column of the triangle of `_steps` the scaled coordinates are turned and stretched by its diagonal.
+        stretch = np.prod(np.abs(np.diag(triangle_of(self._steps)[0]))) if self.dimension else 1.0
+        return float(self._simplices[1].sum() * stretch / factorial(self.dimension))
+
+    @cached_property
+    def _simplices(self) -> tuple[Integers, Floats]:
+        """Vertices of simplices that divide the set, shape (k, d + 1), and their determinants in d coordinates."""
+        if not self.dimension:
+            return np.zeros((1, 1), np.int64), np.ones(1)
+        corners = simplices_of(dd.transposed(self.incidence, len(self.facets)), self.dimension)
+        inner = self.points[:, self._own]
+        return corners, np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
 
     def area(self) -> float:
         """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
@@ -338,22 +453,27 @@ class Polytope(PolytopeArrays):
 
     def centroid(self) -> Floats:
         """Return the centroid within the affine hull, shape (n,), from a division into simplices."""
-        simplices, shares = simplices_of(self.needed().vertices, self._axes)
-        return np.asarray(shares @ simplices.mean(axis=1))
+        corners, sizes = self.needed()._simplices
+        return np.asarray(self.centre + self.scale * (sizes / sizes.sum() @ self.points[corners].mean(axis=1)))
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
         """Return points distributed uniformly over the set, shape (count, n), from a division into simplices."""
         random = np.random.default_rng(seed)
-        simplices, shares = simplices_of(self.needed().vertices, self._axes)
-        weights = random.dirichlet(np.ones(simplices.shape[1]), count)
-        return np.asarray(np.einsum("ij,ijk->ik", weights, simplices[random.choice(len(shares), count, p=shares)]))
+        corners, sizes = self.needed()._simplices
+        weights = random.dirichlet(np.ones(corners.shape[1]), count)
+        chosen = corners[random.choice(len(sizes), count, p=sizes / sizes.sum())]
+        return np.asarray(self.centre + self.scale * np.einsum("ij,ijk->ik", weights, self.points[chosen]))
 
     def chebyshev_centre(self) -> tuple[Floats, float]:
         """Return the centre, shape (n,), and the radius of a largest ball in the set, within its affine hull.
 
         A linear program (HiGHS) in coordinates about the centre of the vertices.
         """
-        return max_ball(self.needed().vertices, self.normals, self.offsets, self._axes)
+        middle = self.needed().vertices.mean(axis=0)
+        if not self.dimension:
+            return middle, 0.0
+        inner, radius = largest_ball(self.normals @ self._steps, self.offsets - self.normals @ middle)
+        return middle + self._steps @ inner, max(0.0, radius)
 
     def diameter(self) -> float:
         """Return the maximum distance between two vertices; 0 for the empty set. O(v^2 n)."""
@@ -411,6 +531,32 @@ class Polytope(PolytopeArrays):
 
     def __le__(self, other: Polytope) -> bool:
         return self.is_subset(other) if isinstance(other, Polytope) else NotImplemented
+
+
+def _inverse(matrix: Floats, condition: float) -> Floats | None:
+    """Return the inverse of a square matrix; None if its condition is greater, whatever the units of its columns."""
+    units = np.abs(matrix).max(axis=0)
+    if not units.all():
+        return None
+    try:
+        inverse = np.linalg.inv(matrix / units)
+    except np.linalg.LinAlgError:
+        return None
+    sizes = np.abs(matrix / units).sum(axis=1).max() * np.abs(inverse).sum(axis=1).max()
+    return inverse / units[:, None] if sizes < condition else None
+
+
+def _image(points: Floats, matrix: Floats, shift: Floats, rounded: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return matrix y + shift of points, shape (k, m), in new coordinates, with their centre, scale and errors.
+
+    `rounded`, shape (m,), are errors of the shift.
+    """
+    rough = points @ matrix.T
+    reach = np.abs(matrix) @ np.abs(points).max(axis=0)
+    # Of a coordinate that is zero but for rounding, the errors stay small in the new coordinates.
+    centre, scale = coordinates(rough.min(axis=0) + shift, rough.max(axis=0) + shift, 2.0**-10 * reach)
+    image, errors = dd.affine_image(points, matrix / scale[:, None], (shift - centre) / scale)
+    return image, centre, scale, errors + rounded / scale
 
 
 def _bent(reach: Floats, rows: Floats) -> Floats:

@@ -15,7 +15,7 @@ VOCABULARY = {
     "cut", "preimage", "support_function", "support_vector", "contains", "is_subset", "equals", "is_empty",
     "vertices", "constraints", "area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter",
     "hausdorff_distance", "distance", "closest_point", "project", "slice", "sample", "reduce_outward", "plot",
-    "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely", "to_shapely",
+    "add_segment", "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely", "to_shapely",
     "margin", "empty",
 }  # fmt: skip
 """The names of both classes."""
@@ -26,14 +26,15 @@ ONLY_POLYGONS = {
     "polytope": "conversion; the reverse is ConvexPolygons.from_points(P.vertices)",
     "from_points": "from_vertices of a Polytope is a hull of points in any order; a ring has an order",
     "unchecked": "for arrays of kernels, which only polygons have",
-    "add_segment": "the sum with a segment in O(n); a segment is also a Polytope of two vertices",
 }
 ONLY_POLYTOPES = {
     **dict.fromkeys(["normals", "offsets", "across", "levels"], "stored facets and affine hull; polygons compute them"),
     **dict.fromkeys(["space", "dimension"], "a polygon is in R^2, and its number of vertices shows its dimension"),
     **dict.fromkeys(["relaxation", "needed"], "minimum relaxation of an empty set, known from linear programs"),
     "excess": "-margin; needed where no sign must change",
-    "essential_vertices": "vertices that may be the same point; polygons decide this exactly",
+    **dict.fromkeys(["points", "facets", "equations", "incidence", "centre", "scale"], "arrays in scaled coordinates"),
+    "conflict": "half-spaces without a common point, for the relaxation",
+    "enlarged": "outward by given errors; kernels of polygons do this at each step",
 }
 
 

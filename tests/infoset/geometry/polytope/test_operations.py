@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from infoset import ConvexPolygons
 from infoset.arrays import Floats
-from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, _qhull
+from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError
 from tests.rationals import Fraction
 from tests.rendezvous.reachability.rationals import RationalSet, polyhedron_of, rounded, vertices_of
 
@@ -259,15 +259,6 @@ def test_balls_and_zonotopes() -> None:
     wanted = directions @ [1.0, 2.0, 3.0] + np.abs(directions @ generators.T).sum(axis=1)
     np.testing.assert_allclose(zonotope.support_function(directions), wanted, rtol=1e-12)
     assert Polytope.from_zonotope([1.0, 2.0], []).dimension == 0
-
-
-def test_a_hull_is_the_same_if_its_tables_are_computed_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With 46080 facets the tables of pairs of facets did not fit into memory."""
-    points = np.random.default_rng(2).normal(size=(40, 4))
-    whole = Polytope.from_vertices(points)
-    monkeypatch.setattr(_qhull, "_ENTRIES", 1000)
-    for part in ("vertices", "normals", "offsets"):
-        np.testing.assert_array_equal(getattr(Polytope.from_vertices(points), part), getattr(whole, part))
 
 
 # Published cases ----------------------------------------------------------------------------------------------------

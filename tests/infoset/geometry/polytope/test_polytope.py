@@ -13,10 +13,8 @@ from infoset.geometry.polytope import (
     EmptyPolytopeError,
     Polytope,
     UnboundedPolytopeError,
-    _qhull,
     polytope_from_support,
     product,
-    relative_interior,
 )
 from tests.rendezvous.reachability.rationals import rational_hull, rational_intersection
 
@@ -66,26 +64,6 @@ def test_redundant_points_and_halfspaces_are_dropped() -> None:
     assert (len(again.vertices), len(again.normals)) == (8, 6)
 
 
-def test_many_vertices_and_few_facets() -> None:
-    corners = np.array(list(itertools.product([-1.0, 1.0], repeat=8)))
-    normals, offsets = np.vstack([np.eye(8), -np.eye(8)]), np.ones(16)
-    on = corners @ normals.T == 1.0
-    every = np.arange(256)
-    vertices, facets, _ = _qhull.essential(corners, normals, offsets)
-    assert (len(vertices), len(facets)) == (256, 16)
-    assert _qhull._meet_in(corners, every, normals, offsets, on)
-    assert not _qhull._meet_in(corners, every[1:], normals, offsets, on)
-    assert not _qhull._meet_in(np.vstack([corners, 1.1 * corners[:1]]), every, normals, offsets, on)
-    assert not _qhull._meet_in(
-        np.vstack([corners, np.zeros(8)]), np.arange(257), normals, offsets, np.vstack([on, on[:1]])
-    )
-    for facet in range(3):  # the others do not bound a set
-        rest = np.delete(normals, facet, 0), np.delete(offsets, facet), np.delete(on, facet, 1)
-        assert not _qhull._meet_in(corners, every, *rest)
-    on[0] = False
-    assert not _qhull._meet_in(corners, every, normals, offsets, on)
-
-
 @needs_ppl
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 6), flat=st.integers(0, 3), extra=st.integers(1, 8))
@@ -120,7 +98,7 @@ def test_flat_hull_is_the_exact_one(seed: int, size: int, rank: int, extra: int)
 @needs_ppl
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 5), count=st.integers(1, 8))
-@example(seed=1219, size=5, count=6)  # Qhull stops in the check of the facets unless vertices are joggled
+@example(seed=1219, size=5, count=6)
 @example(seed=1374, size=5, count=2)
 @example(seed=1477, size=5, count=6)
 def test_intersection_is_the_exact_one(seed: int, size: int, count: int) -> None:
@@ -131,8 +109,10 @@ def test_intersection_is_the_exact_one(seed: int, size: int, count: int) -> None
     exact = rational_intersection(rows, limits)
     assert (len(found.vertices), len(found.normals)) == (len(exact.vertices), exact.facets)
     np.testing.assert_allclose(np.stack(found.bounding_box(), axis=-1), exact.bounds, atol=1e-9)
+    # The vertices are rounded: their hull may have more facets, but is the same set.
     again = Polytope.from_vertices(found.vertices)
-    assert (len(again.vertices), len(again.normals)) == (len(found.vertices), len(found.normals))
+    assert len(again.vertices) == len(found.vertices)
+    assert again.equals(found, 1e-12)
 
 
 def test_flat_sets_meet_in_flat_sets() -> None:
@@ -189,12 +169,6 @@ def test_projection_of_a_flat_set_and_of_one_with_too_many_facets() -> None:
         polytope_from_support(lambda direction: direction / np.linalg.norm(direction), 2, max_facets=20)
 
 
-def test_vertices_that_lie_together_count_once() -> None:
-    near = Polytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [1.0, 1e-8], [0.0, 1.0]])
-    assert len(near.vertices) == 4
-    assert near.essential_vertices() == 3
-
-
 @pytest.mark.parametrize("junk", [0.0, 1e-17, -1e-17])
 def test_rows_that_rounding_left_of_nothing_are_no_constraints(junk: float) -> None:
     rows = np.vstack([np.eye(3), -np.eye(3), [[0.0, junk, -junk]], np.zeros((1, 3))])
@@ -202,15 +176,6 @@ def test_rows_that_rounding_left_of_nothing_are_no_constraints(junk: float) -> N
     found = Polytope.from_constraints(rows, limits)
     assert found.dimension == 3
     assert len(found.vertices) == 8
-
-
-def test_a_set_with_a_known_member_is_not_empty() -> None:
-    member = np.array([0.3, 0.1])
-    rows = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-    limits = rows @ member - 1e-16
-    found = relative_interior(rows, limits, np.zeros((0, 2)), np.zeros(0), bounded=True, member=member)
-    assert found.dimension == 0
-    np.testing.assert_allclose(found.point, member, atol=1e-15)
 
 
 @pytest.mark.parametrize("far", [1e3, 1e6, 1e9, 1e12, 1e15])

@@ -1,0 +1,35 @@
+"""Errors of polytopes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from infoset.arrays import Floats
+
+
+class EmptyPolytopeError(ValueError):
+    """No point satisfies the constraints.
+
+    `relaxation` is the minimum relaxation of every constraint, its normal of unit length, with which a point satisfies
+    all; 0 if it is not known.
+    """
+
+    def __init__(self, relaxation: float) -> None:
+        remedy = f"; it is not if its constraints are relaxed by {relaxation:.3g}" if relaxation else ""
+        super().__init__(f"the polytope is empty{remedy}")
+        self.relaxation = relaxation
+
+
+class UnboundedPolytopeError(ValueError):
+    """The constraints do not bound a set; `direction`, shape (n,), of unit length, is one in which it is unbounded."""
+
+    def __init__(self, direction: Floats) -> None:
+        direction = direction / np.abs(direction).max()
+        direction = direction / np.linalg.norm(direction) + 0.0
+        shown = ", ".join(f"{component:.3g}" for component in direction)
+        super().__init__(f"the polytope is unbounded along ({shown})")
+        self.direction = direction
+
+
+class UncertainHullError(ArithmeticError):
+    """Facets and vertices do not agree because of rounding."""
