@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from rich.table import Table
@@ -29,6 +30,12 @@ class Report:
     estimates: Sequence[Estimate]
     smoothed: Sequence[Estimate] | None
     inconsistency: Inconsistency
+
+    @cached_property
+    def excess_widths(self) -> Floats | None:
+        """Difference between the widths of the last set and the exact ones, shape (n,); None if it is not reduced."""
+        last = self.estimates[-1]
+        return last.excess_widths() if last.reduced and not last.is_empty else None
 
     @property
     def contradicted(self) -> bool:
@@ -64,6 +71,7 @@ def report_json(report: Report) -> dict[str, object]:
         "states": report.problem.names,
         "steps": steps,
         "final": _bounds(report.estimates[-1]),
+        "excess_widths": report.excess_widths,
         "inconsistency": {"k": int(where.step), "output": int(where.output) + 1, "excess": float(where.excess)}
         if report.contradicted
         else None,
@@ -133,6 +141,9 @@ def report_lines(report: Report) -> Iterator[Part]:
     if report.data.states is not None:
         inside = sum(map(contains, report.estimates, report.data.states))
         yield f"true state inside the set: {inside} of {count} steps"
+    if report.excess_widths is not None:
+        excess = ", ".join(f"{each:.3g}" for each in report.excess_widths)
+        yield f"the sets have a bounded number of facets; the last one is wider than the exact one by {excess}"
     if report.contradicted:
         where = report.inconsistency
         yield (

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +16,13 @@ from infoset.geometry._set_arguments import finite_values
 from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.geometry.polytope import Polytope
 from infoset.geometry.zonotope import Zonotope
-from infoset.limits import COUNT, real_values, shown
-from infoset.observer.sets import Motion, Polygons, Polytopes, Set, Sets, Strips, polytope_of
+from infoset.limits import COUNT, Limits, real_values, shown
+from infoset.observer.programs import exact_hull
+from infoset.observer.sets import Motion, Polygons, Polytopes, Set, Sets, Strips, polytope_of, sizes_of
 
 MAX_STATES = 6
+MAX_RECORD = 20_000
+"""Number of steps and measurements up to which they are kept, so that the memory of an observer is bounded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,18 +48,64 @@ class Inconsistency:
 
 
 @dataclass(frozen=True, eq=False)
+class Record:
+    """The initial set, and the first `count` of the events: steps and measurements."""
+
+    initial: Set
+    events: list[Motion | Strips]
+    count: int
+
+    def hull(self, run: int, step: int, sizes: Floats) -> Floats:
+        """Return the exact bounds of the states of a run at a step; see `exact_hull`."""
+        if len(self.events) < self.count:
+            raise ValueError(f"exact widths are known for {MAX_RECORD} steps and measurements, not more")
+        return exact_hull(self.initial, self.events[: self.count], run, step, sizes)
+
+
+@dataclass(frozen=True, eq=False)
 class Estimate:
-    """The sets of possible states of all runs at a step; with `single` there is one run, without an axis of runs."""
+    """The sets of possible states of all runs at a step; with `single` there is one run, without an axis of runs.
+
+    `record` has the steps and the measurements that the sets result from.
+    """
 
     step: int
     sets: Sets = field(repr=False)
     single: bool
     states: int
+    record: Record = field(repr=False)
 
     @property
     def is_empty(self) -> Flags:
         """Whether no state is possible, shape () or (B,)."""
         return np.asarray(self._runs(self.sets.is_empty))
+
+    @property
+    def reduced(self) -> Flags:
+        """Whether the set is larger than the exact one, because it was reduced to a bounded number of facets.
+
+        Shape () or (B,). Polygons of two states are exact up to 512 vertices, and not counted here.
+        """
+        return np.asarray(self._runs(self.sets.reduced))
+
+    def excess_widths(self) -> Floats:
+        """Return by how much the width of the set along each state exceeds the exact one, shape (n,) or (B, n).
+
+        2 n linear programs over the whole record for each reduced run, with errors of about 1e-9 of a state; 0 for
+        other runs, and NaN for the empty set.
+
+        Raises
+        ------
+        ValueError
+            After more than 10 000 steps: the record is no longer kept.
+        """
+        lower, upper = (np.atleast_2d(end) for end in self._hull)
+        excess = np.where(np.isnan(lower), np.nan, 0.0)
+        for run in np.flatnonzero(np.atleast_1d(self.reduced) & ~np.atleast_1d(self.is_empty)):
+            sizes = np.maximum(np.abs(lower[run]), np.abs(upper[run]))
+            hull = self.record.hull(int(run), self.step, np.where(sizes > 0.0, sizes, 1.0))
+            excess[run] = np.maximum(upper[run] - lower[run] - (hull[1] - hull[0]), 0.0)
+        return self._runs(excess)
 
     @property
     def polygons(self) -> ConvexPolygons:
@@ -78,8 +128,7 @@ class Estimate:
     def polytopes(self) -> tuple[Polytope, ...]:
         """The set of each run; a tuple of one set for a single run."""
         if isinstance(self.sets, Polytopes):
-            empty = Polytope.empty(self.states)
-            return tuple(empty if member is None else member.polytope for member in self.sets.members)
+            return tuple(member.polytope for member in self.sets.members)
         assert isinstance(self.sets, Polygons)
         pairs = zip(self.sets.vertices, self.sets.counts, strict=True)
         return tuple(Polytope.from_vertices(points[:count]) if count else Polytope.empty(2) for points, count in pairs)
@@ -123,7 +172,8 @@ class LinearObserver:
     """Exact sets of the states of x+ = A x + B u + c + w, y = C x + v, with w in W and v in V.
 
     Two states: polygons, compiled, batched over runs. One, and three to six states: polytopes, each run after the
-    other; the number of vertices grows fast with the number of states.
+    other. A polytope of more than `max_facets` facets is replaced by a larger one with fewer, so that the time of a
+    step is bounded; `Estimate.reduced` and `excess_widths` give the effect.
 
     Parameters
     ----------
@@ -143,6 +193,9 @@ class LinearObserver:
         c.
     runs : int, optional
         Number B of runs. Without it there is one run, and its arrays have no axis of runs.
+    max_facets : int or None, optional
+        Maximum number of facets of a polytope, at least 2n: 60 to four states, and 30 with at most 400 vertices above.
+        None keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError.
 
     Raises
     ------
@@ -151,9 +204,9 @@ class LinearObserver:
 
     Notes
     -----
-    The computed sets contain the exact ones. They are larger by a few ulp (two states) or by 1e-12 of the coordinates
-    (polytopes), so that errors exactly at their bounds do not lose the true state. Polygons of more than 512 vertices
-    are reduced outward.
+    The computed sets contain the exact ones. Without reduction they are larger by a few ulp (two states) or by 1e-12 of
+    the coordinates (polytopes), so that errors exactly at their bounds do not lose the true state. Polygons of more
+    than 512 vertices are reduced outward.
 
     Examples
     --------
@@ -176,6 +229,7 @@ class LinearObserver:
         input_matrix: ArrayLike | None = None,
         offset: ArrayLike | None = None,
         runs: int | None = None,
+        max_facets: int | Literal["auto"] | None = "auto",
     ) -> None:
         self._a = _matrices("state_matrix", state_matrix)
         self.states = self._a.shape[-1]
@@ -199,6 +253,10 @@ class LinearObserver:
             )
         if runs is not None:
             COUNT.need("runs", runs)
+        if max_facets == "auto":
+            max_facets = 60 if self.states <= 4 else 30
+        if max_facets is not None:
+            Limits(minimum=2 * self.states, whole=True).need("max_facets", max_facets)
         self._single = runs is None
         self._runs = runs or 1
         self._disturbance = Zonotope(np.zeros(self.states), []) if disturbance is None else disturbance
@@ -208,8 +266,9 @@ class LinearObserver:
         self._sets: Sets = (
             Polygons.of(initial, self._runs)
             if self.states == 2
-            else Polytopes.of(initial, self._runs, _sizes_of(self._disturbance))
+            else Polytopes.of(initial, self._runs, max_facets, sizes_of(self._disturbance))
         )
+        self.max_facets, self._initial, self._events, self._count = max_facets, initial, list[Motion | Strips](), 0
         self.step = 0
         self._empty = np.full(self._runs, -1), np.zeros(self._runs, dtype=np.int64), np.zeros(self._runs)
 
@@ -230,7 +289,7 @@ class LinearObserver:
 
         Parameters
         ----------
-        inputs : array_like, shape (p,) or (B, p), optional
+        inputs : array_like, shape (p,) or (B, p), or a number for one input, optional
             u between this step and the next one; without it zero.
 
         Raises
@@ -238,9 +297,11 @@ class LinearObserver:
         ValueError
             If the inputs have another shape or are not finite, or a matrix for this step is missing.
         ArithmeticError
-            If a polytope has more than 5000 vertices.
+            If a polytope has more than 5000 vertices and no `max_facets`, or rounding decides which are vertices.
         """
-        self._sets = self._sets.predicted(self._motion(self.step, inputs))
+        motion = self._motion(self.step, inputs)
+        self._sets = self._sets.predicted(motion)
+        self._note(motion)
         self.step += 1
 
     def update(self, measurement: ArrayLike) -> None:
@@ -248,7 +309,7 @@ class LinearObserver:
 
         Parameters
         ----------
-        measurement : array_like, shape (q,) or (B, q)
+        measurement : array_like, shape (q,) or (B, q), or a number for one output
             y; NaN is a missing measurement.
 
         Raises
@@ -266,16 +327,27 @@ class LinearObserver:
         lower, upper = np.where(exists, strips.lower, -np.inf), np.where(exists, strips.upper, np.inf)
         excess = np.zeros((self._runs, len(strips.normals)))
         before = self._sets.is_empty
-        self._sets = self._sets.cut(Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0)), excess)
+        strips = Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0))
+        self._sets = self._sets.cut(strips, excess)
+        self._note(strips)
         lost = np.flatnonzero(self._sets.is_empty & ~before)
         if len(lost):
             step, output, amount = self._empty
             step[lost], output[lost] = self.step, excess[lost].argmax(axis=1)
             amount[lost] = excess[lost].max(axis=1)
 
+    def _note(self, event: Motion | Strips) -> None:
+        """Keep a step or a measurement, of sets that may be reduced, for their exact widths."""
+        self._count += 1
+        if self.states != 2 and self.max_facets is not None and self._count <= MAX_RECORD:
+            self._events.append(event)
+        else:
+            self._events = []
+
     def estimate(self) -> Estimate:
         """Return the present sets."""
-        return Estimate(self.step, self._sets, self._single, self.states)
+        record = Record(self._initial, self._events, self._count)
+        return Estimate(self.step, self._sets, self._single, self.states, record)
 
     @property
     def inconsistency(self) -> Inconsistency:
@@ -334,7 +406,7 @@ class LinearObserver:
             step = smoothed[i].step
             motion = self._motion(step, None if rows is None else rows[i])
             sets = smoothed[i].sets.preimage_cut(smoothed[i + 1].sets, motion)
-            smoothed[i] = Estimate(step, sets, self._single, self.states)
+            smoothed[i] = replace(smoothed[-1], step=step, sets=sets)
         return smoothed
 
     def _motion(self, step: int, inputs: ArrayLike | None) -> Motion:
@@ -348,6 +420,8 @@ class LinearObserver:
     def _rows(self, name: str, values: ArrayLike, size: int, *, missing: bool = False) -> Floats:
         """Return measurements or inputs of all runs, shape (B, size)."""
         rows = real_values(name, values)
+        if size == 1 and not rows.ndim:
+            rows = rows[None]
         shapes = [(size,)] if self._single else [(size,), (self._runs, size)]
         if rows.shape not in shapes:
             raise ValueError(f"{name} must have the shape {' or '.join(map(str, shapes))}: got {rows.shape}")
@@ -421,13 +495,6 @@ def _half_spaces(polytope: Polytope) -> tuple[Floats, Floats, Floats]:
         np.concatenate([open_ends, polytope.levels]),
         np.concatenate([polytope.offsets, polytope.levels]),
     )
-
-
-def _sizes_of(shape: Set) -> Floats:
-    """Return the maximum coordinates of a set, shape (n,), or bounds of them."""
-    if isinstance(shape, Zonotope):
-        return np.asarray(np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0))
-    return np.asarray(np.abs(shape.vertices).reshape(-1, shape.vertices.shape[-1]).max(axis=0))
 
 
 def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
@@ -12,18 +13,24 @@ from numpy.typing import NDArray
 from infoset.arrays import Flags, Floats, Integers
 from infoset.engine.section_life import CUT_SLACK, SUM_SLACK
 from infoset.geometry.convex_polygons import ConvexPolygons
-from infoset.geometry.polytope import Polytope
-from infoset.geometry.polytope.double_description import FacetsAndVertices
+from infoset.geometry.polytope import Polytope, UnboundedPolytopeError, UncertainHullError
 from infoset.geometry.zonotope import Zonotope
 from infoset.observer import steps as observer_steps
 
 Set = ConvexPolygons | Polytope | Zonotope
 
-POLYTOPE_SLACK = 1e-12
-"""Enlargement of the bounds of a measurement of a polytope, relative to the terms of normal . x."""
-_SCALE_ULP = 16.0
+POLYTOPE_SLACK = 1e-11
+"""Enlargement of polytopes, relative to the terms of normal . x of a measurement, or to the widths of a prediction:
+ten tolerances of one operation, of which the tip of a sharp corner may be missing."""
 MAX_POLYTOPE_VERTICES = 5000
 """A polytope with more vertices takes minutes a step."""
+_MAX_VERTICES = 400
+"""The same for sets of five and six states that are reduced: such sets have many more vertices than facets."""
+_THIN = 3e-8
+"""Thickness of a layer in place of a flat set, relative to the coordinates."""
+_MIN_DEPTH = 1e-9
+"""Thickness of a set, in coordinates in which it is about one wide, below which rounding decides about its facets."""
+_TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +90,11 @@ class Polygons:
         """Whether each set is empty, shape (B,)."""
         return np.asarray(self.counts == 0)
 
+    @property
+    def reduced(self) -> Flags:
+        """Not known: the kernels reduce only polygons of more than 512 vertices."""
+        return np.zeros(len(self.counts), bool)
+
     def predicted(self, motion: Motion) -> Polygons:
         """Return the sets after a step."""
         none = np.zeros((0, 2))
@@ -125,95 +137,168 @@ class Polygons:
 
 
 @dataclass(frozen=True, eq=False)
-class Polytopes:
-    """Sets of any number of states; None is the empty set."""
+class Member:
+    """The set of one run as a polytope, of at most `max_facets` facets; None is no bound.
 
-    members: tuple[FacetsAndVertices | None, ...]
+    `reduced` is whether the set, or one that it was computed from, was replaced by a larger one with fewer facets.
+    """
+
+    polytope: Polytope
+    max_facets: int | None
+    reduced: bool = False
+
+    @property
+    def sizes(self) -> Floats:
+        """Maximum coordinates, shape (n,)."""
+        return np.asarray(np.abs(self.polytope.vertices).max(axis=0, initial=0.0))
+
+    def solid(self, sizes: Floats) -> Member:
+        """Return the set; a flat or very thin one is enlarged to a layer that is thicker than rounding.
+
+        `sizes`, shape (n,), are maximum terms of the coordinates of a flat set.
+        """
+        one = self.polytope
+        if one.is_empty:
+            return self
+        if one.dimension < one.space:
+            sizes = np.maximum(self.sizes, sizes)
+            return self._apply(methodcaller("enlarged", _THIN * np.where(sizes > 0.0, sizes, 1.0)))
+        if not _is_thin(one):
+            return self
+        same = self._apply(methodcaller("translate", np.zeros(one.space)))  # in coordinates of its present widths
+        if not _is_thin(same.polytope):
+            return same
+        return same._apply(methodcaller("enlarged", _THIN * np.ptp(one.vertices, axis=0)))
+
+    def limited(self) -> Member:
+        """Return a set that contains this one, with at most as many facets and vertices as allowed."""
+        space, vertices = self.polytope.space, len(self.polytope.vertices)
+        if self.max_facets is None:
+            if vertices > MAX_POLYTOPE_VERTICES:
+                raise ArithmeticError(
+                    f"the exact set has {vertices} vertices, and at most {MAX_POLYTOPE_VERTICES} are possible; give "
+                    "max_facets for a larger set with fewer facets"
+                )
+            return self
+        smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES if space > 4 else None)
+        return self if smaller is self.polytope else replace(self, polytope=smaller, reduced=True)
+
+    def _apply(self, operation: Callable[[Polytope], Polytope]) -> Member:
+        """Return the result of an operation; where rounding decides about facets, that of a larger set with fewer ones.
+
+        The last one is a box.
+        """
+        polytope = self.polytope
+        for few in (self.max_facets // 2, 0) if self.max_facets is not None else ():
+            try:
+                return replace(
+                    self, polytope=operation(polytope), reduced=self.reduced or polytope is not self.polytope
+                )
+            except (UncertainHullError, UnboundedPolytopeError):
+                polytope = polytope.reduce_outward(max(few, 2 * polytope.space))
+        return replace(self, polytope=operation(polytope), reduced=self.max_facets is not None)
+
+    def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
+        """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w."""
+        terms = np.abs(matrix) @ self.sizes + terms
+        image = self._apply(methodcaller("affine_map", matrix, shift))
+        moved = image.solid(terms)
+        was_solid = moved is image
+        if isinstance(disturbance, Zonotope):
+            for half in disturbance.generators:
+                moved = moved._apply(methodcaller("add_segment", half))
+                if len(shift) > 4:  # in many dimensions a sum has many facets
+                    moved = moved.limited()
+        else:
+            moved = moved._apply(methodcaller("minkowski_sum", polytope_of(disturbance)))
+        moved = moved.limited()
+        widths = np.ptp(moved.polytope.vertices, axis=0) if not moved.polytope.is_empty else 0.0
+        slack = POLYTOPE_SLACK if moved.solid(terms) is moved and was_solid else _THIN
+        return moved._apply(methodcaller("enlarged", SUM_SLACK * terms + slack * widths))
+
+    def cut(self, strips: Strips, run: int = 0) -> tuple[Member, Floats]:
+        """Return the part within strips, and the distances of strips from the set, shape (r,), if the part is empty."""
+        terms = np.abs(strips.normals) @ self.sizes + strips.terms[run]
+        unit = np.ldexp(1.0, -np.frexp(terms)[1])  # a row that is short in the units of the states counts like others
+        normals, ends = strips.normals * unit[:, None], (strips.lower[run], strips.upper[run])
+        excess = np.zeros(len(terms))
+        for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set
+            lower, upper = (ends[0] - slack * terms) * unit, (ends[1] + slack * terms) * unit
+            part = self._apply(methodcaller("cut", normals, lower, upper))
+            if part.polytope.is_empty or part.polytope.dimension == part.polytope.space:
+                break
+        if part.polytope.is_empty and not self.polytope.is_empty:  # find the first strip that leaves nothing
+            part = self
+            for r, normal in enumerate(normals):
+                heights = part.polytope.vertices @ normal
+                part = part._apply(methodcaller("cut", normal, lower[r], upper[r]))
+                if part.polytope.is_empty:
+                    excess[r] = max(heights.min() - upper[r], lower[r] - heights.max(), _TINY) / unit[r]
+                    break
+        if slack == _THIN and not part.polytope.is_empty:
+            widths = np.ptp(self.polytope.vertices, axis=0)
+            part = part.solid(self.sizes)._apply(methodcaller("enlarged", POLYTOPE_SLACK * widths))
+        return part.limited(), excess
+
+
+@dataclass(frozen=True, eq=False)
+class Polytopes:
+    """Sets of any number of states."""
+
+    members: tuple[Member, ...]
 
     @classmethod
-    def of(cls, start: Set, runs: int, sizes: Floats | float = 0.0) -> Polytopes:
-        """Return the same set for all runs; a flat one is widened by 3e-8 of its coordinates, or of `sizes`."""
-        return cls((FacetsAndVertices.of(polytope_of(start), sizes).enlarged(_SCALE_ULP),) * runs)
+    def of(cls, start: Set, runs: int, max_facets: int | None, sizes: Floats) -> Polytopes:
+        """Return the same set for all runs; `sizes`, shape (n,), are those of disturbances."""
+        member = Member(polytope_of(start), max_facets).solid(sizes)
+        return cls((replace(member, polytope=member.polytope.enlarged(SUM_SLACK * member.sizes)).limited(),) * runs)
 
     @property
     def is_empty(self) -> Flags:
         """Whether each set is empty, shape (B,)."""
-        return np.array([member is None for member in self.members])
+        return np.array([member.polytope.is_empty for member in self.members])
+
+    @property
+    def reduced(self) -> Flags:
+        """Whether each set was reduced, shape (B,)."""
+        return np.array([member.reduced for member in self.members])
 
     def predicted(self, motion: Motion) -> Polytopes:
-        """Return the sets after a step; raise ArithmeticError if one has more than `MAX_POLYTOPE_VERTICES`."""
-        w, states = motion.disturbance, len(motion.matrix)
-        centre = w.centre if isinstance(w, Zonotope) else np.zeros(states)
-        shifts, terms = (
-            np.broadcast_to(values, (len(self.members), states))
-            for values in (motion.shifts + centre, motion.terms + np.abs(centre))
-        )
-        results: list[FacetsAndVertices | None] = []
-        for member, shift, term in zip(self.members, shifts, terms, strict=True):
-            if member is None:
-                results.append(None)
-                continue
-            moved = member.affine_image(motion.matrix, shift)
-            if isinstance(w, Zonotope):
-                for half in w.generators:
-                    moved = moved.plus_segment(half)
-            else:
-                moved = moved.plus(polytope_of(w))
-            if len(moved.vertices) > MAX_POLYTOPE_VERTICES:
-                raise ArithmeticError(
-                    f"the exact set has {len(moved.vertices)} vertices, and at most {MAX_POLYTOPE_VERTICES} are "
-                    "possible; use fewer states, fewer steps, or zonotopes of another library"
-                )
-            results.append(moved.enlarged(_SCALE_ULP, term))
-        return Polytopes(tuple(results))
+        """Return the sets after a step; raise ArithmeticError if one has too many vertices."""
+        w, shape = motion.disturbance, (len(self.members), len(motion.matrix))
+        centre = w.centre if isinstance(w, Zonotope) else np.zeros(shape[1])
+        shifts = np.broadcast_to(motion.shifts + centre, shape)
+        terms = np.broadcast_to(motion.terms + sizes_of(w), shape)
+        pairs = zip(self.members, shifts, terms, strict=True)
+        return Polytopes(tuple(member.predicted(motion.matrix, shift, term, w) for member, shift, term in pairs))
 
     def cut(self, strips: Strips, excess: Floats) -> Polytopes:
         """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
-        results: list[FacetsAndVertices | None] = []
-        for b, start in enumerate(self.members):
-            member = start
-            for r, normal in enumerate(strips.normals):
-                for sign, level in ((1.0, strips.upper[b, r]), (-1.0, -strips.lower[b, r])):
-                    if member is None or not np.isfinite(level):
-                        continue
-                    terms = float(np.abs(normal) @ np.abs(member.vertices).max(axis=0)) + strips.terms[b, r]
-                    slack = POLYTOPE_SLACK * terms
-                    if not normal.any():
-                        member, lowest = (member if level >= 0.0 else None), -level
-                    else:
-                        member, lowest = member.cut(sign * normal, level + slack)
-                    if member is None:
-                        excess[b, r] = lowest
-            results.append(member)
-        return Polytopes(tuple(results))
+        members, distances = zip(*(member.cut(strips, b) for b, member in enumerate(self.members)), strict=True)
+        excess[:] = distances
+        return Polytopes(members)
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Polytopes:
         """Return the states that lead to a state of the later set for some disturbance."""
         assert isinstance(later, Polytopes)
-        backward = later.predicted(motion.reversed_sum)
-        results: list[FacetsAndVertices | None] = []
-        for start, target in zip(self.members, backward.members, strict=True):
-            if start is None or target is None:
-                results.append(None)
-                continue
-            levels = (target.vertices @ target.normals.T).max(axis=0)
-            open_ends = np.full((1, len(levels)), -np.inf)
-            terms = np.abs(target.normals) @ np.abs(target.vertices).max(axis=0)
-            strips = Strips(target.normals @ motion.matrix, open_ends, levels[None], terms[None])
-            (member,) = Polytopes((start,)).cut(strips, np.zeros((1, len(levels)))).members
-            results.append(member)
+        results = []
+        for start, target in zip(self.members, later.predicted(motion.reversed_sum).members, strict=True):
+            rows, limits = target.polytope.constraints()
+            # rows @ matrix is rounded, relative to these terms.
+            terms = np.abs(rows) @ (np.abs(motion.matrix) @ start.sizes + target.sizes)
+            open_ends = np.full((1, len(rows)), -np.inf)
+            member, _ = start.cut(Strips(rows @ motion.matrix, open_ends, limits[None], terms[None]))
+            results.append(replace(member, reduced=member.reduced or target.reduced))
         return Polytopes(tuple(results))
 
     def support(self, direction: Floats) -> Floats:
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
-        return np.array([-np.inf if member is None else (member.vertices @ direction).max() for member in self.members])
+        return np.array([member.polytope.support_function(direction) for member in self.members])
 
     def chebyshev_centres(self, states: int) -> Floats:
         """Return the centres of largest balls, shape (B, n), by a linear program each; NaN for the empty set."""
-        nowhere = np.full(states, np.nan)
-        return np.array(
-            [nowhere if member is None else member.polytope.chebyshev_centre()[0] for member in self.members]
-        )
+        polytopes = [member.polytope for member in self.members]
+        return np.array([np.full(states, np.nan) if p.is_empty else p.chebyshev_centre()[0] for p in polytopes])
 
 
 Sets = Polygons | Polytopes
@@ -236,6 +321,20 @@ def polytope_of(shape: Set) -> Polytope:
     if isinstance(shape, Zonotope):
         return Polytope.from_zonotope(shape.centre, shape.generators)
     return Polytope.from_vertices(shape.polygon())
+
+
+def _is_thin(one: Polytope) -> bool:
+    """Whether rounding decides about the facets of a set with an interior."""
+    rows = one.facets[:, :-1]
+    depths = one.facets[:, -1] - (one.points @ rows.T).min(axis=0)
+    return bool((depths < _MIN_DEPTH * np.abs(rows).sum(axis=1)).any())
+
+
+def sizes_of(shape: Set) -> Floats:
+    """Return the maximum coordinates of a set, shape (n,), or bounds of them."""
+    if isinstance(shape, Zonotope):
+        return np.asarray(np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0))
+    return np.asarray(np.abs(shape.vertices).reshape(-1, shape.vertices.shape[-1]).max(axis=0))
 
 
 def _negative(disturbance: Set) -> Set:

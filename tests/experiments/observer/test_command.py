@@ -45,6 +45,7 @@ def test_the_published_example_has_the_exact_bounds(infoset: Command) -> None:
     assert [len(step["vertices"]) for step in results["steps"]] == PUBLISHED["exact_rational"]["counts"]
     assert results["final"] == {"lower": results["steps"][-1]["lower"], "upper": results["steps"][-1]["upper"]}
     assert results["inconsistency"] is None
+    assert results["excess_widths"] is None
 
 
 def test_bounds_of_a_simulation(infoset: Command) -> None:
@@ -174,6 +175,8 @@ def test_six_states_are_polytopes(infoset: Command) -> None:
     Path("six.toml").write_text(SIX_STATES)
     results = infoset.json("observe", "six.toml")
     assert "vertices" not in results["steps"][0]
+    assert all(0.0 <= excess < 1.0 for excess in results["excess_widths"])
+    assert "the sets have a bounded number of facets" in infoset("observe", "six.toml")[1]
     for step in results["steps"]:
         assert (np.array(step["lower"]) <= step["state"]).all()
         assert (np.array(step["upper"]) >= step["state"]).all()

@@ -132,14 +132,22 @@ class Programs:
                     limits += [value + width, width - value]
         self.rows, self.limits = np.array(rows), np.array(limits)
 
+    def farthest(self, step: int, direction: Floats) -> Floats:
+        """Coefficients of a motion whose state at a step is farthest along a direction."""
+        cost = -direction @ self.states[step]
+        optimum = linprog(cost, self.rows, self.limits, bounds=(-1.0, 1.0), method="highs", options=HIGHS)
+        assert optimum.status == 0
+        return np.asarray(optimum.x)
+
     def hull(self, step: int) -> tuple[list[float], list[float]]:
-        ends = []
-        for row in self.states[step]:
-            for sign in (1.0, -1.0):
-                optimum = linprog(sign * row, self.rows, self.limits, bounds=(-1.0, 1.0), method="highs", options=HIGHS)
-                assert optimum.status == 0
-                ends.append(sign * optimum.fun)
-        return ends[::2], ends[1::2]
+        ends = [
+            [
+                float(row @ self.farthest(step, sign * unit))
+                for row, unit in zip(self.states[step], np.eye(len(self.states[step])), strict=True)
+            ]
+            for sign in (-1.0, 1.0)
+        ]
+        return ends[0], ends[1]
 
 
 def chain(axes: int, order: int) -> tuple[Floats, Floats, Floats]:
@@ -175,9 +183,8 @@ def test_hulls_equal_linear_programs(axes: int, order: int, steps: int) -> None:
     y = states @ c.T + rng.uniform(-0.15, 0.15, (steps, axes))
     y[2, 0] = np.nan
     size = len(a)
-    observer = LinearObserver(
-        a, c, Zonotope.box(-np.ones(size), np.ones(size)), noise=noise, disturbance=Zonotope(np.zeros(size), generators)
-    )
+    start, disturbance = Zonotope.box(-np.ones(size), np.ones(size)), Zonotope(np.zeros(size), generators)
+    observer = LinearObserver(a, c, start, noise=noise, disturbance=disturbance, max_facets=None)
     estimates = observer.run(y)
     for step in (steps - 1, steps // 2):
         wanted = Programs(a, c, generators, np.ones(size), noise, y[: step + 1]).hull(step)
@@ -204,6 +211,7 @@ def test_units_of_six_states_do_not_matter(units: list[float]) -> None:
             Zonotope.box(-scale, scale),
             noise=0.2,
             disturbance=Zonotope(np.zeros(6), generators * scale),
+            max_facets=None,
         )
         estimates = observer.run(y)
         sets = estimates + observer.smooth(estimates)
@@ -485,3 +493,38 @@ def test_a_polygon_of_an_observer_gains_no_vertices_from_slack() -> None:
     out = np.zeros((12, 2))
     ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     assert enlarge(ring, 4, 0.0, 0.0, SUM_SLACK, SUM_SLACK, out) == 4
+
+
+# A bounded number of facets --------------------------------------------------------------------------------------
+
+
+def test_reduced_sets_contain_the_exact_ones_and_tell_how_much_wider_they_are() -> None:
+    a, c, generators = chain(2, 2)
+    noise, steps, size = np.full(2, 0.2), 12, 4
+    rng = np.random.default_rng(6)
+    states, _ = simulated(a, c, generators, noise, steps, rng)
+    y = states @ c.T + rng.uniform(-0.15, 0.15, (steps, 2))
+    start, disturbance = Zonotope.box(-np.ones(size), np.ones(size)), Zonotope(np.zeros(size), generators)
+    observer = LinearObserver(a, c, start, noise=noise, disturbance=disturbance, max_facets=20)
+    estimates = observer.run(y)
+    programs = Programs(a, c, generators, np.ones(size), noise, y)
+    assert not estimates[0].reduced
+    assert estimates[-1].reduced
+    for estimate in (estimates[-1], *observer.smooth(estimates)[::4]):
+        assert len(estimate.polytopes[0].normals) <= 20
+        hull = np.array(programs.hull(estimate.step))
+        assert (estimate.lower <= hull[0] + 1e-9).all()
+        assert (estimate.upper >= hull[1] - 1e-9).all()
+    wider = estimates[-1].upper - estimates[-1].lower - np.subtract(*reversed(programs.hull(steps - 1)))
+    np.testing.assert_allclose(estimates[-1].excess_widths(), wider, rtol=0.0, atol=1e-8)
+    assert (estimates[0].excess_widths() == 0.0).all()
+
+
+def test_numbers_of_one_output_and_a_wrong_bound() -> None:
+    box = Zonotope.box([-1.0, -1.0, -1.0], [1.0, 1.0, 1.0])
+    observer = LinearObserver(np.eye(3), [[1.0, 0.0, 0.0]], box, noise=0.1, input_matrix=[[1.0], [0.0], [0.0]])
+    observer.update(0.5)
+    observer.predict(1.0)
+    np.testing.assert_allclose([observer.estimate().lower[0], observer.estimate().upper[0]], [1.4, 1.6], atol=1e-9)
+    with pytest.raises(ValueError, match="max_facets"):
+        LinearObserver(np.eye(3), np.eye(3), box, noise=0.1, max_facets=5)
