@@ -209,7 +209,7 @@ class Polytope(PolytopeArrays):
         return replace(start, points=points, facets=facets)
 
     def _prism(self, margin: Floats) -> Polytope:
-        """Return a flat set with its translations across the affine hull by a `margin`, shape (n,), or 3e-8 of its size.
+        """Return a flat set and its translations across the affine hull by a `margin`, shape (n,), or 3e-8 of its size.
 
         The other coordinates have the coefficient one in one equation alone.
         """

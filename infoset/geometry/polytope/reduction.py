@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,10 +14,11 @@ from infoset.geometry.polytope.arrays import PolytopeArrays
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.kernels import Kernels
 
+Shape = TypeVar("Shape", bound=PolytopeArrays)
 _kernels = Kernels()
 
 
-def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> PolytopeArrays:
+def reduced_outward(polytope: Shape, cap: int, max_vertices: int) -> Shape:
     """Return a set that contains a polytope with an interior, with at most `cap` facets and `max_vertices` vertices.
 
     It starts with the bounding box, so that all widths are exact, and is cut by the facet beyond which it extends most,
@@ -34,15 +36,15 @@ def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> Po
     bits = np.ascontiguousarray(bits[:, : (len(sides) + 63) // 64])
     outer = replace(polytope, points=rays[:, :-1].copy(), facets=sides, incidence=bits)
     try:
-        return outer._reduced(dd.unpacked(bits, len(sides))[:, 2 * space :].any(axis=1))
+        return outer._reduced(np.asarray(dd.unpacked(bits, len(sides))[:, 2 * space :].any(axis=1)))
     except UncertainHullError:  # few facets are always possible
         return reduced_outward(polytope, max(2 * space, cap // 2), max_vertices)
 
 
 @_kernels.compiled
 def _cut_by_worst(
-    rays: Floats, bits: Integers, points: Floats, facets: Floats, cap: int, max_vertices: int
-) -> tuple[Floats, Integers, Integers]:
+    rays: Floats, bits: dd.Bits, points: Floats, facets: Floats, cap: int, max_vertices: int
+) -> tuple[Floats, dd.Bits, Integers]:
     """Return the vertices (y, 1) of a box that is cut by facets, their bits, and the numbers of these facets.
 
     The excess of a facet only decreases, so that one of an earlier round is an upper bound: only the greatest one is
@@ -86,7 +88,7 @@ def _cut_by_worst(
 
 
 @_kernels.compiled
-def _sides(bits: Integers, rows: int, least: int) -> int:
+def _sides(bits: dd.Bits, rows: int, least: int) -> int:
     """Return the number of rows with at least `least` rays."""
     counts = np.zeros(rows, np.int64)
     for i in range(len(bits)):

@@ -15,8 +15,8 @@ VOCABULARY = {
     "cut", "preimage", "support_function", "support_vector", "contains", "is_subset", "equals", "is_empty",
     "vertices", "constraints", "area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter",
     "hausdorff_distance", "distance", "closest_point", "project", "slice", "sample", "reduce_outward", "plot",
-    "add_segment", "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely", "to_shapely",
-    "margin", "empty",
+    "add_segment", "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely",
+    "to_shapely", "margin", "empty",
 }  # fmt: skip
 """The names of both classes."""
 

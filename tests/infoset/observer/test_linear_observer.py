@@ -515,7 +515,7 @@ def test_reduced_sets_contain_the_exact_ones_and_tell_how_much_wider_they_are() 
         hull = np.array(programs.hull(estimate.step))
         assert (estimate.lower <= hull[0] + 1e-9).all()
         assert (estimate.upper >= hull[1] - 1e-9).all()
-    wider = estimates[-1].upper - estimates[-1].lower - np.subtract(*reversed(programs.hull(steps - 1)))
+    wider = estimates[-1].upper - estimates[-1].lower - np.ptp(np.array(programs.hull(steps - 1)), axis=0)
     np.testing.assert_allclose(estimates[-1].excess_widths(), wider, rtol=0.0, atol=1e-8)
     assert (estimates[0].excess_widths() == 0.0).all()
 
