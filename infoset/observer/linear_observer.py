@@ -56,7 +56,13 @@ class Record:
     count: int
 
     def hull(self, run: int, step: int, sizes: Floats) -> Floats:
-        """Return the exact bounds of the states of a run at a step; see `exact_hull`."""
+        """Return the exact bounds of the states of a run at a step; see `exact_hull`.
+
+        Raises
+        ------
+        ValueError
+            If there were too many steps and measurements to record.
+        """
         if len(self.events) < self.count:
             raise ValueError(f"exact widths are known for {MAX_RECORD} steps and measurements, not more")
         return exact_hull(self.initial, self.events[: self.count], run, step, sizes)

@@ -171,7 +171,13 @@ class Member:
         return same._apply(methodcaller("enlarged", _THIN * np.ptp(one.vertices, axis=0)))
 
     def limited(self) -> Member:
-        """Return a set that contains this one, with at most as many facets and vertices as allowed."""
+        """Return a set that contains this one, with at most as many facets and vertices as allowed.
+
+        Raises
+        ------
+        ArithmeticError
+            If there is no limit and the set has too many vertices.
+        """
         space, vertices = self.polytope.space, len(self.polytope.vertices)
         if self.max_facets is None:
             if vertices > MAX_POLYTOPE_VERTICES:

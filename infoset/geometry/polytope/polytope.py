@@ -48,6 +48,11 @@ class Polytope(PolytopeArrays):
     the hull of points in such a set is their affine hull to rounding. A set that sticks out by less than 1e-12 of its
     size from a half-space touches it.
 
+    The arrays are stored in scaled coordinates y, x = `centre` + `scale` y: `points`, shape (v, n), and rows (a, b) of
+    `facets`, a y <= b, shape (f, n + 1), and of `equations`, a y = b, shape (n - dimension, n + 1). Bit j of a row of
+    `incidence`, shape (v, words), is whether the vertex lies on facet j. `conflict` are half-spaces without a common
+    point.
+
     An empty set has no vertices; `relaxation` is then the minimum relaxation of the constraints that made it empty,
     their normals of unit length, with which a point satisfies them; 0 if it is not known. Operations on it give the
     empty set; points such as its centroid do not exist, and an EmptyPolytopeError is raised.
