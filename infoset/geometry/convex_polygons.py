@@ -12,8 +12,10 @@ from infoset.geometry import polygon_batches as kernels
 from infoset.geometry._set_arguments import (
     axis_numbers,
     finite_values,
+    is_number,
     is_set,
     not_negative,
+    present_axes,
 )
 from infoset.geometry.polygon_arrays import PolygonArrays
 from infoset.limits import Limits, real_values, shown
@@ -323,6 +325,10 @@ class ConvexPolygons(PolygonArrays):
         one, two = self._with(other)
         return one._measure(kernels.gap, *two._flat())[..., 0]
 
+    def isdisjoint(self, other: ConvexPolygons) -> Flags:
+        """Return whether no point is in both sets, shape (...). O(n m), exact."""
+        return np.asarray(self.distance(other) > 0.0)
+
     def closest_point(self, point: ArrayLike) -> Floats:
         """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside. O(n), rounded."""
         one, points = self._and_vectors(point, "point")
@@ -348,8 +354,11 @@ class ConvexPolygons(PolygonArrays):
         kernels.sample(vertices, counts, random.random((counts.size, count, 3)), out)
         return self._known(out.reshape(*self.shape, count, 2), "points")
 
-    def plot(self, axes: Any, **style: Any) -> None:
-        """Fill the polygons on matplotlib axes, with the options of `matplotlib.axes.Axes.fill`."""
+    def plot(self, axes: Any = None, **style: Any) -> None:
+        """Fill the polygons on matplotlib axes (default: the present ones), with the options of
+        `matplotlib.axes.Axes.fill`.
+        """
+        axes = present_axes(axes)
         for index in np.ndindex(self.shape):
             axes.fill(*self.vertices[index][: self.counts[index]].T, **style)
 
@@ -363,6 +372,14 @@ class ConvexPolygons(PolygonArrays):
         return self.minkowski_sum(given) if is_set(given) else self.translate(given)
 
     __radd__ = __add__
+
+    def __mul__(self, factor: float) -> ConvexPolygons:
+        return self.linear_map(float(factor) * np.eye(2)) if is_number(factor) else NotImplemented
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> ConvexPolygons:
+        return -1.0 * self
 
     def __rmatmul__(self, matrix: ArrayLike) -> Any:
         return self.affine_map(matrix)

@@ -16,7 +16,7 @@ class Zonotope:
     """The set of centre + t_1 g_1 + ... + t_m g_m with all -1 <= t_i <= 1.
 
     An argument of `LinearObserver`. For operations on sets, `Polytope.from_zonotope(z.centre, z.generators)` or the
-    same method of `ConvexPolygons` converts it.
+    same method of `ConvexPolygons` converts it. `A @ Z` is the linear map.
 
     Parameters
     ----------
@@ -49,6 +49,10 @@ class Zonotope:
         # Rounding of the centre must not lose an end.
         half = np.maximum(maximum - centre, centre - minimum)
         return cls(centre, np.diag(half)[half > 0.0])
+
+    def __rmatmul__(self, matrix: ArrayLike) -> Zonotope:
+        rows = finite_values("matrix", matrix, "m", self.space)
+        return Zonotope(rows @ self.centre, self.generators @ rows.T)
 
     @property
     def space(self) -> int:

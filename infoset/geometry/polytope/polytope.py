@@ -16,9 +16,11 @@ from infoset.geometry._set_arguments import (
     axis_numbers,
     bound_values,
     finite_values,
+    is_number,
     is_set,
     need_set,
     not_negative,
+    present_axes,
 )
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, nearest_difference, simplices_of, triangle_of
@@ -61,8 +63,8 @@ class Polytope(PolytopeArrays):
     (ValueError). An UncertainHullError is raised if vertices and facets do not agree because of rounding.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
-    `point in P`, `P <= Q` (subset, to rounding). `P == Q` compares objects; `equals` compares sets. The vertices are in
-    no order; `plot` and `to_shapely` order those of a set of the plane.
+    `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding). `P == Q` compares objects; `equals` compares sets. The
+    vertices are in no order; `plot` and `to_shapely` order those of a set of the plane.
     """
 
     __array_ufunc__ = None
@@ -505,17 +507,35 @@ class Polytope(PolytopeArrays):
             return float("inf")
         return float(np.linalg.norm(nearest_difference(self.vertices, points)))
 
+    def isdisjoint(self, other: Polytope) -> bool:
+        """Return whether no point is in both sets, to rounding; see `separating_direction`."""
+        return self.is_empty or self._need_other(other).is_empty or self.separating_direction(other) is not None
+
+    def separating_direction(self, other: Polytope) -> Floats | None:
+        """Return a witness that two sets are disjoint; None if they meet, to rounding, or one is empty.
+
+        It is a direction d, shape (n,), of unit length, with d . x < d . y for all x of this set and y of the other.
+        """
+        if self.is_empty or self._need_other(other).is_empty:
+            return None
+        between = nearest_difference(other.vertices, self.vertices)
+        length = float(np.linalg.norm(between))
+        direction = np.asarray(between / (length or 1.0))
+        return direction if self.support_function(direction) < -other.support_function(-direction) else None
+
     def hausdorff_distance(self, other: Polytope) -> float:
         """Return the Hausdorff distance; inf between an empty and a nonempty set. One `distance` for each vertex."""
         pairs = (self, self._need_other(other)), (other, self)
         return max((two.distance(vertex) for one, two in pairs for vertex in one.vertices), default=0.0)
 
-    def plot(self, axes: Any, **style: Any) -> None:
-        """Fill a set of R^2 on matplotlib axes, with the options of `matplotlib.axes.Axes.fill`."""
+    def plot(self, axes: Any = None, **style: Any) -> None:
+        """Fill a set of R^2 on matplotlib axes (default: the present ones), with the options of
+        `matplotlib.axes.Axes.fill`.
+        """
         self._of_plane()
         points = self.vertices - self.vertices.mean(axis=0) if len(self.vertices) else self.vertices
         order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
-        axes.fill(*self.vertices[order].T, **style)
+        present_axes(axes).fill(*self.vertices[order].T, **style)
 
     # Operators and old names --------------------------------------------------------------------------------------
 
@@ -527,6 +547,14 @@ class Polytope(PolytopeArrays):
         return self.minkowski_sum(given) if is_set(given) else self.translate(given)
 
     __radd__ = __add__
+
+    def __mul__(self, factor: float) -> Polytope:
+        return self.affine_map(float(factor) * np.eye(self.space)) if is_number(factor) else NotImplemented
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Polytope:
+        return -1.0 * self
 
     def __rmatmul__(self, matrix: ArrayLike) -> Polytope:
         return self.affine_map(matrix)

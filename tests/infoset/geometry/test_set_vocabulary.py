@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from infoset import ConvexPolygons, Polytope
+from infoset import ConvexPolygons, Polytope, Zonotope
 
 VOCABULARY = {
     "linear_map", "affine_map", "translate", "minkowski_sum", "minkowski_difference", "intersection", "convex_hull",
@@ -16,7 +16,7 @@ VOCABULARY = {
     "vertices", "constraints", "area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter",
     "hausdorff_distance", "distance", "closest_point", "project", "slice", "sample", "reduce_outward", "plot",
     "add_segment", "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely",
-    "to_shapely", "margin", "empty",
+    "to_shapely", "margin", "empty", "isdisjoint",
 }  # fmt: skip
 """The names of both classes."""
 
@@ -34,6 +34,7 @@ ONLY_POLYTOPES = {
     "excess": "-margin; needed where no sign must change",
     **dict.fromkeys(["points", "facets", "equations", "incidence", "centre", "scale"], "arrays in scaled coordinates"),
     "conflict": "half-spaces without a common point, for the relaxation",
+    "separating_direction": "a witness; polygons decide exactly whether they meet",
     "enlarged": "outward by given errors; kernels of polygons do this at each step",
 }
 
@@ -90,3 +91,40 @@ def test_a_single_polygon_takes_many_points_and_directions() -> None:
     assert square.contains(np.zeros((0, 2))).shape == (0,)
     with pytest.raises(ValueError, match="normal must have the shape"):
         square.cut([[1, 0], [0, 1]], 0.0, 1.0)  # for a Polytope this is one intersection
+
+
+@pytest.mark.parametrize("kind", [ConvexPolygons, Polytope])
+def test_multiples_of_sets_and_disjoint_sets(kind: Any) -> None:
+    square, far = kind.from_box([0, 1], [2, 5]), kind.from_box([2, 7], [3, 8])
+    wanted = kind.from_box([0, 2], [4, 10])
+    for doubled in (2 * square, square * 2.0, np.float64(2.0) * square):
+        assert bool(np.all(doubled.equals(wanted, 1e-12)))
+    assert bool(np.all((-square).equals(kind.from_box([-2, -5], [0, -1]), 1e-12)))
+    with pytest.raises(TypeError):
+        square * square
+    assert bool(np.all(square.isdisjoint(far)))
+    assert not np.any(square.isdisjoint(kind.from_box([2, 5], [3, 6])))  # they touch
+    assert bool(np.all(square.isdisjoint(kind.empty() if kind is ConvexPolygons else kind.empty(2))))
+
+
+def test_a_witness_of_disjoint_sets() -> None:
+    one, two = (
+        Polytope.from_box([0, 0, 0], [1, 1, 1]),
+        Polytope.from_vertices([[2, 2, 2], [3, 2, 2], [2, 3, 2], [2, 2, 3]]),
+    )
+    direction = one.separating_direction(two)
+    assert direction == pytest.approx(np.ones(3) / np.sqrt(3.0), abs=1e-12)
+    assert one.separating_direction(one) is None
+
+
+def test_plots_without_axes_and_maps_of_zonotopes() -> None:
+    import matplotlib.pyplot as plt
+
+    for kind in (ConvexPolygons, Polytope):
+        figure = plt.figure()
+        kind.from_box([0, 1], [2, 5]).plot(alpha=0.5)
+        assert len(figure.gca().patches) == 1
+        plt.close(figure)
+    turned = np.array([[0.0, -1.0], [1.0, 0.0]]) @ Zonotope([1, 2], [[1, 0], [0, 3]])
+    assert turned.centre.tolist() == [-2.0, 1.0]
+    assert turned.generators.tolist() == [[0.0, 1.0], [-3.0, 0.0]]
