@@ -269,17 +269,19 @@ class PolytopeArrays:
             return cls.empty(space)
         if not (limited := limits < np.inf).all():
             rows, limits = rows[limited], limits[limited]
-        guesses = [coordinates(*box, 1e-10 * np.abs(box).max(axis=0))] if box is not None else []
         # In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
-        guesses = guesses or [(np.zeros(space), _guess(rows, limits, percentile)) for percentile in (25.0, 100.0)]
-        for centre, scale in guesses:
+        for share in (0.25, 1.0):
+            if box is None:
+                centre, scale = np.zeros(space), _guess(rows, limits, share)
+            else:
+                centre, scale = coordinates(*box, 1e-10 * np.abs(box).max(axis=0))
             try:
                 found = cls._intersect(rows, limits, terms, (origin, centre, scale))
             except (UnboundedPolytopeError, UncertainHullError):
-                if scale is guesses[-1][1]:
+                if share == 1.0 or box is not None:
                     raise
             else:
-                if not found.is_empty:
+                if box is not None or not found.is_empty:
                     break
         flat = np.zeros(space, bool)
         for _ in range(8):
@@ -547,14 +549,18 @@ def coordinates(lower: Floats, upper: Floats, minimum: Floats) -> tuple[Floats, 
     return np.where(far, 0.5 * lower + 0.5 * upper, 0.0), scale
 
 
-def _guess(rows: Floats, limits: Floats, percentile: float = 25.0) -> Floats:
-    """Return sizes of coordinates, powers of two, shape (n,): a percentile of those at which one row is tight."""
+def _guess(rows: Floats, limits: Floats, share: float = 0.25) -> Floats:
+    """Return sizes of coordinates, powers of two, shape (n,): those at which a `share` of the rows is tight."""
     large = np.abs(rows) > 1e-14 * np.abs(rows).max(axis=1, initial=0.0, keepdims=True)  # others may be rounding
     used = np.where(large.any(axis=0), large, rows != 0.0) & (limits[:, None] != 0.0)
-    sizes = np.where(used, np.abs(limits)[:, None] / np.where(used, np.abs(rows), 1.0), np.nan)
-    if not (known := used.any(axis=0)).all():  # no row is tight away from zero: the unit of the others
-        sizes[:, ~known] = np.nanmedian(sizes) if known.any() else 1.0
-    return np.asarray(np.ldexp(1.0, np.frexp(np.nanpercentile(sizes, percentile, axis=0))[1]))
+    counts, order = used.sum(axis=0), np.arange(rows.shape[1])
+    if not counts.any():
+        return np.ones(rows.shape[1])
+    sizes = np.where(used, np.abs(limits)[:, None] / np.where(used, np.abs(rows), 1.0), np.inf)
+    sizes = np.sort(sizes, axis=0)[(share * np.maximum(counts - 1, 0)).astype(np.int64), order]
+    # Where no row is tight away from zero, the unit is that of the others.
+    sizes[counts == 0] = np.sort(sizes[counts > 0])[(counts > 0).sum() // 2]
+    return np.asarray(np.ldexp(1.0, np.frexp(sizes)[1]))
 
 
 def _scaled_rows(
