@@ -270,9 +270,21 @@ def checks(kind: str, space: int, seed: int) -> Iterator[tuple[str, Callable[[],
     )
 
 
-@pytest.mark.xfail(reason="facets are not rounded outward, and several operations lose parts", strict=False)
-@pytest.mark.parametrize("space", [3, 4, 5, 6])
-@pytest.mark.parametrize("kind", KINDS)
+# Formerly all failed. What is left: 16 intersections of 3 200 checks, most of flat sets, where rounding decides.
+ILL_POSED = {("flat", 3), ("flat", 4), ("flat", 5), ("flat", 6)}
+ILL_POSED |= {("touching", 5), ("touching", 6), ("mixed units", 4), ("mixed units", 6)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "space"),
+    [
+        pytest.param(
+            kind, space, marks=[pytest.mark.xfail(reason="an intersection is wrong")] * ((kind, space) in ILL_POSED)
+        )
+        for kind in KINDS
+        for space in (3, 4, 5, 6)
+    ],
+)
 def test_operations(kind: str, space: int, record_property: Callable[[str, object], None]) -> None:
     wrong, excess = [], dict[str, float]()
     for seed in range(SEEDS):
