@@ -398,7 +398,7 @@ class PolytopeArrays:
             if not ((before > 0.0) & (SMALL * (upper - lower) < before)).any():
                 return part._reduced(new)
         # The result is much smaller: again, in its own coordinates, with the rows on which it has vertices and a box.
-        margin = _GAIN * before
+        margin = 2.0**-8 * before  # far from the set: rounding can have moved sharp corners of the part
         unit, box = np.eye(self.space), (lower - margin, upper + margin)
         used = np.bitwise_or.reduce(bits, axis=0)[None]
         sides = np.vstack([sides[dd.unpacked(used, len(sides))[0]], self.equations, -self.equations])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from math import factorial
@@ -25,7 +26,7 @@ from infoset.geometry._set_arguments import (
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, nearest_difference, simplices_of, triangle_of
 from infoset.geometry.polytope.arrays import FLAT, SMALL, PolytopeArrays, coordinates
-from infoset.geometry.polytope.errors import UncertainHullError
+from infoset.geometry.polytope.errors import UnboundedPolytopeError, UncertainHullError
 from infoset.limits import Limits, real_values
 
 _MAX_CONDITION = 1e6
@@ -275,11 +276,15 @@ class Polytope(PolytopeArrays):
         """Return the intersection with one polytope; neither is empty."""
         boxes = np.array([self.bounding_box(), other.bounding_box()])
         lower, upper, widths = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0), boxes[0, 1] - boxes[0, 0]
-        if not (SMALL * (upper - lower) < widths).any():
-            return self._with_rows(*other._rows(other.centre), other.centre)
-        rows, limits = zip(*(one._rows(self.centre) for one in (self, other)), strict=True)
-        box = lower, np.maximum(lower, upper)
-        return self._of_rows(np.vstack(rows), np.concatenate(limits), box=box, origin=self.centre)
+        if (SMALL * (upper - lower) < widths).any():
+            rows, limits = zip(*(one._rows(self.centre) for one in (self, other)), strict=True)
+            box = lower, np.maximum(lower, upper)
+            with suppress(UncertainHullError, UnboundedPolytopeError):
+                found = self._of_rows(np.vstack(rows), np.concatenate(limits), box=box, origin=self.centre)
+                if not found.is_empty:
+                    return found
+        # Sets that touch each other do so within the rounding of their own coordinates.
+        return self._with_rows(*other._rows(other.centre), other.centre)
 
     def convex_hull(self, *others: Polytope) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
