@@ -42,7 +42,7 @@ def test_the_closed_form_is_not_that_of_a_camera_that_loses_images() -> None:
         possible_miss_of(replace(scenario, **of_model(replace(scenario.set_model, angle_sensor=lossy))))
 
 
-LONG_STEPS = ("--set", "step_s=30", "--set", "angle_sensor.period_s=30")
+LONG_STEPS = ("--set", "step_s=30", "--set", "camera.period_s=30")
 """A third of the steps of haiv-2013."""
 
 

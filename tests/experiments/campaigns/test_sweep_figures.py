@@ -65,7 +65,7 @@ def test_the_limit_of_two_keys_is_a_line() -> None:
     table.rows["closed_form_m"] = 1.5 * table.rows["limit_quantile"]
     figure = draw_sweep(table, SHOWN, "game")
     first = figure.axes[0]
-    assert first.get_xlabel() == "angle sensor: pixel error, $10^{-5}$\N{NO-BREAK SPACE}rad"
+    assert first.get_xlabel() == "camera: pixel error, $10^{-5}$\N{NO-BREAK SPACE}rad"
     assert first.get_title(loc="left") == "(a) guaranteed miss p99 under 25 m"
     assert len(first.texts) == 64
     drawn, form = (np.asarray(each.get_paths()[0].vertices, dtype=float) for each in first.collections[1:])

@@ -155,7 +155,7 @@ def max_share(scenario: Scenario, both: list[Floats], last_common_step: int) -> 
         steps = np.arange(0, last_common_step + 1, round(sensor.period_s / scenario.set_model.step_s))
         half = 0.5 * np.abs(values[0][name] - values[1][name])[steps]
         ranges = np.minimum(*(each["range"][steps] for each in values))
-        if isinstance(sensor, AngleSensor):
+        if isinstance(sensor, AngleSensor | Camera):
             farther = np.maximum(*(each["range"][steps] for each in values))
             bounds = np.minimum(sensor.error_bound(ranges), sensor.error_bound(farther))
         elif isinstance(sensor, RangeSensor):
