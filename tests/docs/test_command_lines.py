@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 
-_STEPS = "--set step_s={0} --set angle_sensor.period_s={0}"
+_STEPS = "--set step_s={0} --set camera.period_s={0}"
 REDUCED = (
     (r"^infoset experiment\b(?!.* --runs)", "infoset experiment --runs 2"),
     (r"--runs \d+", "--runs 2"),
