@@ -395,7 +395,8 @@ class PolytopeArrays:
         new = np.asarray(dd.unpacked(bits, len(sides))[:, count:].any(axis=1))
         lower, upper, before = part.points.min(axis=0), part.points.max(axis=0), np.ptp(self.points, axis=0)
         with suppress(UncertainHullError):
-            if not ((before > 0.0) & (SMALL * (upper - lower) < before)).any():
+            # An axis along which the part has no width is no reason: its equations fix that coordinate.
+            if not ((SMALL * (upper - lower) < before) & (upper - lower > FLAT * before)).any():
                 return part._reduced(new)
         # The result is much smaller: again, in its own coordinates, with the rows on which it has vertices and a box.
         margin = 2.0**-8 * before  # far from the set: rounding can have moved sharp corners of the part

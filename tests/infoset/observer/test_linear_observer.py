@@ -370,12 +370,12 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
 
 # Formerly lost the true state: seeds 216 and 252, with exact measurements, a singular matrix and a flat initial set;
 # seeds 1949 and 3147, with initial sets whose known coordinates were rounding errors.
-# Seed 41: an exact measurement at a vertex of the set; the true state is 1e-12 of a coordinate outside.
+# Seed 41: an exact measurement at a vertex of the set; on some machines the true state is 1e-12 of a coordinate outside.
 @pytest.mark.parametrize(
     "seed",
     [
         *range(20), 40, *range(42, 60), 125, 216, 252, 1949, 3147,
-        pytest.param(41, marks=pytest.mark.xfail(strict=True, reason="rounding of a vertex that touches a strip")),
+        pytest.param(41, marks=pytest.mark.xfail(strict=False, reason="rounding of a vertex that touches a strip")),
     ],
 )  # fmt: skip
 def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(seed: int) -> None:
