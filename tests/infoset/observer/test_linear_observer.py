@@ -370,7 +370,7 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
 
 # Formerly lost the true state: seeds 216 and 252, with exact measurements, a singular matrix and a flat initial set;
 # seeds 1949 and 3147, with initial sets whose known coordinates were rounding errors.
-# Seed 41: an exact measurement at a vertex of the set; on some machines the true state is 1e-12 of a coordinate outside.
+# Seed 41: an exact measurement at a vertex; on some machines the true state is 1e-12 of a coordinate outside.
 @pytest.mark.parametrize(
     "seed",
     [
