@@ -65,6 +65,7 @@ nitpick_ignore = [
         "guidance.predictive": ("ManoeuvreState",),
         "guidance.proportional_navigation": ("PulseState",),
         "infoset.observer.sets": ("Polygons", "Polytopes"),
+        "infoset.observer.linear_observer": ("Record",),
         "infoset.limits": ("Line",),
         "infoset.sensors.sensor": ("Measurements", "Geometry", "Apart", "Cuttable"),
         "infoset.sensors.bearing": ("RangeOrRanges",),
