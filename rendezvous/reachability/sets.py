@@ -108,11 +108,14 @@ class ReachableSets:
 class Meter:
     """Measures the computing time of hulls, and raises an error before a hull that is expected to exceed a limit.
 
-    Qhull's time for k points in R^d grows as k^(d/2) at worst, and the memory of the check as vertices times facets.
+    The time for k points in R^d is taken to grow as k^(d/2), and the memory of the check as vertices times facets.
     Both are extrapolated from the last hull of that dimension, or from values of a slow machine for the first hull.
     """
 
     def __init__(self) -> None:
+        # The time that Numba needs to compile the kernels does not count.
+        unit = Polytope.from_vertices(np.vstack([np.zeros(3), np.eye(3)]))
+        _ = (unit + 0.5 * unit).cut(np.eye(3), 0.0, 0.7).intersection(unit).preimage(np.eye(3))
         self._began_s = perf_counter()
         self._last: dict[int, tuple[int, float, int]] = {}
 
