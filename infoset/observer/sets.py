@@ -225,7 +225,8 @@ class Member:
     def cut(self, strips: Strips, run: int = 0) -> tuple[Member, Floats]:
         """Return the part within strips, and the distances of strips from the set, shape (r,), if the part is empty."""
         terms = np.abs(strips.normals) @ self.sizes + strips.terms[run]
-        unit = np.ldexp(1.0, -np.frexp(terms)[1])  # a row that is short in the units of the states counts like others
+        # A row that is short in the units of the states counts like others; normals may have at most 1e60.
+        unit = np.ldexp(1.0, -np.frexp(np.maximum(terms, 1e-50))[1])
         normals, ends = strips.normals * unit[:, None], (strips.lower[run], strips.upper[run])
         excess = np.zeros(len(terms))
         for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set

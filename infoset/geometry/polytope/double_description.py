@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
+from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.kernels import Kernels
 
 Bits = NDArray[np.uint64]
@@ -28,6 +29,8 @@ COLLINEAR = 1e-9
 """Distance of a ray from the plane of two others that contains it. A wrong one adds only points of the set."""
 TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
+MAX_CROSSINGS = 50_000
+"""Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
 EPS = float(np.finfo(np.float64).eps)
 
 _1, _2, _4, _56 = np.uint64(1), np.uint64(2), np.uint64(4), np.uint64(56)
@@ -147,7 +150,8 @@ def crossings(
 ) -> tuple[Floats, Bits]:
     """Return the rays in which edges cross a row, and the common bits of the ends of the edges.
 
-    `heights` and `signs` are those of `sides`, and `least` is the minimum number of rows on which an edge lies.
+    `heights` and `signs` are those of `sides`, and `least` is the minimum number of rows on which an edge lies. An
+    UncertainHullError is raised if more than `MAX_CROSSINGS` edges cross the row.
     O(above below (words + k words)) at worst.
     """
     k, size = rays.shape
@@ -173,6 +177,8 @@ def crossings(
                         break
                 if not edge:
                     continue
+            if count == MAX_CROSSINGS:
+                raise UncertainHullError("rounding decides which points are vertices: one half-space cuts 50000 edges")
             if count == room:
                 room *= 2
                 more, more_marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)

@@ -211,8 +211,8 @@ class Polytope(PolytopeArrays):
             return self
         start = self if self.dimension == self.space else self._prism(margin)
         facets = start.facets.copy()
-        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ (margin / self.scale)
-        most = dd.TIP + 32.0 * float((margin / self.scale).max())
+        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ (margin / start.scale)
+        most = dd.TIP + 32.0 * float((margin / start.scale).max())
         points = dd.push_out(start.points, facets, start.incidence, np.ones(len(start.points), bool), False, most)
         return replace(start, points=points, facets=facets)
 
@@ -221,7 +221,10 @@ class Polytope(PolytopeArrays):
 
         The other coordinates have the coefficient one in one equation alone.
         """
-        sizes = np.maximum(margin / self.scale, _THICK * np.abs(self.vertices / self.scale).max(axis=0))
+        # A coordinate that is zero in all points has no scale yet: that of the margin.
+        is_zero = (self.points == 0.0).all(axis=0) & (self.centre == 0.0) & (margin > 0.0)
+        scale = np.where(is_zero, np.ldexp(1.0, np.frexp(margin)[1]), self.scale)
+        sizes = np.maximum(margin / scale, _THICK * np.abs(self.vertices / scale).max(axis=0))
         heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, _THICK)
         points, on = self.points, dd.unpacked(self.incidence, len(self.facets))
         others = np.delete(np.arange(self.space), self._own)
@@ -233,7 +236,9 @@ class Polytope(PolytopeArrays):
         ends[:, :, -1] += heights[:, None]
         sides = np.vstack([self.facets, ends.reshape(-1, self.space + 1)])
         sides *= np.ldexp(1.0, -np.frexp(np.abs(sides).max(axis=1))[1])[:, None]
-        return replace(self, points=points, facets=sides, equations=self.equations[:0], incidence=dd.packed(on))
+        return replace(
+            self, points=points, facets=sides, equations=self.equations[:0], incidence=dd.packed(on), scale=scale
+        )
 
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
