@@ -78,7 +78,7 @@ class Engagements:
 
     `strategy`, `truth`, `noise` and `target` replace the strategy, the Kepler motion, the measurement noise and the
     target's acceleration of the scenario.
-    `guarantee` computes the bound Phi in the guaranteed model; it doubles the run time.
+    `guarantee` computes the bound Phi in the guaranteed model; it takes 2 to 3.5 times as long.
 
     One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the true motion advances,
     and its closest approach is detected. Of the true motion, the strategy gets the measurements only.

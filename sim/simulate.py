@@ -41,7 +41,7 @@ def simulate(
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
     guarantee : bool
-        Compute the bound Phi in the guaranteed model; it doubles the run time.
+        Compute the bound Phi in the guaranteed model; it takes 2 to 3.5 times as long.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
     observe : callable or None

@@ -110,7 +110,8 @@ class Campaign(Flight):
     guarantee: Annotated[
         bool,
         typer.Option(
-            "--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed (doubles the run time)."
+            "--guarantee/--no-guarantee",
+            help="Compute the bound Phi in the model guaranteed (2 to 3.5 times the run time).",
         ),
     ] = True
 

@@ -38,7 +38,7 @@ class Report:
 def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) -> Report:
     """Return the sets and the selected optimal controls with their motions."""
     if options.replan or options.html is not None:
-        raise InputError("--replan and --html: need a problem of kind reachable-rendezvous")
+        raise InputError("--replan and --html: are for problems of kind reachable-rendezvous; omit them here")
     selection(options.select)  # a mistake is found before anything is computed
     progress = begin(system.name)
     problem, path = system.problem, system.path
@@ -103,7 +103,7 @@ def motions_csv(report: Report) -> str:
 def report_lines(report: Report) -> Iterator[Part]:
     """Yield the minimum norm, the tube and the selected controls, for the screen."""
     solution, minimum = report.solution, report.min_periods
-    least = "" if minimum is None else f"; norm 0 needs at least {minimum} period{'s' if minimum > 1 else ''}"
+    least = "" if minimum is None else f"; to reach it takes at least {minimum} period{'s' if minimum > 1 else ''}"
     yield f"{report.system.name}: minimum distance from the target {solution.optimal.miss:.9g}{least}"
     yield f"route: {solution.route.value} ({solution.reason})"
     dimension = solution.optimal.dimension

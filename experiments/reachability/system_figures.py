@@ -12,8 +12,6 @@ from matplotlib.ticker import MaxNLocator
 from experiments.common.figure_style import LINE_LOOKS, SET_EDGE, SET_FILL, legend_below, plain, style, subplots
 from experiments.reachability.system import Report
 
-_MAX_MEMBERS = 4
-
 
 def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
@@ -34,8 +32,7 @@ def draw_states(report: Report) -> Figure:
             axes.plot(states[1][:, i], label=states[0], **look | {"linewidth": 1.0})
         axes.set_ylabel(name)
         axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
-    grid[-1, 0].set_xlabel("period")
-    legend_below(figure, 3)
+    _finish(figure, grid, report)
     return figure
 
 
@@ -52,6 +49,13 @@ def draw_controls(report: Report) -> Figure:
             line: dict[str, Any] = {"color": look["color"], "linestyle": look["linestyle"], "label": name}
             axes.stairs(control[:, j], np.arange(periods + 1), baseline=None, **line)
         axes.set_ylabel(f"u{j + 1}")
+    _finish(figure, grid, report)
+    return figure
+
+
+def _finish(figure: Figure, grid: Any, report: Report) -> None:
+    """Add the legend, and a title if there are more selected controls than kinds of lines."""
+    if len(report.controls) > len(LINE_LOOKS):
+        grid[0, 0].set_title(f"the first {len(LINE_LOOKS)} of {len(report.controls)} selected controls")
     grid[-1, 0].set_xlabel("period")
     legend_below(figure, 3)
-    return figure

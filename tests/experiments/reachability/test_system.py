@@ -78,7 +78,7 @@ def test_wrong_systems_are_refused(setting: str, told: str, infoset: Command) ->
 
 
 def test_options_of_a_rendezvous_are_refused(infoset: Command) -> None:
-    assert "need a problem of kind reachable-rendezvous" in infoset.refused("reach", CART, "--replan")
+    assert "are for problems of kind reachable-rendezvous" in infoset.refused("reach", CART, "--replan")
 
 
 def test_the_kind_of_a_file_decides(infoset: Command) -> None:
