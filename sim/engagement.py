@@ -18,7 +18,6 @@ from guidance import (
     Strategy,
     make_strategy,
 )
-from guidance.least_effort import LeastEffort
 from guidance.noise import checked_measurements
 from guidance.strategy import checked_impulses
 from guidance.thruster import MIN_FLOAT, modulus
@@ -34,7 +33,6 @@ from sim.label_ends import LabelEnds
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
 from sim.target import TargetMotion, acceleration_m_s2, constant_side
-from sim.theorem_8 import Theorem8, has_theorem_8
 from sim.truth_section import TruthSection
 
 Pending = tuple[tuple[float, Floats], ...]
@@ -133,8 +131,6 @@ class Engagements:
         self._lead_s = scenario.thruster.delay_steps * model.step_s
         self._not_given = np.zeros(batch)
         self._label_ends = LabelEnds(model, batch)
-        applies = isinstance(self._strategy, LeastEffort) and has_theorem_8(model, len(self._queue))
-        self._theorem_8 = Theorem8(model, batch, scenario.thruster.budget_m_s) if applies else None
 
     @property
     def flying(self) -> bool:
@@ -162,8 +158,6 @@ class Engagements:
         if spent.any():
             self._spent |= spent & (modulus(wanted) >= thruster.min_impulse_m_s)
         self._queue.append(thruster.give(wanted, self._budget))
-        if self._theorem_8 is not None:
-            self._theorem_8.decide(situation, wanted, self._queue[-1], tracking)
         self._budget = np.maximum(self._budget - modulus(self._queue[-1]), 0.0)
         self._impulse = self._give()
         given = modulus(self._impulse)
@@ -347,13 +341,6 @@ class Engagements:
         """Return the maximum miss of a state of the set, m, shape (B,): `LabelEnds.any_state_miss_m`."""
         return self._label_ends.any_state_miss_m(results)
 
-    def _theorem_8_miss_m(self) -> MaskedFloats:
-        """Return the bound of Theorem 8, masked where its assumptions do not hold or the flight has not ended."""
-        if self._theorem_8 is None:
-            return np.ma.MaskedArray(np.zeros(self._batch), mask=True)
-        known = self._theorem_8.known & ~self._information.inconsistent & np.isfinite(self._miss)
-        return np.ma.MaskedArray(self._theorem_8.miss_m, mask=~known)
-
     def results(self, runs: NDArray[np.int64]) -> Results:
         """Return the results so far, with these run numbers."""
         arrivals_s = self._arrivals_s()
@@ -372,7 +359,6 @@ class Engagements:
             miss_m=miss,
             impulse_m_s=np.maximum(self.scenario.thruster.budget_m_s - self._budget - not_given, 0.0),
             guaranteed_miss_m=np.ma.MaskedArray(payoff, mask=~known),
-            theorem_8_miss_m=self._theorem_8_miss_m(),
             outcomes=tuple(
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),

@@ -43,10 +43,6 @@ _MARGIN = (
     "Smallest distance from the true state to the boundary of its section, negative outside; unknown where nothing was "
     "measured"
 )
-_THEOREM_8 = (
-    "Bound of the miss that least-effort guarantees for all errors of the images (Theorem 8); unknown unless range and "
-    "closing speed are known, and for other strategies"
-)
 _HELD = "Miss at most the guaranteed miss; unknown without a guarantee"
 _EMPTY = "A measurement left the set empty, whatever the outcome is"
 _HIT = "Miss at most the radius of the body; unknown if the body has no size"
@@ -74,9 +70,6 @@ class Results:
     miss_m: Floats = field(metadata=columns(Column("miss_m", "m", "Minimum distance between the centres of mass")))
     impulse_m_s: Floats = field(metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' moduli")))
     guaranteed_miss_m: MaskedFloats = field(metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True)))
-    theorem_8_miss_m: MaskedFloats = field(
-        metadata=columns(Column("theorem_8_miss_m", "m", _THEOREM_8, nullable=True, optional=True))
-    )
     outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
     set_emptied: Flags = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool)))
     hit: MaskedFlags = field(metadata=columns(Column("hit", "", _HIT, bool, nullable=True)))

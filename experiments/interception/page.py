@@ -86,7 +86,6 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "min_to_go_s": min_to_go_s(scenario),
         "marks": [[name, duration_text(time), time] for name, time in marks(scenario).items()],
         "guaranteed_miss_m": record.result.guaranteed_miss_m.tolist()[0] if record.result.guarantees else None,
-        "theorem_8_miss_m": record.result.theorem_8_miss_m.tolist()[0],
         "closing_speed_m_s": model.closing_speed_m_s,
         "range_error_relative": scenario.range_sensor.relative_error if scenario.range_sensor is not None else None,
         "rate_error_rad_s": scenario.rate_sensor.error_rad_s if scenario.rate_sensor is not None else None,

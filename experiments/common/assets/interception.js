@@ -431,7 +431,6 @@ class Engagement {
         ["after an impulse that centres the set", stroke("set", { dash: [6, 3] })],
         ["miss of the true state", stroke("ink", { width: 1.2 })],
         ...(record.guaranteed_miss_m === null ? [] : [["guaranteed miss \u03a6", stroke("extra", { dash: [8, 3] })]]),
-        ...(record.theorem_8_miss_m === null ? [] : [["bound by Theorem 8", stroke("extra", { dash: [2, 3] })]]),
         ...(record.radius_m === null ? [] : [["radius of the body", stroke("quiet", { dash: [2, 2] })]]),
       ], (chart) => this.drawCorridor(chart), (step) => this.corridorLines(step), 0.3),
       ...(spatial ? [overTime("Impulse modulus", "Modulus of the impulse against time",
@@ -466,7 +465,7 @@ class Engagement {
   /** The possible miss of the set, that after an impulse that centres it, and that of the true state. */
   drawCorridor(chart) {
     const { record, step, corridor: { maximum, centred, truth } } = this;
-    const levels = [record.guaranteed_miss_m, record.theorem_8_miss_m, record.radius_m].filter((level) => level);
+    const levels = [record.guaranteed_miss_m, record.radius_m].filter((level) => level);
     const values = [...maximum, ...truth, ...levels].filter((value) => value);
     const floor = Math.max(Math.min(...values, ...centred.filter((value) => value)), 1e-3 * Math.min(...levels, ...centred.filter((value) => value)), 1e-3);
     chart.begin({ ...timeAxis(), y: [0.5 * floor, 2 * Math.max(...values, floor)], yTitle: "miss, m", yScale: LOGARITHMIC });
@@ -479,7 +478,6 @@ class Engagement {
     chart.curve(at(centred), { stroke: theme.colours.set, width: 1.3, dash: [6, 3] });
     chart.curve(at(truth), { stroke: theme.colours.ink, width: 1.2 });
     if (record.guaranteed_miss_m !== null) chart.level(record.guaranteed_miss_m, { stroke: theme.colours.extra, width: 1.6, dash: [8, 3] });
-    if (record.theorem_8_miss_m !== null) chart.level(record.theorem_8_miss_m, { stroke: theme.colours.extra, width: 1.3, dash: [2, 3] });
     if (record.radius_m !== null) chart.level(record.radius_m, { stroke: theme.colours.quiet, width: 1.3, dash: [2, 2] });
     drawMarks(chart, record);
     markNow(chart, record.places[step]);

@@ -11,7 +11,7 @@ from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
 from experiments.interception.published import SINGLE, printed_single_runs
 from experiments.interception.record_file import write_record
-from experiments.interception.runs.shared import THEOREM_8_NAME, allowance, bound_name
+from experiments.interception.runs.shared import allowance, bound_name
 from sim import Record
 from sim.results import ending
 
@@ -23,7 +23,6 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     """Yield the results of engagements side by side, with the paper's for its scenario, for the screen."""
     bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
     lateral = sorted({axis for record in records for axis in record.scenario.set_model.axes})
-    has_theorem_8 = any(record.result.theorem_8_miss_m.count() for record in records)
     columns: list[tuple[str, dict[str, str]]] = []
     for record in records:
         result = {name: values[0] for name, values in record.result.to_dict().items()}
@@ -33,7 +32,6 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
             **{f"miss along {axis}, m": number(result.get(f"miss_{axis}_m")) for axis in lateral},
             "impulse, m/s": number(result["impulse_m_s"]),
             f"{' / '.join(bounds)}, m": number(result["guaranteed_miss_m"]),
-            **({THEOREM_8_NAME: number(result.get("theorem_8_miss_m"))} if has_theorem_8 else {}),
             "outcome": _outcome(record),
             "true state inside the set\nat every step": _yes(result["truth_kept"]),
             "smallest distance from the true\nstate to the set's boundary, m": number(result["truth_margin_m"]),

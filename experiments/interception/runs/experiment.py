@@ -13,7 +13,6 @@ from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
 from experiments.interception.published import MANY, SINGLE, printed_single_runs
 from experiments.interception.runs.shared import (
-    THEOREM_8_NAME,
     allowance,
     b_plane_figures,
     bound_name,
@@ -114,14 +113,13 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> Iterator[Part]:
     table, runs = number_table("curve", "quantity", *QUANTILES, left=2), len(curves[0].results)
     for curve in curves:
         results = curve.results
-        bounds = {bound_name(scenario): results.guaranteed_miss_m, THEOREM_8_NAME: results.theorem_8_miss_m}
         head = f"{curve.number} {curve.noise.value}"
         table.add_row(head, "miss, m", *map(number, summary(results.miss_m).values()))
         ranging = "  + range sensor" if curve.range_sensor else ""
         table.add_row(ranging, "impulse, m/s", *map(number, summary(results.impulse_m_s).values()))
-        for title, values in bounds.items():
-            if values.count():
-                table.add_row("", title, "", number(summary(values.compressed())["p50"]))
+        if results.guaranteed_miss_m.count():
+            bound_m = summary(results.guaranteed_miss_m.compressed())["p50"]
+            table.add_row("", bound_name(scenario), "", number(bound_m))
     yield (
         f"{scenario.name}: quantiles of {some_runs(runs)} per curve; game noise with the tie rule {scenario.tie.value}"
     )

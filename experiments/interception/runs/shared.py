@@ -101,10 +101,6 @@ def bound_name(scenario: Scenario) -> str:
     return "guaranteed miss, m" if scenario.set_model.is_guaranteed else "the paper's Phi (not a bound here), m"
 
 
-THEOREM_8_NAME = "bound by Theorem 8, m"
-"""Table heading of `theorem_8_miss_m`."""
-
-
 def allowance(scenario: Scenario) -> str | None:
     """Return a line with the disturbances that the guaranteed model allows for; None for the model `paper`."""
     model = on_board_model(scenario)
