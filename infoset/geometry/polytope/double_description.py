@@ -145,6 +145,21 @@ def sides(rays: Floats, row: Floats, slack: float) -> tuple[Floats, Integers]:
 
 
 @_kernels.compiled
+def _near(bits: Bits, others: Integers, chosen: Integers, least: int) -> Integers:
+    """Return the `chosen` sets of bits that share at least `least` bits with the union of the `others`."""
+    union = np.zeros(bits.shape[1], np.uint64)
+    for i in others:
+        for word in range(len(union)):
+            union[word] |= bits[i, word]
+    near, count = np.empty(len(chosen), np.int64), 0
+    for i in chosen:
+        if _common(bits[i], union) >= least:
+            near[count] = i
+            count += 1
+    return near[:count]
+
+
+@_kernels.compiled
 def crossings(
     rays: Floats, bits: Bits, heights: Floats, signs: Integers, least: int, affine: bool
 ) -> tuple[Floats, Bits]:
@@ -160,8 +175,9 @@ def crossings(
         counts[i] = _common(bits[i], bits[i])
     room, count, blocker = 2 * k + 16, 0, 0
     result, marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)
-    for p in np.flatnonzero(signs > 0):
-        for q in np.flatnonzero(signs < 0):
+    below = _near(bits, np.flatnonzero(signs > 0), np.flatnonzero(signs < 0), least)
+    for p in _near(bits, below, np.flatnonzero(signs > 0), least):
+        for q in below:
             shared = _common(bits[p], bits[q])
             if shared < least:
                 continue
@@ -352,7 +368,7 @@ def unpacked(bits: Bits, count: int) -> Flags:
 
 def transposed(bits: Bits, count: int) -> Bits:
     """Return the bits of `count` columns, shape (count, words), from those of rows."""
-    return packed(unpacked(bits, count).T)
+    return packed(np.ascontiguousarray(unpacked(bits, count).T))
 
 
 @_kernels.compiled
@@ -442,6 +458,39 @@ def supports(points: Floats, normals: Floats) -> Floats:
     return result
 
 
+@_kernels.allocation_free
+def _along(row: Floats, step: Floats) -> tuple[float, float]:
+    """Return row . step of the first entries of a row, and their sum of squares."""
+    along = square = 0.0
+    for j in range(len(step)):
+        along += row[j] * step[j]
+        square += row[j] * row[j]
+    return along, square
+
+
+@_kernels.allocation_free
+def _solve(table: Floats, result: Floats) -> None:
+    """Write the solution of the linear equations (a, b), a x = b, to a zero result, which stays zero if singular."""
+    n = len(table)
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            best = i if abs(table[i, k]) > abs(table[best, k]) else best
+        if table[best, k] == 0.0:
+            return
+        for j in range(k, n + 1):
+            table[k, j], table[best, j] = table[best, j], table[k, j]
+        for i in range(k + 1, n):
+            factor = table[i, k] / table[k, k]
+            for j in range(k, n + 1):
+                table[i, j] -= factor * table[k, j]
+    for k in range(n - 1, -1, -1):
+        value = table[k, n]
+        for j in range(k + 1, n):
+            value -= table[k, j] * result[j]
+        result[k] = value / table[k, k]
+
+
 @_kernels.compiled
 def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bool, most: float) -> Floats:
     """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
@@ -453,10 +502,11 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
     where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
     v, n = points.shape
-    result, middle = points.copy(), np.zeros(n)
+    result, middle, step = points.copy(), np.zeros(n), np.empty(n)
     for i in range(v):
-        middle += points[i] / v
-    mine, needs = np.empty(len(facets), np.int64), np.empty(len(facets))
+        for j in range(n):
+            middle[j] += points[i, j] / v
+    mine, needs, table = np.empty(len(facets), np.int64), np.empty(len(facets)), np.empty((n, n + 1))
     for i in range(v):
         moved = 0.0
         for attempt in range(3 if chosen[i] else 0):
@@ -476,28 +526,34 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                     f += 1
             if not inside:
                 break
-            step = points[i] - middle if flat else np.zeros(n)
-            if count == n and not flat and np.linalg.det(facets[mine[:n], :n]) != 0.0:
-                step = np.linalg.solve(facets[mine[:n], :n], needs[:n])
+            for j in range(n):
+                step[j] = points[i, j] - middle[j] if flat else 0.0
+            if count == n and not flat:
+                for m in range(n):
+                    table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
+                _solve(table, step)
             for _ in range(0 if flat else 50):
                 done = True
                 for m in range(count):
-                    row = facets[mine[m], :n]
-                    gap = needs[m] - (row * step).sum()
+                    along, square = _along(facets[mine[m]], step)
+                    gap = needs[m] - along
                     if gap > 0.0:
-                        step += (gap + 0.25 * abs(needs[m])) / (row**2).sum() * row
+                        part = (gap + 0.25 * abs(needs[m])) / square
+                        for j in range(n):
+                            step[j] += part * facets[mine[m], j]
                         done = False
                 if done:
                     break
             factor = 0.0 if flat else 1.0
             for m in range(count):
-                along = (facets[mine[m], :n] * step).sum()
+                along, _ = _along(facets[mine[m]], step)
                 if needs[m] > factor * along:
                     factor = needs[m] / along if along > 0.0 else np.inf
-            length = math.sqrt((step**2).sum())
+            length = math.sqrt(_along(step, step)[0])
             if length == 0.0 or moved >= most:
                 break
             factor = min(factor, (most - moved) / length)
             moved += factor * length
-            result[i] += factor * step
+            for j in range(n):
+                result[i, j] += factor * step[j]
     return result
