@@ -41,7 +41,7 @@ def equally_spaced(count: int) -> Nodes:
     """Return visits to random targets every 150 s."""
     times = 150.0 * np.arange(1.0, count + 1.0)
     states = 100.0 * np.random.default_rng(0).normal(size=(count, 6))
-    return Nodes(times, times, states, states, states, states, np.zeros(count, dtype=bool))
+    return Nodes(times, times, states, states, np.zeros(count, dtype=bool))
 
 
 def test_pareto(benchmark: BenchmarkFixture, under: Check) -> None:

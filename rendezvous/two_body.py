@@ -116,20 +116,3 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
         ],
         axis=-1,
     )
-
-
-def coasting_rates(states: Floats, gravitational_parameter_m3_s2: float) -> Floats:
-    """Return (v, -mu r / |r|^3), the time derivatives of coasting `states`, shape (..., 6)."""
-    position = states[..., :3]
-    cube = np.linalg.norm(position, axis=-1, keepdims=True) ** 3
-    return np.concatenate([states[..., 3:], -gravitational_parameter_m3_s2 * position / cube], axis=-1)
-
-
-def gravity_gradient(position_m: Floats, gravitational_parameter_m3_s2: float) -> Floats:
-    """Return A = d(v, g) / d(r, v), shape (..., 6, 6), at positions of shape (..., 3)."""
-    squared = (position_m**2).sum(axis=-1)[..., None, None]
-    outer = position_m[..., :, None] * position_m[..., None, :]
-    matrix = np.zeros((*position_m.shape[:-1], 6, 6))
-    matrix[..., :3, 3:] = np.eye(3)
-    matrix[..., 3:, :3] = gravitational_parameter_m3_s2 / squared**1.5 * (3.0 * outer / squared - np.eye(3))
-    return matrix

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +10,8 @@ import numpy as np
 from rendezvous._arrays import Floats
 from rendezvous._compile import allocation_free, compiled
 from rendezvous.dormand_prince import STAGES, step_of
-from rendezvous.multipoint.segments import Nodes, Path
+from rendezvous.multipoint.segments import Nodes, Path, time_gradient
+from rendezvous.relative_motion.linear_motion import even_breaks
 from rendezvous.two_body import coast
 
 STEP_RAD = 0.1
@@ -71,7 +71,7 @@ def propagate(z: Floats, duration: float) -> bool:
 
     Lengths and times are such that the gravitational parameter is one. Returns whether the trajectory neither falls
     into the centre nor takes too many steps. The energy is not varied. Steps of 0.1 radians of the circular orbit at
-    the present distance have relative errors of about 1e-12 a revolution.
+    the present distance, or of 0.1 of this distance at a high speed, have relative errors of about 1e-12 a revolution.
     """
     slopes, z_next = np.zeros((STAGES, *z.shape)), np.zeros(z.shape)
     no_y, no_slopes = np.zeros(0), np.zeros((STAGES, 0))
@@ -80,7 +80,8 @@ def propagate(z: Floats, duration: float) -> bool:
         radius = np.sqrt(z[0, 0] ** 2 + z[1, 0] ** 2 + z[2, 0] ** 2)
         if not radius > MIN_RADIUS:
             return False
-        step = min(left, STEP_RAD * radius * np.sqrt(radius))
+        speed = np.sqrt(z[3, 0] ** 2 + z[4, 0] ** 2 + z[5, 0] ** 2)
+        step = min(left, STEP_RAD * radius / max(1.0 / np.sqrt(radius), speed))
         if left - step < 1e-3 * step:
             step = left
         _step(0.0, step, 0, no_y, z, (), no_slopes, slopes, no_y, z_next)
@@ -111,16 +112,10 @@ class Block:
         return length, float(np.sqrt(length**3 / self.gravitational_parameter_m3_s2))
 
     @cached_property
-    def state_units(self) -> Floats:
-        """Units of a state, shape (6,)."""
+    def value_units(self) -> Floats:
+        """Units of a state and its costate, shape (12,)."""
         length, duration = self.units
-        return np.array([length] * 3 + [length / duration] * 3)
-
-    @cached_property
-    def costate_units(self) -> Floats:
-        """Units of a costate, shape (6,)."""
-        length, duration = self.units
-        return np.array([length / duration**3] * 3 + [length / duration**2] * 3)
+        return length / np.repeat([1.0, duration, duration**3, duration**2], 3)
 
     @cached_property
     def durations(self) -> Floats:
@@ -147,11 +142,11 @@ class Shot:
     block: Block
     unknowns: Floats
 
-    def states(self, time_s: Floats) -> Floats:
-        """Return states in SI, shape (k, 6), at k increasing times."""
+    def along(self, time_s: Floats) -> Floats:
+        """Return states and costates in SI, shape (k, 12), at k increasing times: at a node, after the jump."""
         block, duration = self.block, self.block.units[1]
         z, now, node = _initial(block, self.unknowns[:6]), block.start_s, 0
-        states = np.empty((len(time_s), 6))
+        values = np.empty((len(time_s), 12))
         for row, time in enumerate(time_s):
             while node < len(block.time_s) - 1 and block.time_s[node] <= time:
                 _advance(z, (block.time_s[node] - now) / duration)
@@ -159,12 +154,11 @@ class Shot:
                 now, node = block.time_s[node], node + 1
             _advance(z, (time - now) / duration)
             now = time
-            states[row] = z[:6, 0]
-        return states * block.state_units
+            values[row] = z[:12, 0]
+        return values * block.value_units
 
-    @cached_property
-    def ends(self) -> tuple[Floats, Floats, Floats, float]:
-        """States and costates at the end of each segment, costates at its start, and the energy spent, in SI."""
+    def segments(self) -> tuple[Floats, Floats, float]:
+        """Return states and costates at the start and at the end of each segment, shape (k, 12), and the energy: SI."""
         block, count = self.block, len(self.block.time_s)
         z, starts, ends = _initial(block, self.unknowns[:6]), np.empty((count, 12)), np.empty((count, 12))
         for node in range(count):
@@ -173,59 +167,60 @@ class Shot:
             ends[node] = z[:12, 0]
             if node < count - 1:
                 self._jump(z, node)
-        (length, duration), costate = block.units, block.costate_units
-        energy = float(z[12, 0]) * length**2 / duration**3
-        return ends[:, :6] * block.state_units, ends[:, 6:] * costate, starts[:, 6:] * costate, energy
+        length, duration = block.units
+        return starts * block.value_units, ends * block.value_units, float(z[12, 0]) * length**2 / duration**3
 
     def _jump(self, z: Floats, node: int) -> None:
         z[6:9, 0] -= self.unknowns[6 + 3 * node : 9 + 3 * node]
 
 
 @dataclass(frozen=True, eq=False)
-class ShotPath:
-    """Trajectories that were shot, one for each block, and the stays between them; `settle` makes a `Path`."""
+class ShotPath(Path):
+    """A path of trajectories that were shot, one for each block, and of the stays between them."""
 
-    nodes: Nodes
     shots: tuple[Shot, ...]
-    settle: Callable[[ShotPath], Path]
 
-    @property
-    def cost(self) -> float:
-        """I = 1/2 int |u|^2 dt, m^2/s^3."""
-        return sum(shot.ends[3] for shot in self.shots)
+    @classmethod
+    def of(cls, nodes: Nodes, shots: tuple[Shot, ...]) -> ShotPath:
+        """Return the path of trajectories through `nodes`."""
+        starts, ends, costs = zip(*(shot.segments() for shot in shots), strict=True)
+        start, end = np.concatenate(starts), np.concatenate(ends)
+        before, after = end[:, 6:], np.vstack([start[1:, 6:], np.zeros(6)])
+        return cls(
+            nodes,
+            sum(costs),
+            np.concatenate([[shots[0].block.start_s], nodes.leave_s[:-1]]),
+            start[:, :6],
+            end[:, :6],
+            before,
+            after,
+            start[0, 6:],
+            time_gradient(nodes, end[:, :6], before, after),
+            shots,
+        )
 
-    @property
-    def time_gradient(self) -> Floats:
-        """Slopes dI / dt_i, shape (N,): D'(V_i - V) at a flyby.
+    def breaks(self) -> Floats:
+        """Return times, s, not decreasing: radians of the circular orbits at the starts of the segments."""
+        mu = self.shots[0].block.gravitational_parameter_m3_s2
+        radians = np.sqrt(mu / np.linalg.norm(self.start_states[:, :3], axis=1) ** 3) * (
+            self.nodes.arrive_s - self.starts_s
+        )
+        return np.concatenate([*map(even_breaks, self.starts_s, self.nodes.arrive_s, radians)])
 
-        At a rendezvous H - lambda' x_i' is the power 1/2 |u|^2, after minus before.
-        """
-        states, before, starts = (np.concatenate([shot.ends[part] for shot in self.shots]) for part in range(3))
-        after = np.concatenate([starts[1:], np.zeros((1, 6))])
-        gradient = ((before - after)[:, :3] * (self.nodes.arrive[:, 3:] - states[:, 3:])).sum(axis=1)
-        power = 0.5 * (after[:, 3:] ** 2).sum(axis=1) - 0.5 * (before[:, 3:] ** 2).sum(axis=1)
-        return np.asarray(np.where(self.nodes.rendezvous, power, gradient))
-
-    def settled(self) -> Path:
-        """Return the path that re-linearising about this one gives."""
-        return self.settle(self)
-
-    def states(self, time_s: Floats) -> Floats:
-        """Return states, shape (k, 6), at k times; those of the target during a stay."""
-        states = np.empty((len(time_s), 6))
-        which = np.searchsorted(np.array([shot.block.start_s for shot in self.shots]), time_s, side="right") - 1
+    def along(self, time_s: Floats) -> tuple[Floats, Floats]:
+        """Return states and costates, shapes (k, 6), at k times from the start to the last node."""
+        times = np.asarray(time_s, dtype=np.float64)
+        values = np.zeros((len(times), 12))
+        which = np.searchsorted([shot.block.start_s for shot in self.shots], times, side="right") - 1
         for index, shot in enumerate(self.shots):
             rows, end = np.flatnonzero(which == index), float(shot.block.time_s[-1])
-            rows = rows[np.argsort(time_s[rows], kind="stable")]
-            states[rows] = shot.states(np.minimum(time_s[rows], end))
-            stays = rows[time_s[rows] > end]
-            met = np.broadcast_to(shot.block.goal[-1], (len(stays), 6))
-            states[stays] = coast(met, time_s[stays] - end, shot.block.gravitational_parameter_m3_s2)
-        return states
-
-
-Flown = Path | ShotPath
-"""A path that the choice of times compares: its cost and its slopes by the times; `settled` completes it."""
+            rows = rows[np.argsort(times[rows], kind="stable")]
+            stays = (times[rows] >= end) & (index < len(self.shots) - 1)
+            values[rows[~stays]] = shot.along(times[rows[~stays]])
+            rows = rows[stays]
+            met = np.broadcast_to(shot.block.goal[-1], (len(rows), 6))
+            values[rows, :6] = coast(met, times[rows] - end, shot.block.gravitational_parameter_m3_s2)
+        return values[:, :6], values[:, 6:]
 
 
 def shoot(block: Block, near: Floats | None = None) -> Shot | None:
@@ -246,7 +241,7 @@ def shoot(block: Block, near: Floats | None = None) -> Shot | None:
 def _initial(block: Block, costate: Floats, variations: int = 0) -> Floats:
     """State, costate and energy at the start of a block in column 0, and columns for their variations."""
     z = np.zeros((13, 1 + variations))
-    z[:12, 0] = np.concatenate([block.start_state / block.state_units, costate])
+    z[:12, 0] = np.concatenate([block.start_state / block.value_units[:6], costate])
     return z
 
 
@@ -257,7 +252,7 @@ def _advance(z: Floats, duration: float) -> None:
 
 def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> Floats | None:
     """Return the residual at the nodes, or None if there is no trajectory; fill in its derivatives `slopes`."""
-    goals = block.goal / block.state_units
+    goals = block.goal / block.value_units[:6]
     size, last = len(unknowns), len(block.time_s) - 1
     z = _initial(block, unknowns[:6], size)
     z[6:12, 1:7] = np.eye(6)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Flags, Floats
-from rendezvous.multipoint._shooting import Flown
 from rendezvous.multipoint.segments import NotSettledError, Path, check_times
 from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times, room_s
 from rendezvous.multipoint.tour import SMOOTH, Visits
@@ -67,7 +66,7 @@ def best_order(
     unfit = _orders_without_room(tour.start_s, dwell, limits)
     horizon = limits.latest_s
 
-    def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown]:
+    def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Path]:
         complete, held, enough = len(order) == count, limits, -np.inf
         if not complete:
             if horizon is not None:
@@ -84,7 +83,7 @@ def best_order(
             tour.flyer(order), tour.start_s, dwell[list(order)], held, begins, effort=effort, enough=enough
         )
         search.evaluations += times.evaluations
-        return times.objective, times.flown
+        return times.objective, times.path
 
     # A local minimum of a partial order is no bound; divided by the slack, it is used as one.
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0 / (1.0 - _MARGIN)
@@ -123,14 +122,14 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
             "stays shorter"
         )
 
-    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Flown]:
-        flown = tour.flyer(order)(times[: len(order)])
+    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Path]:
+        path = tour.flyer(order)(times[: len(order)])
         search.evaluations += 1
-        return flown.cost, flown
+        return path.cost, path
 
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
     search = _Search(solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits)
-    path = search.run().settled()
+    path = search.run()
     return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, tuple(search.lost), unfit)
 
 
@@ -151,7 +150,7 @@ def best_times(
 class _Search:
     """A depth-first search through partial orders."""
 
-    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Flown]]
+    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Path]]
     count: int
     progress: Report | None
     start_s: float
@@ -160,20 +159,20 @@ class _Search:
     looks_twice: bool
     fits: Flags | None = None
     best: tuple[int, ...] = ()
-    best_path: Flown | None = None
+    best_path: Path | None = None
     best_objective: float = np.inf
     nodes: int = 0
     evaluations: int = 0
     decided: int = 0
     lost: list[tuple[int, ...]] = field(default_factory=list)
 
-    def run(self) -> Flown:
+    def run(self) -> Path:
         self._branch((), None)
         if self.best_path is None:
             raise NotSettledError("no path was found for any order; give visits more time")
         return self.best_path
 
-    def _branch(self, beginning: tuple[int, ...], before: Flown | None) -> None:
+    def _branch(self, beginning: tuple[int, ...], before: Path | None) -> None:
         """Examine all orders that begin with a partial order."""
         children = []
         for target in (target for target in range(self.count) if target not in beginning):
@@ -214,7 +213,7 @@ class _Search:
         if self.progress is not None:
             self.progress(self.decided / factorial(self.count))
 
-    def _warm(self, before: Flown | None) -> list[Floats]:
+    def _warm(self, before: Path | None) -> list[Floats]:
         """Return initial times: those of the previous visits, contracted, and one more gap."""
         if before is None:
             return []

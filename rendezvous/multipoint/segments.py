@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,16 +18,14 @@ class Nodes:
     """States through which a path must pass, and their times, in order.
 
     `arrive` and `leave`, shape (N, 6), are the targets' states at the arrivals and departures, `arrive_s` and
-    `leave_s`, shape (N,), which are equal if the chaser does not stay; `arrive_rate` and `leave_rate` are their time
-    derivatives. `rendezvous`, shape (N,), says whether the velocities must also agree.
+    `leave_s`, shape (N,), which are equal if the chaser does not stay. `rendezvous`, shape (N,), says whether the
+    velocities must also agree.
     """
 
     arrive_s: Floats
     leave_s: Floats
     arrive: Floats
     leave: Floats
-    arrive_rate: Floats
-    leave_rate: Floats
     rendezvous: Flags
 
 
@@ -35,7 +34,7 @@ class NotSettledError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Path(ABC):
     """The minimum-energy path through N nodes.
 
     Parameters
@@ -54,7 +53,6 @@ class Path:
         dI / dt_i.
     """
 
-    motion: LinearMotion
     nodes: Nodes
     cost: float
     starts_s: Floats
@@ -65,14 +63,18 @@ class Path:
     costate_start: Floats
     time_gradient: Floats
 
+    @abstractmethod
+    def along(self, time_s: Floats) -> tuple[Floats, Floats]:
+        """Return states and costates, shapes (k, 6), at k times from the start to the last node."""
+
+    @abstractmethod
+    def breaks(self) -> Floats:
+        """Return times, s, not decreasing, between which the control is smooth and turns by about a radian."""
+
     @property
     def jumps(self) -> Floats:
         """Costate before minus costate after, shape (N, 6): dI / d(target's state); zero in the velocity of a flyby."""
         return self.costate_before - self.costate_after
-
-    def settled(self) -> Path:
-        """Return the path itself."""
-        return self
 
     def costate(self, time_s: Floats) -> Floats:
         """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times: after the jump at a node, zero during a stay."""
@@ -82,14 +84,21 @@ class Path:
         """Return u = B' lambda, m/s^2, shape (k, 3), at k times."""
         return self.costate(time_s)[:, 3:]
 
+    def state(self, time_s: Floats) -> Floats:
+        """Return the chaser's states, shape (k, 6), at k times."""
+        return self.along(time_s)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearPath(Path):
+    """A path of a linear motion."""
+
+    motion: LinearMotion
+
     def breaks(self) -> Floats:
         """Return times, s, not decreasing, between which the control is smooth and turns by about a radian."""
         legs = zip(self.starts_s, self.nodes.arrive_s, strict=True)
         return np.concatenate([self.motion.breaks(float(start), float(end)) for start, end in legs])
-
-    def state(self, time_s: Floats) -> Floats:
-        """Return the chaser's states, shape (k, 6), at k times."""
-        return self.along(time_s)[0]
 
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
         """Return states and costates, shapes (k, 6), at k times from the start to the last node.
@@ -122,10 +131,10 @@ class Path:
         return which, (time_s < self.nodes.arrive_s[which]) | ended
 
 
-def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> Path:
+def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> LinearPath:
     """Find the minimum-energy path of a `motion` from the `start_state` (m, m/s) through `nodes`.
 
-    Unknowns are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k,
+    Unknowns are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1),
     with L_k the Cholesky factor of the Gramian, in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose
     normal equations are symmetric positive definite with 3 x 3 blocks on three diagonals. In contrast to R13 in the
     paper's elimination, no inverted block is singular in a well-posed problem. O(N) time and memory.
@@ -144,7 +153,7 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     arrive, begin = nodes.arrive.copy(), np.concatenate([start_state[None], nodes.leave[:-1]])
     free = ~nodes.rendezvous
     arrive[free, 3:] = begin[1:][free[:-1], 3:] = 0.0  # the unknowns
-    missing = (arrive - (segment.transition @ begin[:, :, None])[:, :, 0] - segment.drift) / scale
+    missing = (arrive - (segment.transition @ begin[:, :, None])[:, :, 0]) / scale
     try:
         lower = np.linalg.cholesky(segment.gramian / (scale[:, :, None] * scale[:, None, :]))
         slopes = (
@@ -165,8 +174,8 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     after = np.concatenate([at_start[1:], np.zeros((1, 6))])
     arrive[free, 3:] = velocities[free]
     begin[1:][free[:-1], 3:] = velocities[:-1][free[:-1]]
-    cost, gradient = 0.5 * float((effort**2).sum()), _time_gradient(motion, nodes, arrive, before, after)
-    return Path(motion, nodes, cost, starts, begin, arrive, before, after, at_start[0], gradient)
+    cost, gradient = 0.5 * float((effort**2).sum()), time_gradient(nodes, arrive, before, after)
+    return LinearPath(nodes, cost, starts, begin, arrive, before, after, at_start[0], gradient, motion)
 
 
 def _velocities(effort: Floats, ahead: Floats, behind: Floats, free: Flags) -> Floats:
@@ -200,7 +209,7 @@ def _carried(motion: LinearMotion, grid: Floats, start: Floats, costate_end: Flo
         costate = segment.transition[index + 1].T @ costate
         costates[index] = costate
     for index in range(count):
-        state = segment.transition[index] @ state + segment.drift[index] + segment.gramian[index] @ costates[index]
+        state = segment.transition[index] @ state + segment.gramian[index] @ costates[index]
         states[index] = state
     return states, costates
 
@@ -219,17 +228,12 @@ def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
         raise ValueError(f"times must increase: visit {index + 1} is at {arrive_s[index]:g} s, not after {limit}")
 
 
-def _time_gradient(motion: LinearMotion, nodes: Nodes, arrive: Floats, before: Floats, after: Floats) -> Floats:
-    """dI/dt: D'(V_i - V) at a flyby, H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous."""
-    gradient: Floats = ((before - after)[:, :3] * (nodes.arrive[:, 3:] - arrive[:, 3:])).sum(axis=1)
-    met = nodes.rendezvous
-    if met.any():
-        times = np.concatenate([nodes.arrive_s[met], nodes.leave_s[met]])
-        states = np.concatenate([nodes.arrive[met], nodes.leave[met]])
-        rates = np.concatenate([nodes.arrive_rate[met], nodes.leave_rate[met]])
-        costates = np.concatenate([before[met], after[met]])
-        # The Hamiltonian, without its part lambda' x_i'.
-        sides = (costates * (motion.rates(times, states) - rates)).sum(axis=1)
-        sides += 0.5 * (costates[:, 3:] ** 2).sum(axis=1)
-        gradient[met] = sides[len(sides) // 2 :] - sides[: len(sides) // 2]
-    return gradient
+def time_gradient(nodes: Nodes, arrive: Floats, before: Floats, after: Floats) -> Floats:
+    """dI/dt, shape (N,), from the chaser's states at the nodes and its costates before and after them, shapes (N, 6).
+
+    D'(V_i - V) at a flyby. H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous: as the target coasts in the
+    dynamics of the chaser, this is the power 1/2 |u|^2, after minus before.
+    """
+    flyby = ((before - after)[:, :3] * (nodes.arrive[:, 3:] - arrive[:, 3:])).sum(axis=1)
+    power = 0.5 * (after[:, 3:] ** 2).sum(axis=1) - 0.5 * (before[:, 3:] ** 2).sum(axis=1)
+    return np.asarray(np.where(nodes.rendezvous, power, flyby))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize
@@ -13,10 +12,9 @@ from scipy.spatial import cKDTree
 
 from rendezvous._arrays import Floats
 from rendezvous._halton import halton
-from rendezvous.multipoint._shooting import Flown
 from rendezvous.multipoint.segments import NotSettledError, Path
 
-FlyAt = Callable[[Floats], Flown]
+FlyAt = Callable[[Floats], Path]
 
 MIN_SHARE = 1e-6
 """Default of the minimum gap, as a share of the available time."""
@@ -87,19 +85,14 @@ class BestTimes:
     `objective` is the energy plus the price of the time, m^2/s^3; `evaluations` is the number of paths computed.
     """
 
-    flown: Flown
+    path: Path
     objective: float
     evaluations: int
-
-    @cached_property
-    def path(self) -> Path:
-        """The settled path, computed at the first access."""
-        return self.flown.settled()
 
     @property
     def time_s(self) -> Floats:
         """Times of arrival, shape (N,)."""
-        return self.flown.nodes.arrive_s
+        return self.path.nodes.arrive_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +100,7 @@ class _Trial:
     """Gaps, the path at their times, its objective and the slope of the objective along the gaps."""
 
     gaps: Floats
-    flown: Flown
+    path: Path
     objective: float
     slope: Floats
 
@@ -138,11 +131,11 @@ class _Trials:
     def __call__(self, gaps: Floats) -> _Trial:
         times = self.shifts_s + np.cumsum(gaps)
         self.evaluations += 1
-        flown = self.fly(times)
-        gradient = flown.time_gradient.copy()
+        path = self.fly(times)
+        gradient = path.time_gradient.copy()
         gradient[-1] += self.price_per_s
         slope = np.cumsum(gradient[::-1])[::-1]
-        return _Trial(gaps, flown, flown.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope)
+        return _Trial(gaps, path, path.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope)
 
     def attempt(self, gaps: Floats) -> _Trial | None:
         """Return None instead of an error if there is no path at such times."""
@@ -244,7 +237,7 @@ def optimise_times(
                 f"the best times found cost {best.objective:.6g} m^2/s^3 and are no minimum: another gap lowers the "
                 "cost; start from other times, or give visits more time"
             )
-    return BestTimes(best.flown, best.objective, trials.evaluations)
+    return BestTimes(best.path, best.objective, trials.evaluations)
 
 
 def _unsettled(trials: _Trials, best: _Trial) -> float:
@@ -261,7 +254,7 @@ def _unsettled(trials: _Trials, best: _Trial) -> float:
     farthest = max(trials.total - gaps.sum(), 0.0) + excess.sum()
     gain = np.maximum(-slope * np.minimum(gaps, farthest), slope * excess)
     # The objective of a path that costs nothing is the rounding of states.
-    states = best.flown.nodes.arrive
+    states = best.path.nodes.arrive
     size = (states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps
     return float(gain.max() / max(best.objective + _ROUNDING * size.sum(), _MIN))
 

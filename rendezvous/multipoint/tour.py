@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats, Integers
-from rendezvous.multipoint._shooting import Flown
-from rendezvous.multipoint.segments import Nodes, Path, solve_segments
+from rendezvous.multipoint.segments import LinearPath, Nodes, Path, solve_segments
 from rendezvous.relative_motion import LinearMotion
 
 SMOOTH = 4.0 / 3.0
@@ -72,10 +71,6 @@ class MovingTargets(ABC):
     def states(self, which: Integers, time_s: Floats) -> Floats:
         """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
 
-    @abstractmethod
-    def rates(self, time_s: Floats, states: Floats) -> Floats:
-        """Time derivatives of `states` of targets at k times, shape (k, 6)."""
-
 
 @dataclass(frozen=True, eq=False)
 class DriftingTargets(MovingTargets):
@@ -87,13 +82,8 @@ class DriftingTargets(MovingTargets):
 
     def states(self, which: Integers, time_s: Floats) -> Floats:
         """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
-        zero = np.zeros(time_s.shape)
-        coasted = self.motion.transition(zero, time_s) @ self.initial[which][:, :, None]
-        return np.asarray(coasted[:, :, 0] + self.motion.drift(zero, time_s))
-
-    def rates(self, time_s: Floats, states: Floats) -> Floats:
-        """Time derivatives of `states` of targets at k times, shape (k, 6)."""
-        return self.motion.rates(time_s, states)
+        coasted = self.motion.transition(np.zeros(time_s.shape), time_s) @ self.initial[which][:, :, None]
+        return np.asarray(coasted[:, :, 0])
 
 
 class Visits(ABC):
@@ -115,7 +105,7 @@ class Visits(ABC):
         """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""
 
     @abstractmethod
-    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Flown]:
+    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
         """Return a function of N times that finds paths of one `order`, each near one before if that helps."""
 
 
@@ -134,11 +124,11 @@ class Tour(Visits):
     ruggedness = SMOOTH
     """Small: the path of given times is unique, and the costs of an order's few local minima are close."""
 
-    def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
+    def fly(self, order: Sequence[int], time_s: ArrayLike) -> LinearPath:
         """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""
         return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
 
-    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Flown]:
+    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
         """Return `fly` for one `order`; the path is unique."""
         return lambda time_s: self.fly(order, time_s)
 
@@ -158,12 +148,8 @@ def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) ->
         raise ValueError("a target is visited twice")
     rendezvous = np.array([targets.targets[index].meet is Meet.RENDEZVOUS for index in order])
     leave_s = times + targets.dwell_s[which]
-    meets = bool(rendezvous.any())
-    if not meets or (leave_s == times).all():
+    if (leave_s == times).all():
         arrive = targets.states(which, times)
-        rate = targets.rates(times, arrive) if meets else arrive  # rates at flybys are not used
-        return Nodes(times, times, arrive, arrive, rate, rate, rendezvous)
-    both, count = np.concatenate([times, leave_s]), len(times)
-    states = targets.states(np.concatenate([which, which]), both)
-    rates = targets.rates(both, states)
-    return Nodes(times, leave_s, states[:count], states[count:], rates[:count], rates[count:], rendezvous)
+        return Nodes(times, times, arrive, arrive, rendezvous)
+    states = targets.states(np.concatenate([which, which]), np.concatenate([times, leave_s]))
+    return Nodes(times, leave_s, states[: len(times)], states[len(times) :], rendezvous)

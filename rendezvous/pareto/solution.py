@@ -34,11 +34,11 @@ class Plan:
         return self._costate_at(np.asarray(time_s, dtype=np.float64))[..., 3:]
 
     def state(self, time_s: ArrayLike) -> Floats:
-        """Return x(t) = Phi x0 + drift + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6): (2.5) of the paper."""
+        """Return x(t) = Phi x0 + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6): (2.5) of the paper."""
         times = np.asarray(time_s, dtype=np.float64)
         segment = self.craft.motion.segment(np.full(times.shape, self.craft.start_s), times)
         forced = np.einsum("...ab,...b->...a", segment.gramian, self._costate_at(times))
-        return np.asarray(segment.transition @ self.craft.state + segment.drift + forced)
+        return np.asarray(segment.transition @ self.craft.state + forced)
 
     def sample(self, count: int) -> PlanSamples:
         """Return the flight at `count` >= 2 equally spaced times, both ends included."""
@@ -157,14 +157,14 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
         If the numbers overflow, or a Gramian is singular: the craft's control does not reach all components.
     """
     common, opening, base = encounter.common, encounter.opening, encounter.base
-    factors: dict[tuple[int, float], tuple[Floats, Floats, Floats]] = {}
+    factors: dict[tuple[int, float], tuple[Floats, Floats]] = {}
     costs = []
     for craft in encounter.craft:
         key = (id(craft.motion), craft.start_s)
         if key not in factors:
             factors[key] = _factor(craft, encounter.meeting_s, common)
-        transition, drift, whiten = factors[key]
-        missing = (base - transition @ craft.state - drift)[:common]
+        transition, whiten = factors[key]
+        missing = (base - transition @ craft.state)[:common]
         costs.append(_craft_cost(craft, whiten, missing, opening[:common]))
     return EncounterSolution(encounter, tuple(costs), weighted_point(costs, encounter.weights))
 
@@ -181,8 +181,8 @@ def weighted_point(costs: Sequence[CraftCost], weights: ArrayLike) -> Floats:
     return np.asarray(np.linalg.solve(upper, orthogonal.T @ right))
 
 
-def _factor(craft: Craft, meeting_s: float, common: int) -> tuple[Floats, Floats, Floats]:
-    """Return Phi, the drift, and L^-1 S^-1, the map from the missing state to the scaled effort."""
+def _factor(craft: Craft, meeting_s: float, common: int) -> tuple[Floats, Floats]:
+    """Return Phi, and L^-1 S^-1, the map from the missing state to the scaled effort."""
     segment = craft.motion.segment(craft.start_s, meeting_s)
     scale = np.ones(common)
     scale[:3] = meeting_s - craft.start_s
@@ -198,7 +198,7 @@ def _factor(craft: Craft, meeting_s: float, common: int) -> tuple[Floats, Floats
             f"craft {craft.name!r}: its Gramian over {meeting_s - craft.start_s:g} s is singular; check duration, rate"
         ) from None
     whiten = np.linalg.solve(lower, np.diag(1.0 / scale))
-    return segment.transition, segment.drift, np.asarray(whiten)
+    return segment.transition, np.asarray(whiten)
 
 
 def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) -> CraftCost:

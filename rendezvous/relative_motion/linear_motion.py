@@ -15,18 +15,17 @@ MAX_PANELS = 200_000
 
 @dataclass(frozen=True)
 class Segment:
-    """Motion between two times: x(end) = transition x(start) + drift + the effect of the control.
+    """Motion between two times: x(end) = transition x(start) + the effect of the control.
 
-    `transition` and `gramian`, shape (..., 6, 6), and `drift`, shape (..., 6), are those of states in m and m/s.
+    `transition` and `gramian`, shape (..., 6, 6), are those of states in m and m/s.
     """
 
     transition: Floats
     gramian: Floats
-    drift: Floats
 
 
 class LinearMotion(ABC):
-    """x' = A(t) x + B u + w(t), x = (position, velocity), with B = (0, 1)'; by default w = 0.
+    """x' = A(t) x + B u, x = (position, velocity), with B = (0, 1)'.
 
     Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front.
     """
@@ -47,21 +46,9 @@ class LinearMotion(ABC):
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, between which the motion turns by about a radian at most."""
 
-    def forcing(self, time_s: ArrayLike) -> Floats:
-        """w(t), shape (..., 6)."""
-        return np.zeros((*np.shape(time_s), 6))
-
-    def rates(self, time_s: Floats, states: Floats) -> Floats:
-        """A(t) x + w(t) at times and `states` of shapes (k,) and (k, 6)."""
-        return np.asarray((self.dynamics(time_s) @ states[:, :, None])[:, :, 0] + self.forcing(time_s))
-
-    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect of w alone, int Phi(end, t) w dt, shape (..., 6)."""
-        return np.zeros((*np.broadcast_shapes(np.shape(start_s), np.shape(end_s)), 6))
-
     def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition, Gramian and drift together; end >= start."""
-        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s), self.drift(start_s, end_s))
+        """Transition and Gramian together; end >= start."""
+        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s))
 
 
 def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:

@@ -1,4 +1,4 @@
-"""Motion with any A(t), B(t) and drift w(t), by collocation of the adjoint variational equations."""
+"""Motion with any A(t), by collocation of the adjoint variational equations."""
 
 from __future__ import annotations
 
@@ -30,32 +30,21 @@ class _Solution(Segment):
 
 @dataclass(frozen=True, eq=False)
 class TimeVaryingMotion(LinearMotion):
-    """x' = A(t) x + B u + w(t).
-
-    Parameters
-    ----------
-    matrix_at : callable
-        A of times of shape (k,), s: shape (k, 6, 6).
-    drift_at : callable or None
-        w, shape (k, 6); None is zero.
+    """x' = A(t) x + B u; `matrix_at` returns A of times of shape (k,), s: shape (k, 6, 6).
 
     Notes
     -----
     The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
-    = Psi(t)' at the nodes gives the Gramian, the held control and the drift as sums of positive weights. Panels are
-    doubled until two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
+    = Psi(t)' at the nodes gives the Gramian and the held control as sums of positive weights. Panels are doubled until
+    two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
     """
 
     matrix_at: OfTime
-    drift_at: OfTime | None = None
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""
-        return _at(self.matrix_at, time_s)
-
-    def forcing(self, time_s: ArrayLike) -> Floats:
-        """w(t), shape (..., 6)."""
-        return super().forcing(time_s) if self.drift_at is None else _at(self.drift_at, time_s)
+        times = np.asarray(time_s, dtype=np.float64)
+        return np.asarray(self.matrix_at(times.ravel()), dtype=np.float64).reshape(*times.shape, 6, 6)
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
@@ -67,22 +56,14 @@ class TimeVaryingMotion(LinearMotion):
         return self._solved(start_s, end_s).gramian
 
     def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition, Gramian and drift together; end >= start."""
+        """Transition and Gramian together; end >= start."""
         checked_durations(start_s, end_s)
         return self._solved(start_s, end_s)
-
-    def short_segment(self, start_s: Floats, end_s: Floats) -> Segment:
-        """Transition, Gramian and drift over k intervals well under a radian: one panel, unchecked."""
-        return _collocated(self, start_s, end_s, 1)
 
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
         checked_durations(start_s, end_s)
         return self._solved(start_s, end_s).held
-
-    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect of w alone, int Phi(end, t) w dt, shape (..., 6)."""
-        return self._solved(start_s, end_s).drift
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
@@ -133,12 +114,6 @@ def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Soluti
     raise ValueError(f"A(t) changes too fast: {MAX_PANELS} panels an interval do not agree to {AGREEMENT:g}")
 
 
-def _at(function: OfTime, time_s: ArrayLike) -> Floats:
-    times = np.asarray(time_s, dtype=np.float64)
-    values = np.asarray(function(times.ravel()), dtype=np.float64)
-    return values.reshape(*times.shape, *values.shape[1:])
-
-
 def _first_panels(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> int:
     """One panel for each radian of the fastest motion at the ends and the middle."""
     if not len(starts):
@@ -183,23 +158,17 @@ def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels:
     psi = np.linalg.solve(system, right).reshape(len(durations), panels, NODES, 6, 6)
     last = np.eye(6) + np.einsum("k,npkab->npab", weights, adjoint @ psi)
     effect = np.swapaxes(psi[..., 3:, :], -1, -2)  # Phi B; velocities are not scaled
-    drifts = np.zeros((len(durations), panels, 6))
-    if motion.drift_at is not None:
-        pushed = _at(motion.drift_at, times) / scale[:, None, None, :]
-        drifts = np.einsum("k,npkba,npkb->npa", weights, psi, pushed)
     power = np.broadcast_to(np.eye(6), (len(durations), 6, 6))
-    gramian, held, drift = np.zeros((len(durations), 6, 6)), np.zeros((len(durations), 6, 3)), np.zeros_like(scale)
+    gramian, held = np.zeros((len(durations), 6, 6)), np.zeros((len(durations), 6, 3))
     for panel in range(panels):
         turned = power[:, None] @ effect[:, panel]
         gramian = gramian + np.einsum("k,nkai,nkbi->nab", weights, turned, turned)
         held = held + np.einsum("k,nkai->nai", weights, turned)
-        drift = drift + (power @ drifts[:, panel, :, None])[..., 0]
         power = power @ np.swapaxes(last[:, panel], -1, -2)
     outer = scale[:, :, None] * scale[:, None, :]
     return _Solution(
         power * (scale[:, :, None] / scale[:, None, :]),
         gramian * outer * width[:, None, None],
-        drift * scale * width[:, None],
         held * scale[:, :, None] * width[:, None, None],
     )
 
@@ -214,7 +183,6 @@ def _difference(first: _Solution, second: _Solution, durations: Floats) -> float
         (first.transition, second.transition, scale[:, None, :] / scale[:, :, None]),
         (first.gramian, second.gramian, 1.0 / (scale[:, :, None] * scale[:, None, :])),
         (first.held, second.held, 1.0 / scale[:, :, None]),
-        (first.drift, second.drift, 1.0 / scale),
     ):
         axes = tuple(range(1, one.ndim))
         size = np.abs(other * weight).max(axis=axes)

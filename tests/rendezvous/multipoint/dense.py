@@ -32,7 +32,7 @@ def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes
     times, count = nodes.arrive_s, len(nodes.arrive_s)
     sources = np.concatenate([[start_s], times[:-1]])
     segment = motion.segment(start_s, times)
-    coast = np.einsum("kab,b->ka", segment.transition, start_state) + segment.drift
+    coast = np.einsum("kab,b->ka", segment.transition, start_state)
     matrix = np.zeros((3 * count + 3, 3 * count + 3))
     by_velocity = np.zeros_like(matrix[:-3])
     for row in range(count):

@@ -120,7 +120,7 @@ def double_integrator(positions: list[float], times: list[float]) -> tuple[TimeV
     states = np.zeros((len(times), 6))
     states[:, 0] = positions
     at = np.array(times)
-    return motion, Nodes(at, at, states, states, 0.0 * states, 0.0 * states, np.zeros(len(times), dtype=bool))
+    return motion, Nodes(at, at, states, states, np.zeros(len(times), dtype=bool))
 
 
 def test_free_space_is_a_cubic_spline() -> None:

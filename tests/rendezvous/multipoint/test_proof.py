@@ -17,7 +17,6 @@ from rendezvous.relative_motion import (
     ClohessyWiltshire,
     EllipticOrbit,
     LinearMotion,
-    TimeVaryingMotion,
     TschaunerHempel,
 )
 from tests.rendezvous.multipoint.dense import solve_dense
@@ -28,22 +27,9 @@ RATE = 1.13e-3
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def drifting() -> TimeVaryingMotion:
-    """A circular orbit with a push that varies."""
-
-    def push(times: Floats) -> Floats:
-        zeros = np.zeros((len(times), 3))
-        return np.column_stack(
-            [zeros, 1e-4 * np.sin(RATE * times), 2e-5 * np.cos(RATE * times), 1e-5 * np.ones(len(times))]
-        )
-
-    return TimeVaryingMotion(ClohessyWiltshire(RATE).dynamics, drift_at=push)
-
-
 MOTIONS: dict[str, Callable[[], LinearMotion]] = {
     "circular": lambda: ClohessyWiltshire(RATE),
     "elliptic": lambda: TschaunerHempel(EllipticOrbit(RATE, 0.3, 0.7)),
-    "drifting": drifting,
 }
 
 
@@ -75,7 +61,7 @@ def flown(tour: Tour, times: Floats) -> tuple[Floats, float]:
             # The costate comes along, integrated backward from its end beforehand: here forward from its start.
             state, costate = values[:6], values[6:12]
             matrix, control = tour.motion.dynamics(time), costate[3:]
-            moved = matrix @ state + np.append(np.zeros(3), control) + tour.motion.forcing(time)
+            moved = matrix @ state + np.append(np.zeros(3), control)
             return np.concatenate([moved, -matrix.T @ costate, [0.5 * control @ control]])
 
         scale = np.array([end - start] * 3 + [1.0] * 3)

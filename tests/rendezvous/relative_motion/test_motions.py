@@ -78,7 +78,6 @@ def test_matrices_satisfy_their_differential_equations(name: str, duration: floa
     np.testing.assert_allclose(found.transition * weight, transition * weight, rtol=0.0, atol=2e-10 * size)
     spread = np.sqrt(np.outer(np.diag(gramian), np.diag(gramian)))
     np.testing.assert_allclose(found.gramian / spread, gramian / spread, rtol=0.0, atol=2e-10)
-    assert not found.drift.any()
     if isinstance(motion, TschaunerHempel | TimeVaryingMotion):
         effect, wanted = motion.held_input(start, start + duration) / scale[:, None], held / scale[:, None]
         np.testing.assert_allclose(effect, wanted, rtol=0.0, atol=2e-10 * float(np.abs(wanted).max()))
@@ -90,19 +89,6 @@ def test_a_frozen_motion_is_the_exponential_of_its_matrix() -> None:
     assert motion.transition(5.0, 5.0) == pytest.approx(np.eye(6), abs=0.0)
     held = integrated(ClohessyWiltshire(RATE), 0.0, 600.0)[2]
     np.testing.assert_allclose(motion.held_input(0.0, 600.0), held, rtol=1e-9, atol=1e-6)
-
-
-def test_drift_of_a_general_motion() -> None:
-    pushed = TimeVaryingMotion(
-        ClohessyWiltshire(RATE).dynamics,
-        drift_at=lambda times: np.column_stack([np.zeros((len(times), 3)), 1e-5 * np.ones((len(times), 3))]),
-    )
-    end = 1500.0
-    held = ConstantMotion(ClohessyWiltshire(RATE).dynamics(0.0)).held_input(0.0, end)
-    np.testing.assert_allclose(pushed.drift(0.0, end), held @ np.full(3, 1e-5), rtol=1e-12)
-    found = integrated(pushed, 0.0, end)[1]
-    np.testing.assert_allclose(pushed.gramian(0.0, end), found, rtol=0.0, atol=1e-9 * found.max())
-    assert pushed.forcing(3.0) == pytest.approx([0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-5])
 
 
 def test_the_published_gramian() -> None:
