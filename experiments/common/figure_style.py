@@ -112,12 +112,19 @@ def letters(panels: Iterable[Axes], titles: Sequence[str] = (), **look: Any) -> 
 
 
 def legend_below(figure: Figure, columns: int, **more: Any) -> None:
-    """Draw the legend of a figure below its axes: everything drawn in them that has a label, once."""
+    """Draw the legend of a figure below its axes: everything drawn in them that has a label, once.
+
+    It has fewer columns if it would be wider than the figure.
+    """
     handles: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, **more)
+    for count in range(columns, 0, -1):
+        legend = figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=count, **more)
+        if count == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
 
 
 def plain_ticks(one: Axis) -> None:

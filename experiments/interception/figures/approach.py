@@ -19,6 +19,7 @@ from experiments.common.figure_style import (
     legend_below,
     new_figure,
     plain,
+    plain_ticks,
     style,
 )
 from experiments.interception.course import (
@@ -29,7 +30,14 @@ from experiments.interception.course import (
     true_predicted_misses,
 )
 from experiments.interception.figures.b_plane import RADIUS_SHOWN
-from experiments.interception.figures.shared import count_down, draw_body, draw_impulses, draw_levels, name_events
+from experiments.interception.figures.shared import (
+    count_down,
+    draw_body,
+    draw_end,
+    draw_impulses,
+    draw_levels,
+    name_events,
+)
 from guidance.thruster import modulus
 from sim import Record
 
@@ -86,6 +94,8 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     axes.plot(times[known], maximum, color=SET_EDGE, label=_POSSIBLE)
     axes.plot(times[known], centred, label="after an impulse that centres the set", **_CENTRED)
     axes.plot(times, true, **_TRUE)
+    if len(known):
+        draw_end(axes, times[known[-1]], maximum[-1], record.scenario)
     draw_levels(axes, _guaranteed_m(record), record.scenario.radius_m)
 
 
@@ -99,6 +109,7 @@ def _draw_moduli(axes: Axes, record: Record) -> None:
     draw_impulses(axes, Clock(counts_down=True).at(record), sizes, color=IMPULSE, linewidth=0.9, label="impulse")
     if sizes.any():
         axes.set(yscale="log", ylim=(0.4 * sizes[sizes > 0.0].min(), 2.5 * sizes.max()))
+        plain_ticks(axes.yaxis)
     axes.set_ylabel("impulse, m/s")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +23,7 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.screen import number
+from experiments.common.screen import number, some_runs
 from experiments.interception.figures.distributions import axis_limit
 from experiments.interception.figures.shared import MAX_VECTORS, draw_body, ring
 from infoset.arrays import Floats
@@ -34,6 +35,9 @@ _OWN_LIMITS_FROM = 3.0
 """Ratio of the maximum and the minimum median above which each panel has its own limits."""
 RADIUS_SHOWN = 5.0
 """The axes extend to the radius of the body if it is at most this multiple of the maximum miss shown."""
+_AT_BODY_SCALE = "at the scale of the body"
+_BODY_FROM, _BODY_SCALE = 4.0, 2.0
+"""Ratio of the axes and the radius of the body from which a second panel extends to some radii of the body."""
 _POINTS_IN_FRONT = 300
 """Number of points of a panel up to which they are in front of the circles."""
 
@@ -106,23 +110,24 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
 
     Ellipses contain 50 % and 99 % of the runs. The radii of the circles are the median and the 90 % quantile of the
     miss, and the maximum guaranteed miss. All panels have the same limits, unless the median misses differ much. The
-    radius of the body, m, is drawn as a disc.
+    radius of the body, m, is drawn as a disc; if it is small beside the misses, each cloud has a second panel at the
+    scale of the body.
     """
     medians = [float(np.median(each.miss_m)) for each in clouds]
     alone = max(medians) > _OWN_LIMITS_FROM * min(medians)
-    columns = min(_MAX_COLUMNS, len(clouds))
-    rows = -(-len(clouds) // columns)
-    width_mm = 56.0 * columns + 22.0
-    figure, grid = subplots(35.0 + 68.0 * rows, rows, columns, width_mm=width_mm)
-    panels = first_panels(grid, len(clouds))
+    halves = [_half_width([each] if alone else clouds, radius_m) for each in clouds]
+    if radius_m is not None and max(halves) > _BODY_FROM * radius_m:
+        halves += [_BODY_SCALE * radius_m] * len(clouds)
+    columns = min(_MAX_COLUMNS, len(clouds)) if len(clouds) > 1 else len(halves)
+    rows = -(-len(halves) // columns)
+    figure, grid = subplots(35.0 + 68.0 * rows, rows, columns, width_mm=56.0 * columns + 22.0)
+    panels = first_panels(grid, len(halves))
     titles = []
-    for index, (axes, each) in enumerate(zip(panels, clouds, strict=True)):
-        quantiles = _draw_cloud(axes, each, _half_width([each] if alone else clouds, radius_m), radius_m)
-        titles.append(f"{plain(each.title)}\n{quantiles}")
-        if index % columns and not alone:
-            axes.set_ylabel("")
+    for place, (axes, each, half) in enumerate(zip(panels, itertools.cycle(clouds), halves, strict=False)):
+        lines = _draw_cloud(axes, each, half, radius_m)
+        titles.append("\n".join([plain(each.title), *(lines if place < len(clouds) else [_AT_BODY_SCALE, lines[-1]])]))
     letters(panels, titles, fontsize="small")
-    note = "The scale differs from panel to panel." if alone else None
+    note = "The scale differs from panel to panel." if len(set(halves)) > 1 else None
     legend_below(figure, min(2, columns), title=note)
     return figure
 
@@ -134,8 +139,8 @@ def _half_width(clouds: Sequence[Cloud], radius_m: float | None) -> float:
     return 1.08 * max([maximum, *(size for size in sizes if size <= RADIUS_SHOWN * maximum)])
 
 
-def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> str:
-    """Draw the points and lines of a panel, and return the quantiles of the miss, and its maximum guaranteed value."""
+def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> list[str]:
+    """Draw the points and lines of a panel, and return lines about the miss: quantiles, the bound, and hits."""
     count, known = len(each.miss_m), []
     size, alpha = float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5)), float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8))
     point: dict[str, Any] = {"color": SET_EDGE, "marker": "o", "linestyle": "none", "markeredgewidth": 0.0}
@@ -149,13 +154,27 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
             axes.plot(*ring(quantile), label=name, color=_CIRCLE_COLOUR, linestyle=dashes, linewidth=0.9, **line)
             known.append(f"{'median' if level == 0.5 else f'{100 * level:g} %'} {number(quantile)} m")
     for level, name, dashes in _ELLIPSES:
-        if shows(count, level) and (drawn := ellipse(each.across_m, level)) is not None:
-            centre, matrix = drawn
-            axes.plot(*(centre[:, None] + matrix @ ring(1.0)), label=name, color=TRUTH, linestyle=dashes, **line)
+        if shows(count, level) and (outline := _ellipse_within(each, level)) is not None:
+            axes.plot(*outline, label=name, color=TRUTH, linestyle=dashes, **line)
     draw_body(axes, half, each.guaranteed_m, radius_m)
     outside = int((np.abs(each.across_m) > half).any(axis=1).sum())
     if outside:
         place: dict[str, Any] = {"xycoords": "axes fraction", "ha": "right", "va": "bottom", "path_effects": HALO}
         axes.annotate(f"beyond the axes: {outside} of {count}", (0.97, 0.03), fontsize="small", zorder=5.0, **place)
-    bound = "" if each.guaranteed_m is None else f"\nmaximum Φ {number(each.guaranteed_m)} m"
-    return ", ".join(known) + bound
+    lines = [", ".join(known)]
+    lines += [] if each.guaranteed_m is None else [f"maximum Φ {number(each.guaranteed_m)} m"]
+    lines += [] if radius_m is None else [f"hits: {int((each.miss_m <= radius_m).sum())} of {some_runs(count)}"]
+    return lines
+
+
+def _ellipse_within(each: Cloud, level: float) -> Floats | None:
+    """Return the outline of the ellipse of a share of the runs; None if a part of it is beyond the guaranteed miss.
+
+    No miss is there, so the ellipse would not describe the runs.
+    """
+    shape = ellipse(each.across_m, level)
+    if shape is None:
+        return None
+    outline = shape[0][:, None] + shape[1] @ ring(1.0)
+    beyond = each.guaranteed_m is not None and np.hypot(*outline).max() > each.guaranteed_m
+    return None if beyond else outline

@@ -17,6 +17,7 @@ from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
+from experiments.interception.published import MANY, SINGLE, printed_single_runs
 from experiments.interception.study import Comparison, Curve
 from guidance import NoiseKind
 from sim import Record, Results, Scenario
@@ -27,7 +28,8 @@ NOISES = {NoiseKind.RANDOM: "random noise", NoiseKind.GAME: "game noise, worst t
 
 def draw_experiment(scenario: Scenario, curves: Sequence[Curve], courses: Sequence[Courses]) -> Iterator[Figure]:
     """Draw the distributions and the corridor, and in space the misses across the approach for each noise."""
-    yield draw_distributions(curves, radius_m=scenario.radius_m)
+    printed = printed_single_runs() if scenario.name in (MANY, SINGLE) else None
+    yield draw_distributions(curves, scenario.radius_m, printed)
     yield draw_corridor(curves, courses)
     for noise in NoiseKind if scenario.is_spatial else ():
         clouds = [

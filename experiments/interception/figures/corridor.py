@@ -17,12 +17,13 @@ from experiments.common.figure_style import (
     first_panels,
     legend_below,
     letters,
+    plain_ticks,
     style,
     subplots,
 )
 from experiments.common.screen import some_runs
 from experiments.interception.course import Courses
-from experiments.interception.figures.shared import count_down, draw_levels, name_events
+from experiments.interception.figures.shared import count_down, draw_end, draw_levels, name_events
 from experiments.interception.study import Curve, max_guarantee_m
 from sim.statistics import shows
 
@@ -54,6 +55,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
         name_events(first, course.scenario)
         first.set_ylabel("possible miss, m")
         second.set_ylabel("impulse, m/s")
+        second.tick_params(labelbottom=True)
         sensor = f", {'' if curve.range_sensor else 'no '}range sensor" if len(curves) > 2 else ""
         titles.append(f"{curve.noise.value} noise{sensor}, {some_runs(len(course.possible_m))}")
     letters(above, titles)
@@ -78,6 +80,7 @@ def _draw_possible(axes: Axes, course: Courses) -> None:
         axes.plot(times, median, color=TRUTH, label="possible miss: median")
         look: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.0, "linestyle": (0, (4, 1.5))}
         axes.plot(times, maximum, label="possible miss: maximum", **look)
+        draw_end(axes, times[-1], median[-1], course.scenario)
 
 
 def _draw_impulses(axes: Axes, course: Courses) -> None:
@@ -91,3 +94,4 @@ def _draw_impulses(axes: Axes, course: Courses) -> None:
             given = sizes > bottom
             axes.vlines(course.before_arrival_s[given], 1e-12, sizes[given], label=name, **look)
     axes.set(yscale="log", ylim=(bottom, 2.0 * maximum))
+    plain_ticks(axes.yaxis)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,9 +21,10 @@ MAX_POINTS = 2000
 """Most points of a curve; more would only make the file larger."""
 
 _DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
+_RUN: dict[str, Any] = {"marker": "^", "markersize": 7.0, "linestyle": "none", "zorder": 4.0, "clip_on": False}
 _BAND = "95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)"
-_LOGARITHMIC_FROM = 30.0
-"""Ratio of the maximum and the minimum median above which the axis of the miss is logarithmic."""
+_LOGARITHMIC_FROM = 50.0
+"""Ratio of the end of the axis of the miss to the smallest median, or to the radius, above which it is logarithmic."""
 _MIN_SHOWN = 0.01
 """Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
 
@@ -43,29 +44,40 @@ class Sample:
     guaranteed_name: str = ""
 
 
-def draw_distributions(curves: Sequence[Curve], radius_m: float | None = None) -> Figure:
-    """Draw the distribution functions of the curves of the experiment with `draw_samples`."""
-    samples = []
+def draw_distributions(
+    curves: Sequence[Curve], radius_m: float | None = None, printed: Mapping[str, tuple[float, float]] | None = None
+) -> Figure:
+    """Draw the distribution functions of the curves of the experiment with `draw_samples`.
+
+    `printed` are the miss, m, and the impulse, m/s, of the run that the paper prints for a noise.
+    """
+    samples, runs = [], []
     for curve in curves:
         sensor = "with" if curve.range_sensor else "no"
         name = f"{curve.number}  {curve.noise.value} noise, {sensor} range sensor, {some_runs(len(curve.results))}"
         samples.append(Sample(name, CURVE_LOOKS[curve.number], curve.results.miss_m, curve.results.impulse_m_s))
-    return draw_samples(samples, radius_m)
+        if printed and not curve.range_sensor:
+            miss_m, impulse_m_s = np.array(printed[curve.noise.value])[:, None]
+            title = f"printed: one run from z = \N{MINUS SIGN}8 km, {curve.noise.value} noise"
+            runs.append(Sample(title, {"color": CURVE_LOOKS[curve.number]["color"]}, miss_m, impulse_m_s))
+    return draw_samples(samples, radius_m, runs)
 
 
 @style()
-def draw_samples(samples: Sequence[Sample], radius_m: float | None = None) -> Figure:
+def draw_samples(samples: Sequence[Sample], radius_m: float | None = None, runs: Sequence[Sample] = ()) -> Figure:
     """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their 95 % confidence bands.
 
     Where a few values are far beyond the others, the axis ends before them and its label says how many; where the
-    curves lie decades apart, the axis of the miss is logarithmic. The radius of the body, m, is a line in (a).
+    curves or the radius lie decades apart, the axis of the miss is logarithmic. The radius of the body, m, is a line in
+    (a). Single runs are marks on the axes.
     """
     figure, (panels,) = subplots(85.0, 1, 2, sharey=True)
     left, right = panels
     misses, impulses = [sample.miss_m for sample in samples], [sample.impulse_m_s for sample in samples]
     bounds = [sample.guaranteed_miss_m for sample in samples if sample.guaranteed_miss_m.size]
-    scale_misses(left, [*misses, *bounds])
+    scale_misses(left, [*misses, *bounds], radius_m)
     minimum, limit = min(float(each.min()) for each in impulses), axis_limit(impulses)
+    limit = max([limit, *(float(run.impulse_m_s.max()) for run in runs)])
     margin = 0.05 * (limit - minimum) or 0.5
     right.set(xlim=(max(0.0, minimum - margin), limit + margin), ylim=(-0.02, 1.02))
     for sample in samples:
@@ -73,6 +85,9 @@ def draw_samples(samples: Sequence[Sample], radius_m: float | None = None) -> Fi
         _draw_curve(right, sample.impulse_m_s, sample.look, sample.name)
         if sample.guaranteed_miss_m.size:
             _draw_curve(left, sample.guaranteed_miss_m, sample.look | _DOTTED, sample.guaranteed_name, banded=False)
+    for run in runs:
+        left.plot(run.miss_m, [0.0], label=run.name, **_RUN | run.look)
+        right.plot(run.impulse_m_s, [0.0], **_RUN | run.look)
     left.fill_between([], [], facecolor=LIMIT, alpha=0.3, label=_BAND)
     draw_radius(left, radius_m)
     left.set_ylabel("share of runs")
@@ -83,12 +98,12 @@ def draw_samples(samples: Sequence[Sample], radius_m: float | None = None) -> Fi
     return figure
 
 
-def scale_misses(axes: Axes, samples: Sequence[Floats]) -> None:
-    """Scale the axis of the misses so that every sample is visible: logarithmic if they are decades apart."""
-    medians = [float(np.median(sample)) for sample in samples]
-    if 0.0 < _LOGARITHMIC_FROM * min(medians) < max(medians):
-        first = min(float(np.quantile(sample[sample > 0.0], _MIN_SHOWN)) for sample in samples)
-        axes.set(xscale="log", xlim=(0.5 * first, 2.0 * max(float(sample.max()) for sample in samples)))
+def scale_misses(axes: Axes, samples: Sequence[Floats], radius_m: float | None) -> None:
+    """Scale the axis of the misses so that every sample and the radius are visible: logarithmic if decades apart."""
+    sizes = [float(np.median(sample)) for sample in samples] + ([] if radius_m is None else [radius_m])
+    if 0.0 < _LOGARITHMIC_FROM * min(sizes) < axis_limit(samples):
+        firsts = [float(np.quantile(sample[sample > 0.0], _MIN_SHOWN)) for sample in samples]
+        axes.set(xscale="log", xlim=(0.5 * min(*firsts, *sizes), 2.0 * max(float(sample.max()) for sample in samples)))
         plain_ticks(axes.xaxis)
     else:
         axes.set_xlim(0.0, 1.04 * axis_limit(samples) or 0.5)

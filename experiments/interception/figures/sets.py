@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
-from matplotlib.transforms import Bbox
 
 from experiments.common.figure_style import HALO, INK, MEASURED, WIDTH_MM, legend_below, letters, plain, style, subplots
 from experiments.interception.course import Clock, evenly, record_titles
@@ -28,6 +27,10 @@ _SQUARE: dict[str, Any] = {"marker": "s", "color": INK, "markerfacecolor": "whit
 _SECTIONS = 5
 _SMALL_MRAD = 0.1
 """Angle below which the axes of angles are in µrad."""
+_VISIBLE = 0.15
+"""Share of common limits below which a set is too small to see; the planes of a row then have their own limits."""
+_FAR = 1.5
+"""Distance of a measured angle from its set, in heights of the set, from which it is outside the limits."""
 
 
 @style()
@@ -35,7 +38,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
     """Draw sections of the sets after the measurement: one row per time, one column per record and lateral axis.
 
     At most five sections are drawn, evenly chosen over the range. The planes of a row have the same limits for each
-    lateral axis.
+    lateral axis, unless a set would then be too small to see.
 
     Parameters
     ----------
@@ -54,7 +57,10 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
         for axes, plane in zip(row, planes, strict=True):
             _shade_allowed(axes, plane)
     titles = [plane.title for planes in rows for plane in planes]
-    letters([*grid.flat], [title.replace(", ", ",\n") for title in titles] if columns > 2 else titles)
+    if columns > 2:
+        letters([*grid.flat], [title.replace(", ", ",\n") for title in titles], fontsize="small")
+    else:
+        letters([*grid.flat], titles)
     legend_below(figure, min(2, columns))
     return figure
 
@@ -84,6 +90,22 @@ class Plane:
         """Vertices of the sections, omega in µrad/s and alpha in mrad."""
         return [section.omega_alpha[self.axis].polygon() * np.array([1e6, 1e3]) for section in self.chosen]
 
+    @property
+    def true(self) -> Floats:
+        """The true omega, µrad/s, and alpha, mrad, shape (2,)."""
+        at = (self.step, self.axis)
+        return np.array([self.record.true_rate_rad_s[at] * 1e6, self.record.true_angle_rad[at] * 1e3])
+
+    @property
+    def box(self) -> Floats:
+        """The least and the greatest omega and alpha of the set, the true state and a measurement near them, (2, 2)."""
+        points = np.vstack([*self.outlines, self.true])
+        low, high = points.min(axis=0), points.max(axis=0)
+        far, angle = _FAR * (high[1] - low[1]), low[1] if self.measured_rad is None else self.measured_rad * 1e3
+        if far == 0.0 or low[1] - far <= angle <= high[1] + far:
+            low[1], high[1] = min(low[1], angle), max(high[1], angle)
+        return np.array([low, high])
+
 
 def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[Plane]:
     """Return the planes of each record at its step nearest to a time, with at most so many sections."""
@@ -110,15 +132,11 @@ def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
 
 
 def draw_plane(axes: Axes, plane: Plane) -> None:
-    """Draw sections with their ranges, the true state and the measurement, and name the axes."""
+    """Draw sections and the true state, and name the axes; `level_planes` draws the measurement."""
     colours = mpl.colormaps["Blues_r"](np.linspace(0.0, 0.55, len(plane.chosen)))
     for number, (outline, colour) in enumerate(zip(plane.outlines, colours, strict=True)):
         _draw_outline(axes, outline, colour, zorder=3.0 - 0.01 * number)
-    record, at = plane.record, (plane.step, plane.axis)
-    rate, angle = record.true_rate_rad_s[at] * 1e6, record.true_angle_rad[at] * 1e3
-    if plane.measured_rad is not None:
-        axes.plot(rate, plane.measured_rad * 1e3, zorder=5, label=MEASUREMENT_MARK, linestyle="none", **_SQUARE)
-    axes.plot(rate, angle, zorder=6, label=TRUTH_MARK, path_effects=HALO, **_TRUTH)
+    axes.plot(*plane.true, zorder=6, label=TRUTH_MARK, path_effects=HALO, **_TRUTH)
     axes.set_xlabel(f"rate $\\omega_{plane.name}$, µrad/s")
     axes.set_ylabel(f"angle $\\alpha_{plane.name}$, mrad")
 
@@ -145,15 +163,44 @@ def _draw_outline(axes: Axes, outline: Floats, colour: Floats, zorder: float) ->
 
 
 def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
-    """Give the planes of each lateral axis the same limits, those of the sets and marks."""
+    """Set the limits of planes, and draw the measurements within them.
+
+    The planes of a lateral axis have the same limits, or their own if a set would then be too small to see.
+    """
     for axis in {plane.axis for plane in planes}:
         same = [(axes, plane) for axes, plane in zip(row, planes, strict=True) if plane.axis == axis]
-        low, high = Bbox.union([axes.dataLim for axes, _ in same]).get_points()
-        margin = 0.07 * (high - low)
-        margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(high), 1e-6))
-        for axes, _ in same:
+        boxes = np.array([plane.box for _, plane in same])
+        low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+        if (boxes[:, 1] - boxes[:, 0] >= _VISIBLE * (high - low)).all():
+            boxes[:] = low, high
+        for (axes, plane), (low, high) in zip(same, boxes, strict=True):
+            margin = 0.07 * (high - low)
+            margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(high), 1e-6))
             axes.set(xlim=(low[0] - margin[0], high[0] + margin[0]), ylim=(low[1] - margin[1], high[1] + margin[1]))
-            axes.locator_params(nbins=4)
+            axes.locator_params("x", nbins=3)
+            axes.locator_params("y", nbins=4)
+            axes.xaxis.set_major_formatter(lambda tick, _: _short(tick))
             if np.abs(axes.get_ylim()).max() <= _SMALL_MRAD:
-                axes.yaxis.set_major_formatter(lambda tick, _: f"{1e3 * tick:g}".replace("-", "\N{MINUS SIGN}"))
+                axes.yaxis.set_major_formatter(lambda tick, _: _short(1e3 * tick))
                 axes.set_ylabel(axes.get_ylabel().replace("mrad", "µrad"))
+            _draw_measurement(axes, plane)
+
+
+def _short(tick: float) -> str:
+    return f"{tick:g}".replace("-", "\N{MINUS SIGN}")
+
+
+def _draw_measurement(axes: Axes, plane: Plane) -> None:
+    """Draw the measured angle, or write on which side of the axes it is."""
+    if plane.measured_rad is None:
+        return
+    (bottom, top), angle = axes.get_ylim(), plane.measured_rad * 1e3
+    if bottom <= angle <= top:
+        axes.plot(plane.true[0], angle, zorder=5, label=MEASUREMENT_MARK, linestyle="none", **_SQUARE)
+        return
+    # Sets rise with the rate, so these corners are free.
+    arrow, corner, aligned = (
+        ("↑", (0.04, 0.96), ("left", "top")) if angle > top else ("↓", (0.96, 0.04), ("right", "bottom"))
+    )
+    where: dict[str, Any] = {"xycoords": "axes fraction", "ha": aligned[0], "va": aligned[1]}
+    axes.annotate(f"measured α {arrow}", corner, fontsize="small", zorder=7.0, **where)

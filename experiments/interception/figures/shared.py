@@ -27,6 +27,10 @@ _MORE_TICKS_S = (0.1, 10.0, 600.0, 21600.0, 864000.0)
 """Ticks of the time before the arrival, and those that have a label only in a short flight."""
 _LONG = 1000.0
 """Ratio of the first and the last time from which a flight is long."""
+_KM_FROM = 5000.0
+"""Extent of the B-plane, m, from which its axes are in kilometres."""
+_MIN_DISC = 0.02
+"""Share of the axes below which the disc of a body is not drawn: it would be hidden by the mark of its centre."""
 
 
 def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) -> None:
@@ -37,19 +41,27 @@ def draw_levels(axes: Axes, guaranteed_m: float | None, radius_m: float | None) 
         axes.axhline(radius_m, label=f"body radius, {radius_m:g} m", **RADIUS)
 
 
+def draw_end(axes: Axes, time_s: float, miss_m: float, scenario: Scenario) -> None:
+    """Mark the end of the possible miss: from there on the set is not complete (see `complete_steps`)."""
+    label = f"end: nearest range in the set {scenario.set_model.range_threshold_m / 1e3:g} km"
+    axes.plot(time_s, miss_m, marker="D", markersize=4.0, color=INK, linestyle="none", zorder=4.0, label=label)
+
+
 def draw_body(axes: Axes, half_m: float, guaranteed_m: float | None, radius_m: float | None) -> None:
     """Draw the B-plane of axes that extend by `half_m` around the centre of the body: disc, guaranteed miss, labels."""
-    if radius_m is not None and radius_m <= half_m:
-        fill = axes.fill(*ring(radius_m), facecolor=BODY_FILL, zorder=0.5, label=f"body radius, {radius_m:g} m")
+    if radius_m is not None and _MIN_DISC * half_m <= radius_m <= half_m:
+        fill = axes.fill(*ring(radius_m), facecolor=BODY_FILL, zorder=0.6, label=f"body radius, {radius_m:g} m")
         fill[0].set(edgecolor=INK, linestyle=RADIUS["linestyle"])
     if guaranteed_m is not None and guaranteed_m <= half_m:
         axes.plot(*ring(guaranteed_m), label="guaranteed miss Φ", zorder=3.1, **GUARANTEE)
     centre: dict[str, Any] = {"color": INK, "marker": "+", "markersize": 7.0, "linestyle": "none", "zorder": 4.0}
     axes.plot(0.0, 0.0, markeredgewidth=1.1, label="centre of the body", **centre)
-    axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal", xlabel="miss along y, m")
-    axes.set_ylabel("miss along z, m")
+    unit, metres = ("km", 1e3) if half_m >= _KM_FROM else ("m", 1.0)
+    axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal", xlabel=f"miss along y, {unit}")
+    axes.set_ylabel(f"miss along z, {unit}")
     for one in (axes.xaxis, axes.yaxis):
         one.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+        one.set_major_formatter(lambda tick, _: f"{tick / metres:g}".replace("-", "\N{MINUS SIGN}"))
 
 
 def ring(radius: float) -> Any:

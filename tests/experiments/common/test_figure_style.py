@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from experiments.common import figure_style
-from experiments.common.figure_style import WIDTH_MM, figure_bytes, style, subplots
+from experiments.common.figure_style import WIDTH_MM, figure_bytes, legend_below, style, subplots
 
 
 def test_pdfs_have_truetype_fonts_and_pngs_200_dpi(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -18,3 +18,14 @@ def test_pdfs_have_truetype_fonts_and_pngs_200_dpi(monkeypatch: pytest.MonkeyPat
     assert b"/Type3" not in files["pdf"]
     # The header of a PNG has its width at byte 16.
     assert int.from_bytes(files["png"][16:20], "big") == int(WIDTH_MM / 25.4 * 200.0)
+
+
+@style()
+def test_a_legend_is_not_wider_than_its_figure() -> None:
+    figure, ((axes,),) = subplots(40.0)
+    for number in range(6):
+        axes.plot([0.0, 1.0], [0.0, number], label=f"{number}: {'long ' * 8}")
+    legend_below(figure, 3)
+    (legend,) = figure.legends
+    assert len(legend.get_texts()) == 6
+    assert legend.get_window_extent().width <= figure.bbox.width

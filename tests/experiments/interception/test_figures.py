@@ -12,9 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
-from experiments.common.figure_style import figure_bytes
+from experiments.common.figure_style import CURVE_LOOKS, figure_bytes
+from experiments.interception.course import Courses
+from experiments.interception.figures.commands import draw_experiment
 from experiments.interception.figures.comparison import draw_comparison
-from experiments.interception.figures.distributions import draw_distributions
+from experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, choose_sections, draw_sets
 from experiments.interception.scenario_file import load_scenario
@@ -128,6 +130,28 @@ def test_distributions_draw_the_curves_and_their_bands(curves: list[Curve]) -> N
             for edge in (np.maximum(share - half, 0.0), np.minimum(share + half, 1.0)):
                 for corner in zip(sample, edge, strict=True):
                     assert np.isclose(band, corner).all(axis=1).any()
+
+
+def test_the_runs_that_the_paper_prints_are_marks() -> None:
+    scenario = load_scenario("asteroid-1997")
+    curve = Curve(1, NoiseKind.RANDOM, False, simulate(scenario, 2))
+    courses = Courses(scenario, 2)
+    figure = next(draw_experiment(scenario, [curve], [courses]))
+    label = "printed: one run from z = \N{MINUS SIGN}8 km, random noise"
+    left, right = figure.axes
+    assert (points(left, label)[0, 0], data(right.lines[-1])[0, 0]) == (4.3, 244.7)
+    assert right.get_xlim()[1] > 244.7
+    other = next(draw_experiment(replace(scenario, name="mine"), [curve], [courses]))
+    assert label not in legend(other)
+
+
+@pytest.mark.parametrize(("radius_m", "scale"), [(None, "linear"), (400.0, "linear"), (20.0, "log")])
+def test_the_axis_of_the_miss_shows_the_radius_of_the_body(radius_m: float | None, scale: str) -> None:
+    misses = np.geomspace(500.0, 2000.0, 40)
+    figure = draw_samples([Sample("wide", CURVE_LOOKS[1], misses, misses)], radius_m)
+    assert figure.axes[0].get_xscale() == scale
+    low, high = figure.axes[0].get_xlim()
+    assert low < (radius_m or 500.0) < high
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse
 from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
+from experiments.interception.figures.sets import draw_sets
 from experiments.interception.scenario_file import load_scenario
 from experiments.interception.study import Curve
 from guidance import NoiseKind
@@ -91,6 +92,38 @@ def test_ellipses_contain_their_share_of_the_runs() -> None:
     assert ellipse(np.outer(np.arange(9.0), [1.0, 2.0]), 0.5) is None
     figure = draw_b_plane([Cloud("many", across, np.hypot(*across.T))])
     assert {"ellipse: 50 % of the runs", "ellipse: 99 % of the runs"} <= set(legend(figure))
+
+
+def test_an_ellipse_beyond_the_guaranteed_miss_is_not_drawn() -> None:
+    across = np.repeat([[3.0, 0.1], [-3.0, -0.2], [0.0, 0.3]], 10, axis=0)
+    for guaranteed_m, drawn_too in ((30.0, True), (3.1, False)):
+        figure = draw_b_plane([Cloud("on a line", across, np.hypot(*across.T), guaranteed_m)])
+        assert ("ellipse: 50 % of the runs" in legend(figure)) is drawn_too
+
+
+def test_wide_misses_have_a_panel_at_the_scale_of_the_body() -> None:
+    across = 1e3 * np.random.default_rng(5).normal(size=(50, 2))
+    across[:4] *= 1e-3
+    wide = Cloud("wide", across, np.hypot(*across.T))
+    figure = draw_b_plane([wide, wide], 100.0)
+    hits = int((wide.miss_m <= 100.0).sum())
+    assert 4 <= hits < 50
+    assert [axes.get_title("left").splitlines()[-1] for axes in figure.axes] == [f"hits: {hits} of 50 runs"] * 4
+    assert [axes.get_xlim()[1] == 200.0 for axes in figure.axes] == [False, False, True, True]
+    assert "body radius, 100 m" in legend(figure)
+    assert len(draw_b_plane([wide], 1500.0).axes) == 1
+    far = draw_b_plane([replace(wide, across_m=20.0 * across, miss_m=20.0 * wide.miss_m)], None).axes[0]
+    assert far.get_xlabel() == "miss along y, km"
+
+
+def test_sets_much_smaller_than_others_have_their_own_limits(records: list[Record]) -> None:
+    random, game = records
+    step = int(np.abs(random.time_s - 60.0).argmin())
+    figure = draw_sets(records, [float(random.time_s[step])])
+    for axes, (record, axis) in zip(figure.axes, ((random, 0), (random, 1), (game, 0), (game, 1)), strict=True):
+        outlines = [section.omega_alpha[axis].polygon() for section in record.sections[step]]
+        width = 1e6 * np.ptp(np.concatenate(outlines)[:, 0])
+        assert width > 0.14 * np.ptp(axes.get_xlim())
 
 
 def test_process_has_the_courses_of_both_axes(records: list[Record]) -> None:
@@ -199,6 +232,9 @@ def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
     median, maximum = (drawn(left)[f"possible miss: {name}"] for name in ("median", "maximum"))
     np.testing.assert_allclose(median[:, 1], np.median(courses.possible_m, axis=0)[: len(median)])
     np.testing.assert_allclose(maximum[:, 1], courses.possible_m.max(axis=0)[: len(maximum)])
+    threshold_km = scenario.set_model.range_threshold_m / 1e3
+    end = drawn(left)[f"end: nearest range in the set {threshold_km:g} km"]
+    np.testing.assert_array_equal(end[0], median[-1])
     assert left.get_ylim() == right.get_ylim()
     assert left.get_xlim() == left_impulse.get_xlim()
     assert {"impulse: median", "guaranteed miss Φ", "body radius, 50 m", "times of the schedule"} <= set(legend(figure))
