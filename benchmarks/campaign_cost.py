@@ -46,7 +46,7 @@ def main() -> None:
     paper = replace(load_scenario("asteroid-1997"), range_sensor=None)
     with style():
         figure, ((left, right),) = subplots(80.0, 1, 2)
-        for noise in NoiseKind:
+        for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
             scenario = replace(paper, noise=noise)
             simulate(scenario, 64)
             look = CURVE_LOOKS[1 if noise is NoiseKind.RANDOM else 4]

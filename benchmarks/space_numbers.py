@@ -89,7 +89,7 @@ def cost(runs: int) -> Iterator[str]:
     """Yield the processor time of engagements in space over those in the plane."""
     planar, spatial = (load_scenario(name) for name in ("asteroid-1997", "asteroid-1997-space"))
     for model in Model:
-        for noise in NoiseKind:
+        for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
             pair = [replace(in_model(scenario, model), noise=noise) for scenario in (planar, spatial)]
             times: list[list[float]] = [[], []]
             for _ in range(6):

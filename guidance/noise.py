@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
@@ -16,9 +16,15 @@ from infoset.sensors import Measurements, Sensor
 
 
 class NoiseKind(Enum):
-    """How measurement errors are chosen within their bounds."""
+    """How measurement errors are chosen within their bounds.
+
+    RANDOM errors are uniform and independent, GAUSSIAN ones independent, CORRELATED ones Gaussian and correlated in
+    time; GAME errors are chosen against the guidance.
+    """
 
     RANDOM = "random"
+    GAUSSIAN = "gaussian"
+    CORRELATED = "correlated"
     GAME = "game"
 
 
@@ -45,6 +51,11 @@ class LineOfSight:
         Sensors that measure in this step, by name: "angle", "range", "rate".
     pending : sequence of (float, ndarray)
         Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (C, B).
+    time_s : float
+        Time since the start, s.
+    uniform : mapping of str to ndarray
+        Random numbers of this step by sensor, with the shape of its measurements: independent, uniform in [-1, 1], and
+        the same for a run of a seed in every batch.
     """
 
     step: int
@@ -53,6 +64,8 @@ class LineOfSight:
     range_m: Floats
     sensors: Mapping[str, Sensor]
     pending: Sequence[tuple[float, Floats]] = ()
+    time_s: float = 0.0
+    uniform: Mapping[str, Floats] = field(default_factory=dict)
 
     def shape(self, sensor: Sensor) -> tuple[int, ...]:
         """Return the shape of the measurements of a sensor."""
@@ -60,12 +73,13 @@ class LineOfSight:
 
 
 def checked_measurements(measured: Measurements, sight: LineOfSight, noise: object) -> dict[str, Floats]:
-    """Return the measurements of a noise as arrays; `real_array` describes the errors in numbers and shapes.
+    """Return the measurements of a noise as arrays; `real_array` describes the errors in numbers.
 
     Raises
     ------
     TypeError, ValueError
-        If the noise returned no mapping, or measured with a sensor that does not measure in this step.
+        If the noise returned no mapping, measured with a sensor that does not measure in this step, or returned an
+        array of another shape than that of the measurements.
     """
     where = f"noise {type(noise).__name__} at step {sight.step}"
     if not isinstance(measured, Mapping):
@@ -73,16 +87,18 @@ def checked_measurements(measured: Measurements, sight: LineOfSight, noise: obje
             f"{where} must return a mapping from sensor names to measured values, for example "
             f'{{"angle": sight.alpha_rad}}: got {type(measured).__name__}'
         )
+    checked = {}
     for name, values in measured.items():
         if name not in sight.sensors:
             raise ValueError(
                 f"{where}: sensor {name!r} does not measure at this step, only {sorted(sight.sensors)}; leave it out: "
                 f"got {shown(values)}"
             )
-    return {
-        name: real_array(f"{where}: {name}", values, sight.shape(sight.sensors[name]))
-        for name, values in measured.items()
-    }
+        shape = sight.shape(sight.sensors[name])
+        if np.ndim(values) == 0:
+            raise ValueError(f"{where}: {name} must be an array of the shape {shape}: got {shown(values)}")
+        checked[name] = real_array(f"{where}: {name}", values, shape)
+    return checked
 
 
 def need_draws(name: str, draws: Floats) -> None:
@@ -120,3 +136,7 @@ class MeasurementNoise(Protocol):
             Measured values by sensor: angles (rad) and rates (rad/s), shape (C, B), ranges (m), shape (B,). A sensor
             that is left out gives no measurement in this step.
         """
+
+
+NoiseSource = MeasurementNoise | Callable[[], MeasurementNoise]
+"""A noise of all batches of runs, or a class or function that is called for the noise of each batch."""

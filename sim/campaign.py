@@ -10,11 +10,11 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
-from guidance import Strategy
+from guidance import NoiseSource, Strategy
 from infoset.limits import COUNT, WHOLE, Limits
 from sim.parallel import CampaignNoise, Task, simulate_tasks
 from sim.requirement import AnyRequirement
-from sim.scenario import Scenario, strategy_name
+from sim.scenario import Scenario, noise_name, strategy_name
 from sim.simulate import ENGAGEMENTS_AT_ONCE
 from sim.stopping_rule import StoppingRule
 from sim.storage import MANIFEST, Axis, CampaignFolder, Manifest, fingerprint, read_manifest
@@ -39,8 +39,9 @@ class Campaign:
         Number of runs, from run 0; with `until` the maximum number.
     seed : int
         Run K is the same engagement in every campaign and experiment with this seed.
-    noise : CampaignNoise or None
-        Measurement noise; None is the scenario's.
+    noise : CampaignNoise, NoiseSource or None
+        Measurement noise, or one of your own, whose attribute `version` is in the manifest like that of a strategy;
+        None is the scenario's.
     strategy : Strategy or None
         A strategy of your own; None is the scenario's. The manifest contains its attribute `version`, or its name
         without this attribute; a campaign cannot be resumed with another strategy.
@@ -71,7 +72,7 @@ class Campaign:
     runs: int
     folder: str | Path
     seed: int = 0
-    noise: CampaignNoise | None = None
+    noise: CampaignNoise | NoiseSource | None = None
     strategy: Strategy | None = None
     guarantee: bool = True
     chunk: int | None = None
@@ -85,9 +86,9 @@ class Campaign:
         for name, limits in (("runs", COUNT), ("seed", WHOLE), ("chunk", COUNT)):
             if name != "chunk" or self.chunk is not None:
                 limits.need(name, getattr(self, name))
-        if self.noise is not None and not isinstance(self.noise, CampaignNoise):
+        if self._own_noise is not None and not (hasattr(self.noise, "measure") or callable(self.noise)):
             choices = ", ".join(map(str, CampaignNoise))
-            raise TypeError(f"noise must be None or one of {choices}: got {self.noise!r}")
+            raise TypeError(f"noise must be None, one of {choices}, or have the method measure: got {self.noise!r}")
         if len(self.cells) != (math.prod(len(axis.values) for axis in self.axes) if self.axes else 0):
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
         if self.max_runs is not None:
@@ -137,7 +138,7 @@ class Campaign:
 
     def manifest(self) -> Manifest:
         """Return the manifest of the campaign; a resumed campaign keeps the size of its chunks."""
-        noise, chunk = self._noise, self.chunk
+        noise, own, chunk = self._noise, self._own_noise, self.chunk
         if chunk is None:
             folder = Path(self.folder)
             chunk = read_manifest(folder).chunk if (folder / MANIFEST).is_file() else self._default_chunk()
@@ -149,6 +150,7 @@ class Campaign:
             chunk=chunk,
             seed=self.seed,
             noise=noise,
+            own_noise=None if own is None else getattr(own, "version", None) or noise_name(own),
             strategy=getattr(self.strategy, "version", None) or strategy_name(self.scenario, self.strategy),
             guarantee=self.guarantee,
             versions=versions(),
@@ -170,7 +172,13 @@ class Campaign:
 
     @property
     def _noise(self) -> CampaignNoise:
-        return CampaignNoise(self.scenario.noise.value) if self.noise is None else self.noise
+        if self.noise is None:
+            return CampaignNoise(self.scenario.noise.value)
+        return self.noise if isinstance(self.noise, CampaignNoise) else CampaignNoise.OWN
+
+    @property
+    def _own_noise(self) -> NoiseSource | None:
+        return None if isinstance(self.noise, CampaignNoise) else self.noise
 
     def _default_chunk(self) -> int:
         """Return the engagements per file: one or more batches of the engine.
@@ -205,4 +213,4 @@ class Campaign:
 
     def _task(self, cell: int, runs: range) -> Task:
         scenario = (self.cells or (self.scenario,))[cell]
-        return Task(scenario, runs, self.seed, self._noise, self.guarantee, self.strategy, cell)
+        return Task(scenario, runs, self.seed, self._own_noise or self._noise, self.guarantee, self.strategy, cell)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,11 +14,13 @@ from guidance import (
     LineOfSight,
     MeasurementNoise,
     NoiseKind,
+    NoiseSource,
     RandomNoise,
     Situation,
     Strategy,
     make_strategy,
 )
+from guidance.gaussian_noise import gaussian_noise
 from guidance.noise import checked_measurements
 from guidance.strategy import checked_impulses
 from guidance.thruster import MIN_FLOAT, modulus
@@ -88,7 +91,7 @@ class Engagements:
         draws: Draws,
         strategy: Strategy | None = None,
         truth: KeplerMotion | None = None,
-        noise: MeasurementNoise | None = None,
+        noise: NoiseSource | None = None,
         *,
         target: TargetMotion | None = None,
         guarantee: bool = True,
@@ -97,7 +100,7 @@ class Engagements:
         self.step = 0
         self._draws = draws
         self._batch = batch = len(draws.position_m)
-        self._noise = noise or _make_noise(scenario, draws)
+        self._noise = _make_noise(scenario, draws) if noise is None else _noise_of_batch(noise)
         self._target = target
         self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
         self._strategy = strategy or make_strategy(scenario.strategy)
@@ -226,7 +229,9 @@ class Engagements:
         self._seen = {}
         if not due or not self._tracking.any():
             return {}
-        asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, pending)
+        uniform = {name: self._draws.errors[name][..., self.step] for name in due if name in self._draws.errors}
+        time_s = self.step * self.scenario.set_model.step_s
+        asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, pending, time_s, uniform)
         measured = kept = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
         cuts = [(measured, self._tracking)]
         camera, images = BearingSensor.name, self._draws.images
@@ -385,4 +390,15 @@ def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
     if scenario.noise is NoiseKind.GAME:
         side = constant_side(scenario.target, draws.target)
         return GameNoise(scenario.tie, draws.tie, worst_shift_m(scenario), side)
-    return RandomNoise(draws.errors, draws.bias)
+    if scenario.noise is NoiseKind.RANDOM:
+        return RandomNoise(draws.errors, draws.bias)
+    is_correlated = scenario.noise is NoiseKind.CORRELATED
+    correlation = math.exp(-scenario.step_s / scenario.correlation_time_s) if is_correlated else 0.0
+    return gaussian_noise(draws.errors, draws.bias, scenario.noise_sigma, correlation)
+
+
+def _noise_of_batch(source: NoiseSource) -> MeasurementNoise:
+    noise = source() if callable(source) else source
+    if not hasattr(noise, "measure"):
+        raise TypeError(f"a noise must have the method measure(sight, predicted): got {noise!r}")
+    return noise

@@ -16,7 +16,7 @@ from enum import Enum
 
 import numpy as np
 
-from guidance import NoiseKind, Strategy
+from guidance import NoiseKind, NoiseSource, Strategy
 from sim.engagement import Step
 from sim.results import Results, join
 from sim.scenario import Scenario
@@ -27,24 +27,28 @@ _PARENT_CHECK_S = 0.5
 
 
 class CampaignNoise(Enum):
-    """Measurement noise of a campaign; MIXED is random in even runs and game in odd ones."""
+    """Measurement noise of a campaign: a `NoiseKind`, MIXED (random in even runs, game in odd ones), or OWN."""
 
     RANDOM = "random"
+    GAUSSIAN = "gaussian"
+    CORRELATED = "correlated"
     GAME = "game"
     MIXED = "mixed"
+    OWN = "own"
 
     @property
-    def kinds(self) -> tuple[NoiseKind, ...]:
+    def kinds(self) -> tuple[CampaignNoise, ...]:
         """Noises of run 0, 1, 2, ..., repeated."""
-        return (NoiseKind.RANDOM, NoiseKind.GAME) if self is CampaignNoise.MIXED else (NoiseKind(self.value),)
+        return (CampaignNoise.RANDOM, CampaignNoise.GAME) if self is CampaignNoise.MIXED else (self,)
 
-    def of_run(self, run: int) -> NoiseKind:
+    def of_run(self, run: int) -> CampaignNoise:
         """Return the noise of a run."""
         return self.kinds[run % len(self.kinds)]
 
     def applied_to(self, scenario: Scenario) -> Scenario:
-        """Return a scenario with this noise; MIXED leaves it unchanged."""
-        return scenario if self is CampaignNoise.MIXED else replace(scenario, noise=NoiseKind(self.value))
+        """Return a scenario with this noise; MIXED and OWN leave it unchanged."""
+        is_other = self in (CampaignNoise.MIXED, CampaignNoise.OWN)
+        return scenario if is_other else replace(scenario, noise=NoiseKind(self.value))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +59,8 @@ class Task:
     ----------
     runs : sequence of int
         Run numbers in increasing order.
-    noise : CampaignNoise or None
-        Noise of the runs; None is the scenario's.
+    noise : CampaignNoise, NoiseSource or None
+        Noise of the runs, or one of the user's own; None is the scenario's.
     cell : int
         Number of the scenario in a sweep.
     progress, observe : callable or None
@@ -68,7 +72,7 @@ class Task:
     scenario: Scenario
     runs: Sequence[int]
     seed: int
-    noise: CampaignNoise | None = None
+    noise: CampaignNoise | NoiseSource | None = None
     guarantee: bool = True
     strategy: Strategy | None = None
     cell: int = 0
@@ -147,19 +151,21 @@ def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Resu
             task.progress(share)
 
     noise = task.noise or CampaignNoise(task.scenario.noise.value)
-    runs_by_noise = {kind: [run for run in task.runs if noise.of_run(run) is kind] for kind in noise.kinds}
+    kind = noise if isinstance(noise, CampaignNoise) else CampaignNoise.OWN
+    runs_by_noise = {each: [run for run in task.runs if kind.of_run(run) is each] for each in kind.kinds}
     results = join(
         [
             simulate(
-                replace(task.scenario, noise=kind),
+                each.applied_to(task.scenario),
                 runs,
                 seed=task.seed,
                 strategy=task.strategy,
+                noise=None if isinstance(noise, CampaignNoise) else noise,
                 guarantee=task.guarantee,
                 progress=progress,
                 observe=task.observe,
             )
-            for kind, runs in runs_by_noise.items()
+            for each, runs in runs_by_noise.items()
             if runs
         ]
     )

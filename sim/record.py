@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from guidance import MeasurementNoise, Strategy
+from guidance import NoiseSource, Strategy
 from infoset import Section
 from infoset.arrays import Flags, Floats
 from infoset.limits import WHOLE
@@ -16,7 +16,7 @@ from infoset.sensors import Measurements
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.results import Results, ending
-from sim.scenario import Scenario, strategy_name, with_strategy
+from sim.scenario import Scenario, noise_name, strategy_name, with_noise, with_strategy
 from sim.target import TargetMotion
 from sim.versions import versions
 
@@ -125,7 +125,7 @@ def fly_one(
     *,
     seed: int = 0,
     strategy: Strategy | str | None = None,
-    noise: MeasurementNoise | None = None,
+    noise: NoiseSource | str | None = None,
     target: TargetMotion | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Record:
@@ -139,8 +139,8 @@ def fly_one(
         Run `run` of `simulate(..., seed=seed)` is the same engagement, number for number.
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
-    noise : MeasurementNoise or None
-        A noise of your own, for a batch of one; None is the scenario's.
+    noise : MeasurementNoise, callable, str or None
+        A noise of your own or the name of a kind, as for `simulate`; None is the scenario's.
     target : TargetMotion or None
         Accelerations of the target, for a batch of one; None is the scenario's target.
     progress : callable or None
@@ -155,8 +155,9 @@ def fly_one(
     WHOLE.need("run", run)
     WHOLE.need("seed", seed)
     scenario, own_strategy = with_strategy(scenario, strategy)
+    scenario, own_noise = with_noise(scenario, noise)
     draws = draw(scenario, [run], seed)
-    flight = Engagements(scenario, draws, own_strategy, noise=noise, target=target)
+    flight = Engagements(scenario, draws, own_strategy, noise=own_noise, target=target)
     sensors = scenario.sensors
     rows: list[dict[str, Any]] = []
     measured: dict[str, list[Floats]] = {name: [] for name in sensors}
@@ -186,7 +187,7 @@ def fly_one(
         if progress is not None:
             progress(min(1.0, flight.step / draws.steps))
     name = strategy_name(scenario, own_strategy)
-    own = None if noise is None else getattr(noise, "name", type(noise).__name__)
+    own = None if own_noise is None else noise_name(own_noise)
     at_step, label = flight.inconsistency
     inconsistency = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None
     columns: dict[str, Any] = {field: np.array([row[field] for row in rows]) for field in rows[0]}

@@ -9,7 +9,7 @@ from enum import Enum
 from functools import cached_property
 from typing import Annotated, Any
 
-from guidance.noise import NoiseKind, TieRule
+from guidance.noise import NoiseKind, NoiseSource, TieRule
 from guidance.strategy import Strategy
 from guidance.thruster import Thruster
 from infoset.limits import Checked, Description, Limits, Name, NotNegative, Positive, check_fields
@@ -18,6 +18,7 @@ from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, Rat
 
 _DIRECTION = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
 _ELEVATION = Limits(minimum=-0.5 * math.pi, maximum=0.5 * math.pi)
+_SIGMA = Limits(minimum=0.01, maximum=10.0)
 MAX_STEPS = 100_000
 """Maximum number of steps of a flight; all random numbers are drawn before it starts."""
 
@@ -107,6 +108,10 @@ class Scenario:
         Name of the guidance strategy.
     noise, tie : NoiseKind, TieRule
         How errors of measurements are chosen, and what game noise keeps of two equally bad extremes.
+    noise_sigma : float
+        Standard deviation of Gaussian and correlated errors as a share of the bound, at which they are truncated.
+    noise_correlation_s : float or None
+        Time constant of correlated errors, s; None is a tenth of the time to the nominal arrival.
     uncertainty : StateBox
         Starts that are possible on board (B x D).
     dispersion : StateBox
@@ -138,6 +143,8 @@ class Scenario:
     strategy: str = "symmetric-miss"
     noise: NoiseKind = NoiseKind.RANDOM
     tie: TieRule = TieRule.UPPER
+    noise_sigma: Annotated[float, _SIGMA] = 1.0 / 3.0
+    noise_correlation_s: Positive | None = None
     sun: Sun | None = None
     uncertainty: StateBox
     dispersion: StateBox
@@ -231,6 +238,11 @@ class Scenario:
         return self.nominal_range_m / self.closing_speed_m_s
 
     @property
+    def correlation_time_s(self) -> float:
+        """Time constant of correlated errors, s."""
+        return 0.1 * self.nominal_arrival_s if self.noise_correlation_s is None else self.noise_correlation_s
+
+    @property
     def impulse_steps(self) -> Sequence[int] | None:
         """Steps in which impulses can be given (`Thruster.impulse_steps`); None is every step from the delay on."""
         return self.thruster.impulse_steps(self.nominal_arrival_s, self.step_s)
@@ -280,3 +292,21 @@ def with_strategy(scenario: Scenario, strategy: Strategy | str | None) -> tuple[
     if isinstance(strategy, str):
         return replace(scenario, strategy=strategy), None
     return scenario, strategy
+
+
+def noise_name(own: NoiseSource) -> str:
+    """Return the name of a noise of the user's own in records: its attribute `name`, or that of its class."""
+    kind = own if isinstance(own, type) else type(own)
+    return str(getattr(own, "name", kind.__name__))
+
+
+def with_noise(scenario: Scenario, noise: NoiseSource | str | None) -> tuple[Scenario, NoiseSource | None]:
+    """Return the scenario with a noise if it is the name of a kind, and the noise if it is a class or an object.
+
+    A ValueError is raised if no kind has this name.
+    """
+    if not isinstance(noise, str):
+        return scenario, noise
+    if noise not in [kind.value for kind in NoiseKind]:
+        raise ValueError(f"no noise is called '{noise}'; there are: {', '.join(kind.value for kind in NoiseKind)}")
+    return replace(scenario, noise=NoiseKind(noise)), None

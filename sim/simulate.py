@@ -7,12 +7,12 @@ from functools import partial
 
 import numpy as np
 
-from guidance import Strategy
+from guidance import NoiseSource, Strategy
 from infoset.limits import WHOLE, shown
 from sim.draws import draw, max_number_of_steps
 from sim.engagement import Engagements, Step
 from sim.results import Results, join
-from sim.scenario import Scenario, with_strategy
+from sim.scenario import Scenario, with_noise, with_strategy
 
 ENGAGEMENTS_AT_ONCE = 200
 SECTIONS_AT_ONCE = 6000
@@ -26,6 +26,7 @@ def simulate(
     *,
     seed: int = 0,
     strategy: Strategy | str | None = None,
+    noise: NoiseSource | str | None = None,
     guarantee: bool = True,
     progress: Callable[[float], None] | None = None,
     observe: Callable[[int, Step], None] | None = None,
@@ -40,6 +41,9 @@ def simulate(
         Number of runs, or the run numbers. Run k of a seed is the same engagement in every call.
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
+    noise : MeasurementNoise, callable, str or None
+        A noise of your own, the name of a kind, or None for the scenario's. A class, or a function without arguments,
+        is called for the noise of each batch; an object is that of all batches, at the same time if there are threads.
     guarantee : bool
         Compute the bound Phi in the guaranteed model; it takes 2 to 3.5 times as long.
     progress : callable or None
@@ -56,11 +60,12 @@ def simulate(
     Raises
     ------
     TypeError, ValueError
-        If there are no runs, a run number or the seed is not a whole number, the strategy is not registered, or it
-        returns impulses that are not finite.
+        If there are no runs, a run number or the seed is not a whole number, the strategy or the noise is not
+        registered, or one of your own returns values that are not allowed.
     """
     WHOLE.need("seed", seed)
     scenario, own = with_strategy(scenario, strategy)
+    scenario, own_noise = with_noise(scenario, noise)
     numbers = np.asarray(runs)
     if isinstance(runs, bool) or numbers.ndim > 1 or (numbers.dtype.kind not in "iu" and numbers.size):
         raise TypeError(
@@ -77,7 +82,7 @@ def simulate(
     for first in range(0, numbers.size, at_once):
         chunk = numbers[first : first + at_once]
         draws = draw(scenario, chunk.tolist(), seed)
-        flight = Engagements(scenario, draws, own, guarantee=guarantee)
+        flight = Engagements(scenario, draws, own, noise=own_noise, guarantee=guarantee)
         steps, observe_batch = draws.steps, None if observe is None else partial(observe, first)
         while flight.flying:
             flight.advance(observe_batch)

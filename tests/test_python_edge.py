@@ -331,6 +331,7 @@ def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
         (None, "must return a mapping"),
         (0.001, "must return a mapping"),
         ({"angle": None}, "angle"),
+        ({"angle": 0.0}, "angle must be an array of the shape (1, 1): got 0.0"),
         ({"angle": np.array([[math.nan]])}, "angle"),
         ({"angle": np.array([[0.0, 0.0]])}, "angle"),
         ({"angle": np.array([[1j]])}, "angle"),

@@ -16,7 +16,7 @@ from experiments.interception.study import Curve, curve_scenarios
 from sim import simulate
 
 curves = [
-    Curve(number, scenario.noise, scenario.range_sensor is not None, simulate(scenario, runs=50))
+    Curve(number, scenario.noise.value, scenario.range_sensor is not None, simulate(scenario, runs=50))
     for number, scenario in curve_scenarios(load_scenario("asteroid-1997"))
 ]
 library_figure = draw_distributions(curves)

@@ -142,4 +142,4 @@ def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
 
 def _look(noise: str) -> dict[str, Any]:
     """Return the line style: dark and solid, or light and dashed, which differ also without colours."""
-    return CURVE_LOOKS[1 if noise == "random" else 4]
+    return CURVE_LOOKS[4 if noise == "game" else 1]

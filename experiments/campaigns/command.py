@@ -44,9 +44,11 @@ class Flight:
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs.")]
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")]
     noise: Annotated[
-        Literal["random", "game", "mixed"] | None,
+        str | None,
         typer.Option(
-            help="Measurement noise; mixed: random in even runs, game in odd runs. Default: that of the scenario."
+            metavar="NOISE",
+            help="Measurement noise: random, gaussian, correlated, game, mixed (random in even runs, game in odd "
+            "runs), or FILE.py:CLASS for a class in a Python file. Default: that of the scenario.",
         ),
     ] = None
     seed: Seed = 0

@@ -14,6 +14,7 @@ from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
 from experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
 from experiments.interception.scenario_file import scenario_warnings, study_scenario
+from experiments.interception.strategies import OwnNoise, chosen_noise
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import MANIFEST, CampaignFolder, StorageError, need_free, read_manifest
 from sim.versions import VersionError
@@ -31,7 +32,17 @@ def scenario_of(options: Flight) -> tuple[Scenario, list[str]]:
     if options.resume and (options.out / MANIFEST).is_file():
         resumed = read_manifest(options.out).scenario.information_set.model
     scenario, notes = study_scenario(options, resumed)
-    return (scenario if options.noise is None else CampaignNoise(options.noise).applied_to(scenario)), notes
+    noise = noise_of(options)
+    return (noise.applied_to(scenario) if isinstance(noise, CampaignNoise) else scenario), notes
+
+
+def noise_of(options: Flight) -> CampaignNoise | OwnNoise | None:
+    """Return the noise of the options; None is that of the scenario."""
+    if options.noise is None:
+        return None
+    names = [noise.value for noise in CampaignNoise if noise is not CampaignNoise.OWN]
+    chosen = chosen_noise(options.noise, names)
+    return CampaignNoise(chosen) if isinstance(chosen, str) else chosen
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.campaigns.command import Campaign as Options
-from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, scenario_of
+from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
 from experiments.campaigns.run_tables import COLUMNS, heading, records, summary, summary_parts
 from experiments.common.errors import input_errors
 from experiments.common.input_file import to_toml
@@ -12,7 +12,7 @@ from experiments.common.screen import show, some_runs
 from experiments.interception.course import duration_text
 from experiments.interception.strategies import own_strategy
 from experiments.interception.study import study_title
-from sim import Campaign, CampaignNoise, StoppingRule
+from sim import Campaign, StoppingRule
 
 SUMMARY = "summary.json"
 
@@ -28,7 +28,7 @@ def run(options: Options) -> None:
             options.runs,
             options.out,
             seed=options.seed,
-            noise=None if options.noise is None else CampaignNoise(options.noise),
+            noise=noise_of(options),
             strategy=own_strategy(options.strategy),
             guarantee=options.guarantee,
             chunk=options.chunk,

@@ -7,7 +7,7 @@ import sys
 import typer
 
 from experiments.campaigns.command import Sweep as Options
-from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, scenario_of
+from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_report import SweepReport, default_requirement, quantile_options
 from experiments.campaigns.sweep_table import sweep_table
@@ -16,7 +16,7 @@ from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import say, show
 from experiments.interception.strategies import own_strategy
-from sim import Campaign, CampaignNoise
+from sim import Campaign
 from sim.storage import need_free
 
 ASK_FROM = 1_000_000
@@ -46,7 +46,7 @@ def run(options: Options) -> None:
             axes=axes,
             cells=cells,
             seed=options.seed,
-            noise=None if options.noise is None else CampaignNoise(options.noise),
+            noise=noise_of(options),
             strategy=own_strategy(options.strategy),
             guarantee=guarantee,
             chunk=options.chunk,

@@ -15,9 +15,8 @@ from rich.table import Table
 from experiments.campaigns.sweep_axes import tied_keys
 from experiments.common.screen import Part, number, number_table, quantile_notes, some_runs
 from experiments.interception.runs.shared import bound_name
-from experiments.interception.study import SetCounts, game_note, hit_text, set_warnings
-from guidance import NoiseKind
-from sim import HitEstimate, Outcome, estimate_hits, estimate_quantiles
+from experiments.interception.study import SetCounts, hit_text, noise_notes, set_warnings
+from sim import CampaignNoise, HitEstimate, Outcome, estimate_hits, estimate_quantiles
 from sim.statistics import correlation_interval, level_name, shows
 from sim.stopping_rule import QUANTITIES
 from sim.storage import CampaignFolder, fingerprint
@@ -121,12 +120,14 @@ def correlations(folder: CampaignFolder, runs: pd.DataFrame) -> pd.DataFrame:
 
 def worst_runs(folder: CampaignFolder, runs: pd.DataFrame, scenario_file: Path) -> pd.DataFrame:
     """Return the runs with the largest miss, the worst first; `replay` is the command that simulates a run again."""
-    # The manifest's name of a strategy in a file: mine.py:Mine sha256:...
+    # The manifest's name of a strategy or a noise in a file: mine.py:Mine sha256:...
     file, _, version = folder.manifest.strategy.rpartition(" sha256:")
     own = f" --strategy {shlex.quote(file)}" if version and file else ""
+    own_noise = shlex.quote((folder.manifest.own_noise or "").partition(" sha256:")[0])
     worst = runs.nlargest(WORST, "miss_m")[["run", "noise", "outcome", "hit", "miss_m", "impulse_m_s"]]
     command = f"infoset engage {shlex.quote(str(scenario_file))} --noise {{}} --seed {folder.manifest.seed} --run {{}}"
-    replay = [command.format(noise, run) + own for noise, run in zip(worst["noise"], worst["run"], strict=True)]
+    noises = worst["noise"].astype(str).replace(CampaignNoise.OWN.value, own_noise)
+    replay = [command.format(noise, run) + own for noise, run in zip(noises, worst["run"], strict=True)]
     return worst.assign(replay=replay)
 
 
@@ -141,6 +142,7 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
         "model": manifest.scenario.information_set.model.value,
         "strategy": manifest.strategy,
         "noise": manifest.noise.value,
+        **({"own_noise": manifest.own_noise} if manifest.own_noise else {}),
         "range_sensor": manifest.scenario.range_sensor is not None,
         "seed": manifest.seed,
         "runs": folder.finished_runs,
@@ -148,13 +150,13 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
         "complete": folder.complete,
         "until": manifest.until,
         "stopped_after": manifest.stopped_after,
-        **({"notes": notes} if (notes := game_notes(folder)) else {}),
+        **({"notes": notes} if (notes := campaign_notes(folder)) else {}),
     }
 
 
-def game_notes(folder: CampaignFolder) -> list[str]:
-    """Return a line about what results with game noise are; no line without game noise."""
-    return [game_note(folder.manifest.scenario)] if NoiseKind.GAME.value in noises_of(folder) else []
+def campaign_notes(folder: CampaignFolder) -> list[str]:
+    """Return a line for each noise about what its results are; none for random noise."""
+    return noise_notes(folder.manifest.scenario, noises_of(folder))
 
 
 def summary_parts(folder: CampaignFolder, table: pd.DataFrame) -> Iterator[Part]:
@@ -169,7 +171,7 @@ def summary_parts(folder: CampaignFolder, table: pd.DataFrame) -> Iterator[Part]
             yield f"{row['noise']} noise: {text}"
         sets += counts
     yield from set_warnings(manifest.scenario.information_set.model, sets)
-    yield from game_notes(folder)
+    yield from campaign_notes(folder)
     if manifest.stopped_after is not None:
         yield (
             "the intervals are computed with 95 % confidence for a fixed number of runs; the campaign stopped when an "

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pandas as pd
 from rich.table import Table
 
-from experiments.campaigns.run_tables import CI, game_notes, heading, records, screen_table
+from experiments.campaigns.run_tables import CI, campaign_notes, heading, records, screen_table
 from experiments.campaigns.sweep_axes import unit_of
 from experiments.campaigns.sweep_table import SweepTable, limits
 from experiments.common.errors import input_errors
@@ -156,7 +156,7 @@ class SweepReport:
                 lines.append(f"{axis.key} has no effect: cells that differ only in it have the same results")
         if NoiseKind.RANDOM.value in self.table.noises:
             lines.append(random_note(self.folder.manifest.scenario))
-        return lines + game_notes(self.folder)
+        return lines + campaign_notes(self.folder)
 
 
 def quantile_options(

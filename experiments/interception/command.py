@@ -33,6 +33,15 @@ Strategies = Annotated[
         "Default: all built-in strategies.",
     ),
 ]
+NoiseName = Annotated[
+    str | None,
+    typer.Option(
+        "--noise",
+        metavar="NOISE",
+        help="Measurement noise: random, gaussian, correlated, game, or FILE.py:CLASS for a class in a Python file. "
+        "Default: that of the scenario.",
+    ),
+]
 ModelName = Annotated[
     Literal["paper", "guaranteed"] | None,
     typer.Option(
@@ -80,13 +89,21 @@ class Experiment(FileOptions):
     """Simulate many runs with random noise and with game noise.
 
     There are four cases (curves): random or game noise, without or with the range sensor. Game noise is measurement
-    errors chosen against the guidance. Run K starts from the same state in all four cases, and is the same engagement
-    as in: infoset engage --run K. Without --out, --json or --csv no file is written.
+    errors chosen against the guidance; --noise replaces the random noise. Run K starts from the same state in all four
+    cases, and is the same engagement as in: infoset engage --run K. Without --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each case.")] = 50
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NOISE",
+            help="Noise of curves 1 and 2: random, gaussian, correlated, or FILE.py:CLASS for a class in a Python "
+            "file. Default: that of the scenario, random if it is game.",
+        ),
+    ] = None
     seed: Seed = 0
     strategy: StrategyName = None
     model: ModelName = None
@@ -108,7 +125,12 @@ class Engage(FileOptions):
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     noise: Annotated[
-        Literal["random", "game", "both"] | None, typer.Option(help="Measurement noise. Default: that of the scenario.")
+        str | None,
+        typer.Option(
+            metavar="NOISE",
+            help="Measurement noise: random, gaussian, correlated, game, both (random and game), or FILE.py:CLASS for "
+            "a class in a Python file. Default: that of the scenario.",
+        ),
     ] = None
     range_sensor: RangeSensor = None
     strategy: StrategyName = None
@@ -130,14 +152,23 @@ class Engage(FileOptions):
 class Compare(FileOptions):
     """Compare guidance strategies by miss and spent impulse.
 
-    Run K has the same initial state and the same random errors for all strategies. Game noise is simulated with each of
-    its four tie rules, and a run is represented by the worst of the four. Run K is the same engagement as in: infoset
-    engage --model guaranteed --run K. Without --out, --json or --csv no file is written.
+    Run K has the same initial state and the same random numbers for all strategies and noises. Game noise is simulated
+    with each of its four tie rules, and a run is represented by the worst of the four. Run K is the same engagement as
+    in: infoset engage --model guaranteed --run K. Without --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     strategies: Strategies = None
+    noise: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B,C",
+            help="Measurement noises, separated by commas: random, gaussian, correlated, game, FILE.py:CLASS for a "
+            "class in a Python file, or all, which are the first four. Which strategy is best, and how large the "
+            "misses are, may depend on them: a table shows it.",
+        ),
+    ] = "random,game"
     runs: Annotated[
         int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs for each strategy and noise.")
     ] = 50

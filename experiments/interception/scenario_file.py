@@ -10,7 +10,7 @@ from typing import Any
 from experiments.common.errors import InputError, input_errors
 from experiments.common.input_file import read_file
 from experiments.common.options import choice
-from experiments.interception.strategies import is_own_strategy
+from experiments.interception.strategies import is_own
 from guidance import TieRule, strategy_names
 from infoset.model import Model, SetModel
 from sim.gravity import on_board_model
@@ -58,7 +58,7 @@ def scenario_with(options: Any) -> Scenario:
         getattr(options, name, None) for name in ("strategy", "model", "tie", "sections", "range_sensor")
     )
     scenario = load_scenario(options.scenario, options.settings)
-    if strategy is not None and not is_own_strategy(strategy):
+    if strategy is not None and not is_own(strategy):
         scenario = replace(scenario, strategy=choice("--strategy", strategy, strategy_names()))
     if tie is not None:
         scenario = replace(scenario, tie=TieRule(tie))

@@ -1,4 +1,4 @@
-"""Strategies that options name: built-in ones, and classes in Python files of the user (``FILE.py:CLASS``)."""
+"""Strategies and noises that options name: built-in ones, and classes in Python files (``FILE.py:CLASS``)."""
 
 from __future__ import annotations
 
@@ -8,20 +8,26 @@ import importlib
 import os
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
-from guidance import Situation, Strategy, strategy_names
+from guidance import LineOfSight, MeasurementNoise, NoiseKind, NoiseSource, Situation, Strategy, strategy_names
+from guidance.noise import checked_measurements
 from guidance.strategy import checked_impulses
+from infoset import InformationSetView
+from infoset.sensors import Measurements
 from sim import Scenario
 from sim.scenario import strategy_name
 
+NOISES = [kind.value for kind in NoiseKind]
 
-def is_own_strategy(text: str) -> bool:
-    """Whether the value of ``--strategy`` names a Python file, not a built-in strategy."""
+
+def is_own(text: str) -> bool:
+    """Whether the value of an option names a Python file, not a built-in strategy or noise."""
     return ":" in text or text.endswith(".py")
 
 
@@ -30,7 +36,7 @@ def own_strategy(text: str | None, option: str = "--strategy") -> Strategy | Non
 
     `InputError` if the file has no such strategy.
     """
-    return None if text is None or not is_own_strategy(text) else load_strategy(text, option)
+    return None if text is None or not is_own(text) else load_strategy(text, option)
 
 
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
@@ -49,12 +55,66 @@ def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Str
     return chosen
 
 
+def chosen_noise(text: str, names: Sequence[str] = NOISES) -> str | OwnNoise:
+    """Return one of some names, or the noise of a Python file, which the option ``--noise`` names.
+
+    `InputError` if there is no such noise.
+    """
+    return load_noise(text) if is_own(text) else choice("--noise", text, names)
+
+
+def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
+    """Return the noises of a list by name, with the noise of a Python file, None for a built-in one.
+
+    `InputError` if there is no such noise, or one is named twice.
+    """
+    chosen: dict[str, NoiseSource | None] = {}
+    for text in NOISES if names == "all" else [part.strip() for part in names.split(",")]:
+        noise = chosen_noise(text)
+        name, own = (noise, None) if isinstance(noise, str) else (noise.name, noise)
+        if name in chosen:
+            raise InputError(f"--noise: {name} is named twice; name each noise once")
+        chosen[name] = own
+    return chosen
+
+
 def load_strategy(text: str, option: str = "--strategy", version: str | None = None) -> Strategy:
     """Import a file and return a strategy of one of its classes, from a text ``FILE.py:CLASS``.
 
     The folder of the file is searched for the modules that it imports. The errors of its code are `InputError`s. The
     strategy is pickled as this text with its version: another process imports the same file, or refuses it.
     """
+    code = _load(text, option, ("start", "decide"), version)
+    with code.errors():
+        strategy: Strategy = _reporting(code)
+    return strategy
+
+
+def load_noise(text: str, option: str = "--noise", version: str | None = None) -> OwnNoise:
+    """Import a file and return the noise of one of its classes, as `load_strategy` does."""
+    return OwnNoise(_load(text, option, ("measure",), version))
+
+
+@dataclass(frozen=True)
+class _Code:
+    """A class of a Python file, the value of an option, and the version of the file."""
+
+    kind: Any
+    file: Path
+    option: str
+    version: str
+
+    def errors(self) -> contextlib.AbstractContextManager[None]:
+        """Turn an exception of the code in the file into a message with its line."""
+        return _errors_of(self.file, self.option)
+
+    @property
+    def again(self) -> tuple[str, str, str]:
+        """Arguments that load the class in another process."""
+        return f"{self.file}:{self.kind.__name__}", self.option, self.version
+
+
+def _load(text: str, option: str, methods: tuple[str, ...], version: str | None) -> _Code:
     name, _, class_name = text.rpartition(":")
     file = Path(name).resolve()
     if file.suffix != ".py" or not file.is_file():
@@ -69,36 +129,64 @@ def load_strategy(text: str, option: str = "--strategy", version: str | None = N
         # Kept by the module: the file may change after its import.
         digest = vars(module).setdefault("_sha256_at_import", hashlib.sha256(file.read_bytes()).hexdigest())
         kind = vars(module).get(class_name)
-        if not (isinstance(kind, type) and hasattr(kind, "start") and hasattr(kind, "decide")):
-            raise InputError(
-                f"{option}: {name} has no class {shown(class_name)} with the methods start and decide; check the name"
-            )
-        strategy = _reporting(kind, file, option, digest)
-    if version not in (None, strategy.version):
+        if not (isinstance(kind, type) and all(hasattr(kind, method) for method in methods)):
+            needed = f"method{'s' if len(methods) > 1 else ''} {' and '.join(methods)}"
+            raise InputError(f"{option}: {name} has no class {shown(class_name)} with the {needed}; check the name")
+    code = _Code(kind, file, option, f"{file.name}:{kind.__name__} sha256:{digest[:16]}")
+    if version not in (None, code.version):
         raise InputError(f"{option}: {text} has changed since the command started; run it again")
-    return strategy  # type: ignore[no-any-return]
+    return code
 
 
-def _reporting(kind: Any, file: Path, option: str, digest: str) -> Any:
+def _reporting(code: _Code) -> Any:
     """Return an object of a subclass, whose methods raise `InputError` with the line of an error in the file."""
+    kind: Any = code.kind
 
     class Reporting(kind):  # type: ignore[misc]
-        version = f"{file.name}:{kind.__name__} sha256:{digest[:16]}"
+        version = code.version
 
         def __reduce__(self) -> tuple[Any, ...]:
-            return load_strategy, (f"{file}:{kind.__name__}", option, self.version)
+            return load_strategy, code.again
 
         def start(self, shape: tuple[int, int]) -> Any:
-            with _errors_of(file, option):
+            with code.errors():
                 return super().start(shape)
 
         def decide(self, situation: Situation, state: Any) -> Any:
-            with _errors_of(file, option):
+            with code.errors():
                 wanted = super().decide(situation, state)
                 return checked_impulses(wanted, situation, situation.predicted_miss.exists, self)
 
     Reporting.__module__, Reporting.__qualname__, Reporting.__name__ = kind.__module__, kind.__qualname__, kind.__name__
     return Reporting()
+
+
+class OwnNoise:
+    """The noise of a Python file: it makes an object of its class for each batch of runs."""
+
+    def __init__(self, code: _Code) -> None:
+        self._code = code
+        self.version, self.name = code.version, f"{code.kind.__module__}.{code.kind.__qualname__}"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return load_noise, self._code.again
+
+    def __call__(self) -> MeasurementNoise:
+        """Return the noise of a batch."""
+        with self._code.errors():
+            return _ReportingNoise(self._code.kind(), self._code)
+
+
+@dataclass(frozen=True)
+class _ReportingNoise:
+    """A noise of a batch, whose method raises `InputError` with the line of an error in the file."""
+
+    noise: Any
+    code: _Code
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
+        with self.code.errors():
+            return checked_measurements(self.noise.measure(sight, predicted), sight, self.noise)
 
 
 @contextlib.contextmanager

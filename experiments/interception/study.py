@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from experiments.common.screen import some_runs
-from guidance import NoiseKind, Strategy, TieRule
+from guidance import NoiseKind, NoiseSource, Strategy, TieRule
+from guidance.gaussian_noise import share_cut
 from infoset import Model
 from infoset.arrays import Flags, Floats
 from sim import HitEstimate, Results, Scenario, estimate_hits
@@ -26,19 +27,22 @@ def summary(sample: Floats) -> dict[str, float | None]:
 
 @dataclass(frozen=True)
 class Curve:
-    """Curve of the experiment: 1 random noise, 2 random with range sensor, 3 game noise, 4 game with range sensor."""
+    """Curve of the experiment: 1 random noise, 2 random with range sensor, 3 game noise, 4 game with range sensor.
+
+    Curves 1 and 2 may have another noise instead.
+    """
 
     number: int
-    noise: NoiseKind
+    noise: str
     range_sensor: bool
     results: Results
 
 
-def curve_scenarios(scenario: Scenario) -> Sequence[tuple[int, Scenario]]:
+def curve_scenarios(scenario: Scenario, noise: NoiseKind = NoiseKind.RANDOM) -> Sequence[tuple[int, Scenario]]:
     """Return number and scenario of each curve, as in the paper's figure 4; without a range sensor curves 1 and 3."""
     numbered = (
-        (1, replace(scenario, noise=NoiseKind.RANDOM, range_sensor=None)),
-        (2, replace(scenario, noise=NoiseKind.RANDOM)),
+        (1, replace(scenario, noise=noise, range_sensor=None)),
+        (2, replace(scenario, noise=noise)),
         (3, replace(scenario, noise=NoiseKind.GAME, range_sensor=None)),
         (4, replace(scenario, noise=NoiseKind.GAME)),
     )
@@ -47,14 +51,19 @@ def curve_scenarios(scenario: Scenario) -> Sequence[tuple[int, Scenario]]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """One strategy with one kind of noise: results by tie rule of the game noise, or one result with random noise.
+    """One strategy with one noise: results by tie rule of the game noise, or one result with another noise.
 
     All strategies have the same runs. The properties are those of each run, shape (N,), with its worst tie rule.
     """
 
     strategy: str
-    noise: NoiseKind
+    noise: str
     results: Mapping[TieRule | None, Results]
+
+    @property
+    def noise_title(self) -> str:
+        """The noise in figures."""
+        return f"{self.noise} noise{', worst tie rule' if len(self.results) > 1 else ''}"
 
     def _worst(self, column: str, over_ties: Callable[..., Any]) -> Any:
         return over_ties(np.ma.stack([getattr(each, column) for each in self.results.values()]), axis=0)
@@ -91,25 +100,30 @@ class Comparison:
         return estimate_hits(int(hit.sum()), len(hit)) if hit.count() else None
 
 
+Compared = tuple[str, str, TieRule | None]
+"""Strategy, noise and tie rule, None without game noise."""
+
+
 def compared_scenarios(
-    scenario: Scenario, strategies: Mapping[str, Strategy | None]
-) -> dict[tuple[str, TieRule | None], Scenario]:
-    """Return the scenarios of a comparison by strategy and tie rule; None is random noise."""
-    flown: dict[tuple[str, TieRule | None], Scenario] = {}
+    scenario: Scenario, strategies: Mapping[str, Strategy | None], noises: Mapping[str, NoiseSource | None]
+) -> dict[Compared, Scenario]:
+    """Return the scenarios of a comparison; strategies and noises of Python files are not in them."""
+    flown: dict[Compared, Scenario] = {}
     for name, own in strategies.items():
         guided = scenario if own is not None else replace(scenario, strategy=name)
-        flown[name, None] = replace(guided, noise=NoiseKind.RANDOM)
-        flown |= {(name, tie): replace(guided, noise=NoiseKind.GAME, tie=tie) for tie in TieRule}
+        for noise, own_noise in noises.items():
+            noisy = guided if own_noise is not None else replace(guided, noise=NoiseKind(noise))
+            ties = TieRule if noise == NoiseKind.GAME.value else (None,)
+            flown |= {(name, noise, tie): noisy if tie is None else replace(noisy, tie=tie) for tie in ties}
     return flown
 
 
-def comparisons(flown: Mapping[tuple[str, TieRule | None], Results]) -> list[Comparison]:
-    """Return results by strategy and noise, in the order of the strategies, random noise first."""
-    compared = []
-    for name in dict.fromkeys(name for name, _ in flown):
-        compared.append(Comparison(name, NoiseKind.RANDOM, {None: flown[name, None]}))
-        compared.append(Comparison(name, NoiseKind.GAME, {tie: flown[name, tie] for tie in TieRule}))
-    return compared
+def comparisons(flown: Mapping[Compared, Results]) -> list[Comparison]:
+    """Return results by strategy and noise, in the order of the noises."""
+    of_pair: dict[tuple[str, str], dict[TieRule | None, Results]] = {}
+    for (name, noise, tie), results in flown.items():
+        of_pair.setdefault((name, noise), {})[tie] = results
+    return [Comparison(name, noise, results) for (name, noise), results in of_pair.items()]
 
 
 @dataclass(frozen=True)
@@ -185,6 +199,25 @@ def random_note(scenario: Scenario) -> str:
         "random noise (uniform errors within the bounds, independent from one measurement to the next"
         f"{', with a constant centroid error' if constant else ''}) is one model of many: a decision holds for it only"
     )
+
+
+def noise_notes(scenario: Scenario, noises: Iterable[str], rule: str | None = None) -> list[str]:
+    """Return a line for each noise, except random noise and the user's own, about what its results are.
+
+    `rule` is that of `game_note`.
+    """
+    sigma = scenario.noise_sigma
+    gaussian = (
+        f"the standard deviation is {sigma:.3g} of the bound, where the errors are truncated; this cuts "
+        f"{percent(share_cut(sigma))} of a Gaussian"
+    )
+    known = {
+        NoiseKind.GAUSSIAN.value: f"gaussian noise: {gaussian}",
+        NoiseKind.CORRELATED.value: f"correlated noise: {gaussian}; the time constant of the correlation is "
+        f"{scenario.correlation_time_s:.4g} s",
+        NoiseKind.GAME.value: game_note(scenario, rule),
+    }
+    return [known[noise] for noise in noises if noise in known]
 
 
 def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:

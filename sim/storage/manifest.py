@@ -71,6 +71,8 @@ class Manifest:
         Whether runs were ever added to a sweep, by a rule or by a greater number of runs.
     scenario : Scenario
         Scenario; for a sweep the one that is varied.
+    own_noise : str or None
+        Name of the user's own noise, like that of a strategy in a Python file; None is a noise of `CampaignNoise`.
     strategy : str
         Name; for a strategy in a Python file with the hash of the file: `mine.py:Mine sha256:0123456789abcdef`.
     chunk : int
@@ -91,6 +93,7 @@ class Manifest:
     scenario: Scenario
     seed: Annotated[int, WHOLE]
     noise: CampaignNoise
+    own_noise: str | None = None
     strategy: str
     guarantee: bool
     chunk: Annotated[int, COUNT]

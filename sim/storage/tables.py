@@ -12,7 +12,6 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 from pyarrow.fs import LocalFileSystem
 
-from guidance import NoiseKind
 from sim.columns import Column, columns_of, values_of
 from sim.parallel import CampaignNoise
 from sim.results import Results
@@ -22,7 +21,7 @@ _RUN, *_OTHERS = columns_of(Results)
 _COLUMNS = (
     Column("cell", "", "Cell number in the sweep; 0 in a campaign", int),
     _RUN,
-    Column("noise", "", "Measurement noise", NoiseKind),
+    Column("noise", "", "Measurement noise", CampaignNoise),
     *_OTHERS,
 )
 

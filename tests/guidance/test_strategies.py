@@ -232,7 +232,7 @@ def fly(scenario: Scenario, draws: Draws) -> Results:
 
 
 @pytest.mark.parametrize("name", strategy_names())
-@pytest.mark.parametrize("noise", list(NoiseKind))
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
 def test_a_mirrored_engagement_is_mirrored(name: str, noise: NoiseKind) -> None:
     scenario = replace(with_long_steps(load_scenario("asteroid-1997")), strategy=name, noise=noise)
     draws = draw(scenario, range(8), 3)
@@ -250,7 +250,7 @@ def flown(name: str, noise: NoiseKind, meter: bool) -> Results:
 @pytest.mark.parametrize("meter", [True, False])
 def test_patient_spends_little_for_the_same_miss(meter: bool) -> None:
     """Bounds set from an independent implementation: 91 m/s and 1.3 m, 147 m/s and 12.8 m."""
-    random, game = (flown("patient", noise, meter) for noise in NoiseKind)
+    random, game = (flown("patient", noise, meter) for noise in (NoiseKind.RANDOM, NoiseKind.GAME))
     assert np.median(random.impulse_m_s) <= 100.0
     assert np.median(random.miss_m) < 1.5
     assert np.median(game.impulse_m_s) <= 165.0

@@ -50,6 +50,7 @@ def mirror(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
     ("noise", "tie"),
     [
         (NoiseKind.RANDOM, TieRule.UPPER),
+        (NoiseKind.CORRELATED, TieRule.UPPER),
         (NoiseKind.GAME, TieRule.UPPER),
         (NoiseKind.GAME, TieRule.LOWER),
         (NoiseKind.GAME, TieRule.RANDOM),

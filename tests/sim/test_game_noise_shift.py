@@ -37,7 +37,7 @@ def latest_pair(scenario: Scenario) -> TruthPair:
 def test_game_noise_is_worse_than_random_noise_and_near_the_bound(name: str, settings: list[str]) -> None:
     """Errors of one sign gave 12.5 m in place of 38 m for haiv-2013, whose lower bound is 39 m."""
     scenario = load_scenario(name, settings)
-    random, game = (simulate(replace(scenario, noise=noise), runs=RUNS) for noise in NoiseKind)
+    random, game = (simulate(replace(scenario, noise=noise), runs=RUNS) for noise in (NoiseKind.RANDOM, NoiseKind.GAME))
     assert (game.miss_m > random.miss_m).all()
     assert (game.miss_m <= game.guaranteed_miss_m).all()
     assert game.truth_kept.all()

@@ -85,7 +85,7 @@ def test_in_space_the_misses_along_both_axes_are_combined(asteroid: Scenario) ->
     assert fly(scenario, 2, noise=EXACT)[1] == pytest.approx([np.hypot(9e3, 5e3)] * 2, rel=1e-6)
 
 
-@pytest.mark.parametrize("noise", list(NoiseKind))
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
 @pytest.mark.parametrize("name", ["asteroid", "ranging", "comet", "space", "target"])
 def test_the_truth_is_one_of_the_states_and_phi_bounds_them(
     name: str, noise: NoiseKind, request: pytest.FixtureRequest

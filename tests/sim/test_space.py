@@ -145,7 +145,7 @@ def test_an_exchange_of_the_axes_changes_nothing(
 
 @pytest.mark.parametrize("axes", [(True, True), (True, False), (False, True)])
 @pytest.mark.parametrize("model", list(Model))
-@pytest.mark.parametrize("noise", list(NoiseKind))
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
 def test_a_mirrored_engagement_is_mirrored(
     axes: tuple[bool, bool], model: Model, noise: NoiseKind, asteroid: Scenario
 ) -> None:

@@ -19,11 +19,9 @@ from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
 from experiments.interception.published import MANY, SINGLE, printed_single_runs
 from experiments.interception.study import Comparison, Curve
-from guidance import NoiseKind
 from sim import Record, Results, Scenario
 
 DEFAULT_TIMES = (0.5, 4.0, 8.0)
-NOISES = {NoiseKind.RANDOM: "random noise", NoiseKind.GAME: "game noise, worst tie rule"}
 
 
 def draw_experiment(scenario: Scenario, curves: Sequence[Curve], courses: Sequence[Courses]) -> Iterator[Figure]:
@@ -31,11 +29,11 @@ def draw_experiment(scenario: Scenario, curves: Sequence[Curve], courses: Sequen
     printed = printed_single_runs() if scenario.name in (MANY, SINGLE) else None
     yield draw_distributions(curves, scenario.radius_m, printed)
     yield draw_corridor(curves, courses)
-    for noise in NoiseKind if scenario.is_spatial else ():
+    for noise in dict.fromkeys(curve.noise for curve in curves) if scenario.is_spatial else ():
         clouds = [
-            cloud(f"{noise.value} noise,\n{'with' if curve.range_sensor else 'no'} range sensor", [curve.results])
+            cloud(f"{noise} noise,\n{'with' if curve.range_sensor else 'no'} range sensor", [curve.results])
             for curve in curves
-            if curve.noise is noise
+            if curve.noise == noise
         ]
         yield draw_b_plane(clouds, scenario.radius_m)
 
@@ -46,9 +44,9 @@ def draw_compared(scenario: Scenario, compared: Sequence[Comparison]) -> Iterato
     With game noise, the misses are those of the worst tie rule of a run.
     """
     yield draw_comparison(compared, scenario.radius_m)
-    for noise in NoiseKind if scenario.is_spatial else ():
-        chosen = [comparison for comparison in compared if comparison.noise is noise]
-        clouds = [cloud(f"{one.strategy}\n{NOISES[noise]}", [*one.results.values()]) for one in chosen]
+    for noise in dict.fromkeys(one.noise for one in compared) if scenario.is_spatial else ():
+        chosen = [one for one in compared if one.noise == noise]
+        clouds = [cloud(f"{one.strategy}\n{one.noise_title}", [*one.results.values()]) for one in chosen]
         yield draw_b_plane(clouds, scenario.radius_m)
 
 

@@ -1,4 +1,4 @@
-"""Comparison of strategies: distributions of miss and impulse, with random and with game noise."""
+"""Comparison of strategies: distributions of miss and impulse with each noise."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from experiments.common.figure_style import INK, SET, legend_below, letters, pla
 from experiments.common.screen import some_runs
 from experiments.interception.figures.distributions import draw_radius
 from experiments.interception.study import Comparison
-from guidance import NoiseKind
 from infoset.arrays import Floats
 from sim.statistics import shows
 
@@ -25,29 +24,31 @@ _MARK: dict[str, Any] = {"color": INK, "linestyle": "none", "zorder": 4.0}
 
 @style()
 def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = None) -> Figure:
-    """Draw the distributions of (a, b) the miss and (c, d) the impulse spent, one row per strategy.
+    """Draw the distributions of the miss (left) and of the impulse spent, one row per strategy in a panel per noise.
 
-    Random noise is left, game noise right. Misses are on a logarithmic axis, with a line at the radius of the body, m.
+    Misses are on a logarithmic axis, with a line at the radius of the body, m.
     """
     names = list(dict.fromkeys(each.strategy for each in compared))
-    figure, grid = subplots(45.0 + 16.0 * len(names), 2, 2, sharex="row", sharey=True)
+    noises = {each.noise: each.noise_title for each in compared}
+    height = len(noises) * (12.0 + 8.0 * len(names)) + 21.0
+    figure, grid = subplots(height, len(noises), 2, sharex="col", sharey=True)
     misses, impulses = [each.miss_m for each in compared], [each.impulse_m_s for each in compared]
     edges = _logarithmic(misses), np.linspace(0.0, 1.04 * float(np.max(impulses)) or 1.0, _BINS + 1)
-    for row, samples, bins in zip(grid, (misses, impulses), edges, strict=True):
-        for axes, noise in zip(row, NoiseKind, strict=True):
+    for column, samples, bins in zip(grid.T, (misses, impulses), edges, strict=True):
+        for axes, noise in zip(column, noises, strict=True):
             for each, sample in zip(compared, samples, strict=True):
-                if each.noise is noise:
+                if each.noise == noise:
                     _draw_strategy(axes, names.index(each.strategy), sample, bins)
             axes.set_xlim(bins[0], bins[-1])
             axes.grid(visible=False, axis="y")
-    for axes in grid[0]:
-        axes.set(xscale="log", xlabel="miss, m")
+    for axes in grid[:, 0]:
+        axes.set_xscale("log")
         plain_ticks(axes.xaxis)
         draw_radius(axes, radius_m)
-    for axes in grid[1]:
-        axes.set_xlabel("impulse spent, m/s")
+    for axes, label in zip(grid[-1], ("miss, m", "impulse spent, m/s"), strict=True):
+        axes.set_xlabel(label)
     grid[0, 0].set(ylim=(len(names) - 0.62, -0.78), yticks=range(len(names)), yticklabels=names)
-    letters([*grid.flat], ["random noise", "game noise, worst of four tie rules"] * 2)
+    letters([*grid.flat], [title for title in noises.values() for _ in range(2)])
     legend_below(figure, 3)
     return figure
 

@@ -57,7 +57,7 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
         second.set_ylabel("impulse, m/s")
         second.tick_params(labelbottom=True)
         sensor = f", {'' if curve.range_sensor else 'no '}range sensor" if len(curves) > 2 else ""
-        titles.append(f"{curve.noise.value} noise{sensor}, {some_runs(len(course.possible_m))}")
+        titles.append(f"{curve.noise} noise{sensor}, {some_runs(len(course.possible_m))}")
     letters(above, titles)
     for level in (above, below):
         limits = np.array([axes.get_ylim() for axes in level])

@@ -54,11 +54,11 @@ def draw_distributions(
     samples, runs = [], []
     for curve in curves:
         sensor = "with" if curve.range_sensor else "no"
-        name = f"{curve.number}  {curve.noise.value} noise, {sensor} range sensor, {some_runs(len(curve.results))}"
+        name = f"{curve.number}  {curve.noise} noise, {sensor} range sensor, {some_runs(len(curve.results))}"
         samples.append(Sample(name, CURVE_LOOKS[curve.number], curve.results.miss_m, curve.results.impulse_m_s))
-        if printed and not curve.range_sensor:
-            miss_m, impulse_m_s = np.array(printed[curve.noise.value])[:, None]
-            title = f"printed: one run from z = \N{MINUS SIGN}8 km, {curve.noise.value} noise"
+        if printed and curve.noise in printed and not curve.range_sensor:
+            miss_m, impulse_m_s = np.array(printed[curve.noise])[:, None]
+            title = f"printed: one run from z = \N{MINUS SIGN}8 km, {curve.noise} noise"
             runs.append(Sample(title, {"color": CURVE_LOOKS[curve.number]["color"]}, miss_m, impulse_m_s))
     return draw_samples(samples, radius_m, runs)
 

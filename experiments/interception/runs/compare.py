@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+import numpy as np
+from rich.table import Table
 
 from experiments.common.output import Cell, hit_key, to_csv
 from experiments.common.screen import Part, figure_files, number, number_table, quantile_notes, show, some_runs
 from experiments.interception.command import Compare
 from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_all, work_of
 from experiments.interception.scenario_file import study_scenario
-from experiments.interception.strategies import chosen_strategies
+from experiments.interception.strategies import chosen_noises, chosen_strategies
 from experiments.interception.study import (
     QUANTILES,
+    Compared,
     Comparison,
     SetCounts,
     compared_scenarios,
     comparisons,
-    game_note,
+    noise_notes,
     percent,
     scenario_title,
     set_counts,
     set_warnings,
     summary,
 )
-from guidance import NoiseKind, Strategy, TieRule
+from guidance import NoiseKind
 from sim import Scenario
 from sim.parallel import Task
 
@@ -36,17 +40,28 @@ COLUMNS = ("run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied
 def run(options: Compare) -> None:
     """Simulate the strategies, write the files and print the table."""
     scenario, notes = study_scenario(options)
-    strategies = chosen_strategies(scenario, options.strategies)
-    figures = [FIGURE, *b_plane_figures(scenario)]
+    strategies, noises = chosen_strategies(scenario, options.strategies), chosen_noises(options.noise)
+    figures = [FIGURE, *b_plane_figures(scenario, noises)]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)], notes=notes) as work:
         reports = {name: work.begin(name) for name in strategies}
-        compared = _simulate(scenario, strategies, options.runs, options.seed, reports)
+        wanted = compared_scenarios(scenario, strategies, noises)
+        progress_of = _progress(wanted, reports)
+        tasks = [
+            Task(
+                *(flown, range(options.runs), options.seed),
+                noise=noises[flight[1]],
+                strategy=strategies[flight[0]],
+                progress=progress_of(flight),
+            )
+            for flight, flown in wanted.items()
+        ]
+        compared = comparisons(dict(zip(wanted, simulate_all(tasks), strict=True)))
         work.save(
             {
                 "seed": options.seed,
                 "runs": options.runs,
                 "strategies": [_summary(comparison) for comparison in compared],
-                "notes": [game_note(scenario, TIES)],
+                "notes": noise_notes(scenario, noises, TIES),
             }
         )
         work.written.save("results.csv", _csv(compared), "--csv")
@@ -57,25 +72,19 @@ def run(options: Compare) -> None:
     show(_parts(scenario, compared), options.quiet, stdout_taken=work.written.stdout_taken)
 
 
-def _simulate(
-    scenario: Scenario, strategies: Mapping[str, Strategy | None], runs: int, seed: int, reports: Mapping[str, Progress]
-) -> list[Comparison]:
-    wanted = compared_scenarios(scenario, strategies)
-    done = dict.fromkeys(wanted, 0.0)
+def _progress(flights: Iterable[Compared], reports: Mapping[str, Progress]) -> Callable[[Compared], Progress]:
+    """Return the progress of a flight, which is shown for all flights of its strategy together."""
+    done = dict.fromkeys(flights, 0.0)
 
-    def progress_of(flight: tuple[str, TieRule | None]) -> Progress:
+    def progress_of(flight: Compared) -> Progress:
         def progress(share: float) -> None:
             done[flight] = share
-            shares = [each for (name, _), each in done.items() if name == flight[0]]
+            shares = [each for (name, *_), each in done.items() if name == flight[0]]
             reports[flight[0]](sum(shares) / len(shares))
 
         return progress
 
-    tasks = [
-        Task(flown, range(runs), seed, strategy=strategies[flight[0]], progress=progress_of(flight))
-        for flight, flown in wanted.items()
-    ]
-    return comparisons(dict(zip(wanted, simulate_all(tasks), strict=True)))
+    return progress_of
 
 
 def _summary(comparison: Comparison) -> dict[str, object]:
@@ -83,7 +92,7 @@ def _summary(comparison: Comparison) -> dict[str, object]:
     phi_held = comparison.phi_held
     return {
         "name": comparison.strategy,
-        "noise": comparison.noise.value,
+        "noise": comparison.noise,
         "miss_m": summary(comparison.miss_m),
         "impulse_m_s": summary(comparison.impulse_m_s),
         **hit_key(comparison.hits),
@@ -106,7 +115,7 @@ def _csv(compared: Sequence[Comparison]) -> str:
     for comparison in compared:
         for tie, results in comparison.results.items():
             columns = results.to_dict()
-            head = [comparison.strategy, comparison.noise.value, None if tie is None else tie.value]
+            head = [comparison.strategy, comparison.noise, None if tie is None else tie.value]
             rows += [[*head, *values] for values in zip(*(columns[name] for name in names), strict=True)]
     return to_csv(("strategy", "noise", "tie", *names), rows)
 
@@ -118,8 +127,9 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
         titles += [f"hit: miss at\nmost {scenario.body.radius_m:g} m", "95 % CI\nof a hit"]
     sets = number_table("noise", "strategy", *titles, left=2)
     total = SetCounts()
-    for comparison in sorted(compared, key=lambda each: [*NoiseKind].index(each.noise)):
-        head = (comparison.noise.value, comparison.strategy)
+    noises = list(dict.fromkeys(comparison.noise for comparison in compared))
+    for comparison in sorted(compared, key=lambda each: noises.index(each.noise)):
+        head = (comparison.noise, comparison.strategy)
         table.add_row(*head, "miss, m", *map(number, summary(comparison.miss_m).values()))
         table.add_row("", "", "impulse, m/s", *map(number, summary(comparison.impulse_m_s).values()))
         counts, hits = set_counts(comparison.truth_kept, comparison.set_emptied), comparison.hits
@@ -129,9 +139,37 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
             shares += [f"{hits.hits} ({percent(hits.probability)})", f"{percent(hits.lower)} to {percent(hits.upper)}"]
         sets.add_row(*head, *shares)
     runs = len(compared[0].miss_m)
-    yield f"{scenario_title(scenario)}: quantiles of {some_runs(runs)}; game noise: {TIES}"
+    ties = f"; game noise: {TIES}" if NoiseKind.GAME.value in noises else ""
+    yield f"{scenario_title(scenario)}: quantiles of {some_runs(runs)}{ties}"
     yield table
     yield from ("", f"of the {some_runs(runs)}:", sets)
-    yield game_note(scenario, TIES)
+    if len(noises) > 1:
+        yield from ("", "what depends on the noise, 90 % quantile of the miss, m:", _by_noise(compared, noises))
+        yield _best(compared, noises)
+    yield from noise_notes(scenario, noises, TIES)
     yield from quantile_notes(runs, [*QUANTILES.values()])
     yield from set_warnings(scenario.information_set.model, total)
+
+
+def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
+    """Return a table of the 90 % quantile of the miss by strategy and noise, with the ratio of its extremes."""
+    table = number_table("strategy", *noises, "maximum / minimum")
+    for name in dict.fromkeys(comparison.strategy for comparison in compared):
+        values = [summary(each.miss_m)["p90"] for each in compared if each.strategy == name]
+        known = [value for value in values if value is not None]
+        ratio = max(known) / min(known) if known and min(known) > 0.0 else None
+        table.add_row(name, *map(number, (*values, ratio)))
+    return table
+
+
+def _best(compared: Sequence[Comparison], noises: Sequence[str]) -> str:
+    """Return a line with the strategy of the least 90 % quantile of the miss for each noise."""
+    best = {
+        noise: min((each for each in compared if each.noise == noise), key=lambda each: np.quantile(each.miss_m, 0.9))
+        for noise in noises
+    }
+    names = dict.fromkeys(each.strategy for each in best.values())
+    if len(names) == 1:
+        return f"least in these runs with every noise: {best[noises[0]].strategy}"
+    by_name = (f"{name} with {', '.join(noise for noise in noises if best[noise].strategy == name)}" for name in names)
+    return f"least in these runs: {'; '.join(by_name)}: which strategy is best depends on the noise"

@@ -21,8 +21,8 @@ from experiments.interception.runs.engagement_table import (
 )
 from experiments.interception.runs.shared import need_finite, work_of
 from experiments.interception.scenario_file import scenario_with
-from experiments.interception.strategies import own_strategy
-from guidance import NoiseKind
+from experiments.interception.strategies import NOISES, chosen_noise, own_strategy
+from guidance import NoiseKind, NoiseSource
 from guidance.thruster import modulus
 from sim import Record, fly_one
 
@@ -33,29 +33,36 @@ def run(options: Engage) -> None:
     own = own_strategy(options.strategy)
     times_s = read_times(options.times, options.out)
     both = options.noise == "both"
-    noises = [*NoiseKind] if both else [NoiseKind(options.noise or scenario.noise)]
-    if not both:
-        scenario = replace(scenario, noise=noises[0])
+    chosen = chosen_noise(options.noise or scenario.noise.value, [*NOISES, "both"])
+    wanted: dict[str, NoiseSource | str] = (
+        {noise: noise for noise in ("random", "game")}
+        if both
+        else {chosen if isinstance(chosen, str) else chosen.name: chosen}
+    )
+    noises = [*wanted]
+    if isinstance(chosen, str) and not both:
+        scenario = replace(scenario, noise=NoiseKind(chosen))
     record_files = {}
     if options.record is not None:
         file = record_path("--record", options.record)
         record_files = {
-            noise: file.with_name(f"{file.stem}-{noise.value}{file.suffix}") if both else file for noise in noises
+            noise: file.with_name(f"{file.stem}-{noise}{file.suffix}") if both else file for noise in noises
         }
-    folder_records = [f"record-{noise.value}.npz" for noise in noises]
+    folder_records = [f"record-{noise}.npz" for noise in noises]
     names = ["steps.csv", *folder_records, *figure_files(*FIGURES)]
     files = {f"--record ({file.name})": file for file in record_files.values()}
     with work_of(options, scenario, names, files) as work:
         records, summaries = [], {}
         for noise in noises:
             began_s = perf_counter()
-            progress = work.begin(f"{noise.value} noise")
-            flown = replace(scenario, noise=noise)
-            record = fly_one(flown, options.run, seed=options.seed, strategy=own, progress=progress)
+            progress = work.begin(f"{noise} noise")
+            record = fly_one(
+                scenario, options.run, seed=options.seed, strategy=own, noise=wanted[noise], progress=progress
+            )
             need_finite(record.result)
             records.append(record)
-            summaries[noise.value] = _summary(record, perf_counter() - began_s)
-        work.save(summaries if both else summaries[noises[0].value])
+            summaries[noise] = _summary(record, perf_counter() - began_s)
+        work.save(summaries if both else summaries[noises[0]])
         work.written.save("steps.csv", steps_csv(records), "--csv")
         named = dict(zip(folder_records, records, strict=True))
         save_records(named, [record_files.get(noise) for noise in noises], work.written, options.overwrite)
@@ -71,8 +78,8 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
         "run": record.run,
         "runs": 1,
         "elapsed_s": elapsed_s,
-        "published_curve": 1 + (scenario.range_sensor is not None) + 2 * (scenario.noise is NoiseKind.GAME),
-        "noise": scenario.noise.value,
+        "published_curve": 1 + (scenario.range_sensor is not None) + 2 * (record.noise_name == NoiseKind.GAME.value),
+        "noise": record.noise_name,
         "strategy": record.strategy,
         **{name: values[0] for name, values in outcome_columns(record.result).items()},
         "hit": record.result.hit.tolist()[0],

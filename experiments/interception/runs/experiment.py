@@ -21,18 +21,19 @@ from experiments.interception.runs.shared import (
     work_of,
 )
 from experiments.interception.scenario_file import scenario_with
-from experiments.interception.strategies import own_strategy
+from experiments.interception.strategies import NOISES, chosen_noise, own_strategy
 from experiments.interception.study import (
     QUANTILES,
     Curve,
     SetCounts,
     curve_scenarios,
-    game_note,
     hit_text,
+    noise_notes,
     set_counts,
     set_warnings,
     summary,
 )
+from guidance import NoiseKind
 from sim import Results, Scenario
 from sim.parallel import Task
 from sim.scenario import strategy_name
@@ -48,27 +49,34 @@ def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
-    figures = [FIGURE, CORRIDOR, *b_plane_figures(scenario)]
+    of_file = scenario.noise if scenario.noise is not NoiseKind.GAME else NoiseKind.RANDOM
+    noise = chosen_noise(options.noise or of_file.value, [name for name in NOISES if name != NoiseKind.GAME.value])
+    name, own_noise, kind = (
+        (noise, None, NoiseKind(noise)) if isinstance(noise, str) else (noise.name, noise, NoiseKind.RANDOM)
+    )
+    names = {1: name, 2: name, 3: NoiseKind.GAME.value, 4: NoiseKind.GAME.value}
+    figures = [FIGURE, CORRIDOR, *b_plane_figures(scenario, dict.fromkeys(names.values()))]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)]) as work:
         if scenario.range_sensor is None:
             say(f"{scenario.name} has no [range_sensor]: curves 1 and 3 only", options.quiet)
         slowest_first = [
-            (curve, flown, f"curve {curve}: {flown.noise.value}{' + range sensor' if flown.range_sensor else ''}")
-            for curve, flown in reversed(curve_scenarios(scenario))
+            (curve, flown, f"curve {curve}: {names[curve]}{' + range sensor' if flown.range_sensor else ''}")
+            for curve, flown in reversed(curve_scenarios(scenario, kind))
         ]
         courses = [Courses(flown, options.runs) for _, flown, _ in slowest_first]
         tasks = [
             Task(
                 *(flown, range(options.runs), options.seed),
+                noise=own_noise if names[curve] == name else None,
                 strategy=own,
                 progress=work.begin(title),
                 observe=course.observe if options.out is not None else None,
             )
-            for (_, flown, title), course in zip(slowest_first, courses, strict=True)
+            for (curve, flown, title), course in zip(slowest_first, courses, strict=True)
         ]
         results = simulate_all(tasks)
         curves = [
-            Curve(curve, flown.noise, flown.range_sensor is not None, result)
+            Curve(curve, names[curve], flown.range_sensor is not None, result)
             for (curve, flown, _), result in zip(slowest_first, results, strict=True)
         ][::-1]
         work.save(
@@ -85,7 +93,7 @@ def run(options: Experiment) -> None:
                     }
                     for curve in curves
                 ],
-                "notes": [game_note(scenario)],
+                "notes": noise_notes(scenario, dict.fromkeys(names.values())),
             }
         )
         work.written.save("results.csv", _csv(curves), "--csv")
@@ -97,7 +105,7 @@ def run(options: Experiment) -> None:
 
 
 def _key(curve: Curve) -> dict[str, int | str | bool]:
-    return {"published_curve": curve.number, "noise": curve.noise.value, "range_sensor": curve.range_sensor}
+    return {"published_curve": curve.number, "noise": curve.noise, "range_sensor": curve.range_sensor}
 
 
 def _csv(curves: Sequence[Curve]) -> str:
@@ -113,7 +121,7 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> Iterator[Part]:
     table, runs = number_table("curve", "quantity", *QUANTILES, left=2), len(curves[0].results)
     for curve in curves:
         results = curve.results
-        head = f"{curve.number} {curve.noise.value}"
+        head = f"{curve.number} {curve.noise}"
         table.add_row(head, "miss, m", *map(number, summary(results.miss_m).values()))
         ranging = "  + range sensor" if curve.range_sensor else ""
         table.add_row(ranging, "impulse, m/s", *map(number, summary(results.impulse_m_s).values()))
@@ -135,7 +143,8 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> Iterator[Part]:
         lines += [f"{outcome}: {count}" for outcome, count in outcomes.items()]
         yield f"curve {curve.number}: {'; '.join(filter(None, lines))}"
     yield from set_warnings(scenario.information_set.model, counts)
-    yield f"{game_note(scenario)}; infoset compare shows the worst of all tie rules"
+    *others, game = noise_notes(scenario, dict.fromkeys(curve.noise for curve in curves))
+    yield from (*others, f"{game}; infoset compare shows the worst of all tie rules")
     if allowed := allowance(scenario):
         yield allowed
     if scenario.name in (MANY, SINGLE):
@@ -174,7 +183,7 @@ def burn_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
         for burn in burns_key(scenario, curve.results).get("burns", []):
             share = burn["share"]
             table.add_row(
-                f"{curve.number} {curve.noise.value}{' + range sensor' if curve.range_sensor else ''}",
+                f"{curve.number} {curve.noise}{' + range sensor' if curve.range_sensor else ''}",
                 f"{burn['before_arrival_s']:g}",
                 *(number(burn[key]) for key in LEVELS),
                 number(None if share is None else 100.0 * share),

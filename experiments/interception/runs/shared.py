@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -16,7 +16,7 @@ from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import NOT_FINITE, BeginProgress, progress_bar, say_warnings, some_runs
 from experiments.interception.scenario_file import scenario_warnings
 from experiments.interception.study import set_counts
-from guidance import NoiseKind, Strategy
+from guidance import Strategy
 from sim import Results, Scenario
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.gravity import on_board_model
@@ -91,9 +91,9 @@ def work_of(
         yield Work(scenario, warnings, written, begin, perf_counter())
 
 
-def b_plane_figures(scenario: Scenario) -> list[str]:
+def b_plane_figures(scenario: Scenario, noises: Iterable[str]) -> list[str]:
     """Return the names of the figures of misses across the approach, one for each noise; none in a plane."""
-    return [f"figure-b-plane-{noise.value}" for noise in NoiseKind] if scenario.is_spatial else []
+    return [f"figure-b-plane-{noise}" for noise in noises] if scenario.is_spatial else []
 
 
 def bound_name(scenario: Scenario) -> str:

@@ -38,7 +38,7 @@ def records() -> list[Record]:
 @pytest.fixture(scope="module")
 def curves() -> list[Curve]:
     return [
-        Curve(number, flown.noise, flown.range_sensor is not None, simulate(flown, runs=RUNS))
+        Curve(number, flown.noise.value, flown.range_sensor is not None, simulate(flown, runs=RUNS))
         for number, flown in curve_scenarios(load_scenario("asteroid-1997"))
     ]
 
@@ -124,7 +124,7 @@ def test_distributions_draw_the_curves_and_their_bands(curves: list[Curve]) -> N
         bands = [np.asarray(band.get_paths()[0].vertices) for band in axes.collections if band.get_paths()]
         for curve, band in zip(curves, bands, strict=True):
             sample = np.sort(getattr(curve.results, name))
-            label = f"{curve.number}  {curve.noise.value} noise, {'with' if curve.range_sensor else 'no'} range sensor"
+            label = f"{curve.number}  {curve.noise} noise, {'with' if curve.range_sensor else 'no'} range sensor"
             drawn = points(axes, f"{label}, {RUNS} runs")
             np.testing.assert_array_equal(drawn[1:-1], np.column_stack([sample, share]))
             for edge in (np.maximum(share - half, 0.0), np.minimum(share + half, 1.0)):
@@ -134,7 +134,7 @@ def test_distributions_draw_the_curves_and_their_bands(curves: list[Curve]) -> N
 
 def test_the_runs_that_the_paper_prints_are_marks() -> None:
     scenario = load_scenario("asteroid-1997")
-    curve = Curve(1, NoiseKind.RANDOM, False, simulate(scenario, 2))
+    curve = Curve(1, "random", False, simulate(scenario, 2))
     courses = Courses(scenario, 2)
     figure = next(draw_experiment(scenario, [curve], [courses]))
     label = "printed: one run from z = \N{MINUS SIGN}8 km, random noise"
@@ -160,7 +160,7 @@ def test_the_axis_of_the_miss_shows_the_radius_of_the_body(radius_m: float | Non
 def test_a_comparison_draws_only_quantiles_that_the_runs_show(runs: int, marks: list[str]) -> None:
     results = simulate(load_scenario("asteroid-1997-single"), 2).take(np.arange(runs) % 2)
     games: dict[TieRule | None, Results] = dict.fromkeys(TieRule, results)
-    compared = [Comparison("a", NoiseKind.RANDOM, {None: results}), Comparison("a", NoiseKind.GAME, games)]
+    compared = [Comparison("a", "random", {None: results}), Comparison("a", "game", games)]
     figure = draw_comparison(compared)
     assert set(legend(figure)) == {f"histogram of {runs} runs", "median", *marks, "worst run"}
     assert points(figure.axes[0], "median")[0, 0] == np.median(results.miss_m)

@@ -11,7 +11,7 @@ import pytest
 
 from experiments.common.errors import InputError
 from experiments.interception.scenario_file import load_scenario
-from experiments.interception.strategies import chosen_strategies, load_strategy, own_strategy
+from experiments.interception.strategies import chosen_strategies, load_noise, load_strategy, own_strategy
 from guidance import SymmetricMiss
 from sim import Scenario, simulate
 from tests.experiments.command_line import Command
@@ -28,6 +28,17 @@ class Mine:
         return None
     def decide(self, situation, state):
         return self.share * symmetric_impulse(situation.predicted_miss, situation.closing_speed_m_s)
+"""
+
+
+LIKE_RANDOM = """
+class Uniform:
+    def measure(self, sight, predicted):
+        return {name: sensor.measured(sight, sight.uniform[name]) for name, sensor in sight.sensors.items()}
+
+class Half:
+    def measure(self, sight, predicted):
+        return {"angle": 0.0 * sight.range_m[0]}
 """
 
 
@@ -145,3 +156,65 @@ def test_a_scenario_file_cannot_name_python_code(mine: Path, brief_file: Path) -
     with pytest.raises(InputError, match=r"strategy: there is no"):
         load_scenario("hostile.toml")
     assert "mine" not in sys.modules
+
+
+def misses(found: dict[str, Any], noise: str) -> list[Any]:
+    """The misses of a noise in the JSON of a command."""
+    for key, name in (("curves", "noise"), ("strategies", "noise"), ("samples", "noise")):
+        if key in found:
+            return [[each.get("miss_m"), each.get("miss_m_p50")] for each in found[key] if each[name] == noise]
+    return [found["miss_m"], found["noise"] == noise]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        (["engage"], "noisy.Uniform"),
+        (["experiment", "--runs", 3], "noisy.Uniform"),
+        (["compare", "--runs", 3, "--strategies", "patient"], "noisy.Uniform"),
+        (["campaign", "--runs", 8], "own"),
+    ],
+)
+def test_every_command_that_draws_errors_takes_a_noise_of_a_file(
+    arguments: list[Any], name: str, brief_file: Path, infoset: Command
+) -> None:
+    Path("noisy.py").write_text(LIKE_RANDOM)
+    command, *options = arguments
+    found = []
+    for noise in ("noisy.py:Uniform", "random"):
+        folder = ["--out", noise[:5]] if command == "campaign" else []
+        found.append(infoset.json(command, brief_file, "--noise", noise, *options, *folder))
+    assert misses(found[0], name) == misses(found[1], "random")
+    if command == "campaign":
+        assert found[0]["own_noise"].startswith("noisy.py:Uniform sha256:")
+        report = infoset.json("report", "noisy")
+        again = infoset.json(*report["worst"][0]["replay"].split()[1:])
+        assert again["miss_m"] == report["worst"][0]["miss_m"]
+        Path("noisy.py").write_text(LIKE_RANDOM + "# changed")
+        del sys.modules["noisy"]
+        resumed = ("campaign", brief_file, "--noise", "noisy.py:Uniform", "--runs", 8, "--out", "noisy", "--resume")
+        assert "own_noise: " in infoset(*resumed)[2]
+
+
+def test_a_noise_of_a_file_can_be_pickled_and_its_mistakes_are_one_message(
+    brief: Scenario, brief_file: Path, infoset: Command
+) -> None:
+    Path("noisy.py").write_text(LIKE_RANDOM)
+    noise = pickle.loads(pickle.dumps(load_noise("noisy.py:Uniform")))
+    assert (simulate(brief, 2, noise=noise).miss_m == simulate(brief, 2).miss_m).all()
+    code, _, err = infoset("engage", brief_file, "--noise", "noisy.py:Half")
+    assert code == 2
+    assert "noise Half at step 0: angle must be an array of the shape (1, 1): got np.float64(0.0)" in err
+    assert 'no class "Full" with the method measure' in infoset.refused("engage", "--noise", "noisy.py:Full")
+    assert "did you mean gaussian?" in infoset.refused("campaign", "--noise", "gaus", "--runs", 1, "--out", "no")
+    assert "is named twice" in infoset.refused("compare", "--noise", "game,game")
+
+
+def test_compare_shows_what_depends_on_the_noise(brief_file: Path, infoset: Command) -> None:
+    options = ("--strategies", "patient,symmetric-miss", "--runs", 10, "--noise", "all", "--set", "noise_sigma=0.5")
+    code, out, _ = infoset("compare", brief_file, *options)
+    assert code == 0
+    assert "maximum / minimum" in out
+    assert "which strategy is best depends on the noise" in out or "least in these runs with every noise" in out
+    assert "0.5 of the bound, where the errors are truncated; this cuts 4.55 % of a Gaussian" in out
+    assert "the time constant of the correlation is 1.026 s" in out

@@ -1,0 +1,80 @@
+"""Gaussian measurement errors, truncated at their bound: independent, or correlated in time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from guidance.scripted_noise import RandomNoise
+from infoset.arrays import Floats
+
+_SMALLEST = 2.0**-54
+"""Half of the smallest distance of a random number from an end of [0, 1]: the quantile of a Gaussian is finite."""
+
+
+def share_cut(sigma: float) -> float:
+    """Return the share of a Gaussian of standard deviation `sigma`, in units of the bound, that lies outside it."""
+    return float(2.0 * ndtr(-1.0 / sigma))
+
+
+def truncated_gaussian(uniform: Floats, sigma: float) -> Floats:
+    """Return numbers of a Gaussian of standard deviation `sigma`, truncated to [-1, 1].
+
+    They are the quantiles of numbers that are uniform in [-1, 1]. The negative number has the negative quantile.
+    """
+    size = np.abs(uniform)
+    tail = 0.5 * (1.0 - size) + size * ndtr(-1.0 / sigma)  # the probability of a larger error of this sign
+    return np.asarray(np.copysign(np.minimum(-sigma * ndtri(tail), 1.0), uniform))
+
+
+def correlated_uniform(uniform: Floats, correlation: float) -> Floats:
+    """Return numbers that are uniform in [-1, 1] and correlated in time, from independent ones.
+
+    Parameters
+    ----------
+    uniform : ndarray, shape (..., steps)
+        Independent numbers, uniform in [-1, 1].
+    correlation : float
+        Correlation of the underlying process between two steps, exp(-step / time constant).
+
+    Notes
+    -----
+    The underlying process is that of Gauss and Markov: x_0 = w_0 and x_k = c x_(k-1) + sqrt(1 - c^2) w_k for the
+    correlation c and independent standard Gaussian w_k. It is stationary, and its autocorrelation after k steps is c^k.
+    """
+    process = _quantile(uniform)
+    process[..., 1:] *= np.sqrt(1.0 - correlation**2)
+    for step in range(1, process.shape[-1]):
+        process[..., step] += correlation * process[..., step - 1]
+    return np.asarray(np.copysign(1.0 - 2.0 * ndtr(-np.abs(process)), process))
+
+
+def _quantile(uniform: Floats) -> Floats:
+    """Return standard Gaussian numbers, the quantiles of numbers that are uniform in [-1, 1]."""
+    tail = np.maximum(0.5 * (1.0 - np.abs(uniform)), _SMALLEST)
+    return np.asarray(np.copysign(ndtri(tail), uniform))
+
+
+def gaussian_noise(
+    uniform: Mapping[str, Floats], bias: Floats | None, sigma: float, correlation: float = 0.0
+) -> RandomNoise:
+    """Return a noise with truncated Gaussian errors.
+
+    Parameters
+    ----------
+    uniform : mapping of str to ndarray, shape (C, B, steps), for ranges (B, steps)
+        Independent numbers by sensor, uniform in [-1, 1].
+    bias : ndarray, shape (C, B), or None
+        The same for the constant errors of a camera's centroid (`RandomNoise`).
+    sigma : float
+        Standard deviation before the truncation, in units of the bound.
+    correlation : float
+        As in `correlated_uniform`, for errors that are correlated in time; 0 is independent errors.
+    """
+    errors = {
+        name: truncated_gaussian(correlated_uniform(each, correlation) if correlation else each, sigma)
+        for name, each in uniform.items()
+    }
+    return RandomNoise(errors, None if bias is None else truncated_gaussian(bias, sigma))
