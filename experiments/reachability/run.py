@@ -26,10 +26,10 @@ from rendezvous.reachability import (
     Flight,
     NonlinearMotion,
     NoRobustPlanError,
-    Route,
     SetKind,
     feedback_plan,
     min_periods,
+    optimal_controls,
     replan,
     solve,
     tightened,
@@ -115,7 +115,7 @@ def _robustness(rendezvous: Rendezvous, disturbance: Floats) -> Robustness:
     problem = rendezvous.problem
     fixed, conflict, plan, refusal = None, None, None, None
     try:
-        fixed = solve(tightened(problem, disturbance), Route.LIFTED).optimal.miss
+        fixed = optimal_controls(tightened(problem, disturbance)).miss
     except EmptyTubeError as error:
         conflict = str(error)
     try:

@@ -11,7 +11,6 @@ from rendezvous.reachability.problem import MAX_PERIODS, InadmissibleStartError,
 from rendezvous.reachability.robust import FeedbackPlan, NoRobustPlanError, feedback_plan, tightened
 from rendezvous.reachability.selection import (
     Effort,
-    TooManyVerticesError,
     analytic_centre,
     chebyshev_centre,
     effort,
@@ -23,8 +22,8 @@ from rendezvous.reachability.selection import (
     samples,
     vertices,
 )
-from rendezvous.reachability.sets import ReachableSets, SetCounts, SetKind, TooLargeError
-from rendezvous.reachability.solve import OptimalControls, Route, Solution, min_periods, solve
+from rendezvous.reachability.sets import ReachableSets, SetCounts, SetKind, TooManyVerticesError
+from rendezvous.reachability.solve import OptimalControls, Route, Solution, min_periods, optimal_controls, solve
 
 __all__ = [
     "MAX_PERIODS",
@@ -44,7 +43,6 @@ __all__ = [
     "SetKind",
     "Solution",
     "ThrustShape",
-    "TooLargeError",
     "TooManyVerticesError",
     "analytic_centre",
     "between_periods",
@@ -59,6 +57,7 @@ __all__ = [
     "minimum_peak",
     "motion_of",
     "nearest",
+    "optimal_controls",
     "replan",
     "samples",
     "solve",

@@ -6,24 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UncertainHullError
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, min_l1, min_peak, min_sum_of_norms, quadratic
 from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.relative_interior import relative_interior
+from rendezvous.reachability.sets import TooManyVerticesError, combined, optimal_polytope
 from rendezvous.reachability.solve import OptimalControls
 
 MAX_VERTICES = 2000
-_MAX_DIMENSIONS = 8
 _NEWTON_STEPS = 200
 _STILL = 1e-9
 _STEPS_A_DIMENSION = 20
 _INSIDE = 1.0 - 1e-12
 _FLATTEST = 1e-15
-
-
-class TooManyVerticesError(ValueError):
-    """The optimal controls have too many vertices, or none because thrust is in a ball."""
 
 
 @dataclass(frozen=True)
@@ -172,32 +167,11 @@ def vertices(optimal: OptimalControls, most: int = MAX_VERTICES) -> Floats:
     UncertainHullError
         If rounding decides which points are vertices.
     """
-    corners = []
-    for part in optimal.blocks:
-        if part.optimal.ball:
-            raise TooManyVerticesError("with thrust in a ball the optimal controls have no vertices")
-        if part.optimal.size > _MAX_DIMENSIONS:
-            raise TooManyVerticesError(
-                f"the optimal controls of a block span {part.optimal.size} dimensions, more than the limit of "
-                f"{_MAX_DIMENSIONS} for vertices"
-            )
-        if not part.optimal.size:
-            corners.append(np.zeros((1, 0)))
-            continue
-        try:
-            inside = Polytope.from_constraints(part.optimal.rows, part.optimal.limits)
-            corners.append(inside.needed().vertices)
-        except EmptyPolytopeError as error:  # the centre is inside
-            raise UncertainHullError(
-                "the set of optimal controls of a block is too thin: it is empty by rounding"
-            ) from error
+    corners = [optimal_polytope(part).vertices if part.optimal.size else np.zeros((1, 0)) for part in optimal.blocks]
     count = int(np.prod([len(block) for block in corners]))
     if count > most:
         raise TooManyVerticesError(f"the optimal controls have {count} vertices, more than the limit of {most}")
-    points = corners[0]
-    for block in corners[1:]:
-        points = np.hstack([np.repeat(points, len(block), axis=0), np.tile(block, (len(points), 1))])
-    return optimal.at(points)
+    return optimal.at(combined(corners))
 
 
 def samples(optimal: OptimalControls, count: int, generator: np.random.Generator) -> Floats:

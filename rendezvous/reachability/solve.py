@@ -10,25 +10,23 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.geometry.polytope import EmptyPolytopeError, UncertainHullError
+from infoset.geometry.polytope import UncertainHullError
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, joined
 from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 from rendezvous.reachability.sets import (
     BlockSets,
-    ExactSets,
     LiftedSets,
-    Meter,
     ReachableSets,
     SetKind,
-    TooLargeError,
+    TooManyVerticesError,
+    exact_sets,
     optimal_set,
 )
 
-MAX_STATES_BY_CHOICE = 4
-"""Maximum number of states of a block for which the exact route is tried by default."""
-MAX_PERIODS_BY_CHOICE = 16
+MAX_STATES, MAX_EXACT_PERIODS = 4, 16
+"""Maximum number of states of a block, and of periods, for which the exact route is tried."""
 AGREEMENT = 1e-9
 """Maximum difference between the bounds of both routes, relative to the bounds on states."""
 
@@ -131,44 +129,26 @@ def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) ->
     return OptimalControls(problem, tuple(block_optimum(block, relative=relative) for block in problem.blocks))
 
 
-def solve(problem: ReachabilityProblem, route: Route | None = None) -> Solution:
+def solve(problem: ReachabilityProblem) -> Solution:
     """Compute the minimum terminal norm, all controls that attain it, and the forward sets and tube.
 
-    No `route` selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
-    and the expected cost is within limits; otherwise the lifted route.
-
-    Raises
-    ------
-    EmptyTubeError
-        If no control keeps the constraints.
-    TooLargeError, UncertainHullError
-        If `route` is the exact route and it is not possible.
+    The route is exact if blocks and their number of periods are small, thrust is in a box, constraints apply at whole
+    periods only, and rounding does not decide; otherwise it is the lifted one. `EmptyTubeError` is raised if no control
+    keeps the constraints.
     """
     optimal = optimal_controls(problem)
-    lifted: tuple[BlockSets, ...] = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
-    meter = Meter()
-    reason = "as asked" if route is Route.LIFTED else _refusal(problem, asked=route is Route.EXACT)
-    if reason is None:
+    lifted = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
+    reason = _refusal(problem)
+    if not reason:
         try:
-            exact = _exact(optimal.blocks, meter)
+            exact = tuple(exact_sets(optimum) for optimum in optimal.blocks)
             _need_agreement(exact, lifted)
-        except (TooLargeError, UncertainHullError) as error:
-            if route is Route.EXACT:
-                raise
+        except (TooManyVerticesError, UncertainHullError) as error:
             reason = str(error)
         else:
-            why = "as asked" if route else f"blocks of {', '.join(str(block.size) for block in problem.blocks)} states"
+            why = f"blocks of {', '.join(str(block.size) for block in problem.blocks)} states"
             return Solution(problem, optimal, ReachableSets(problem, exact), Route.EXACT, why)
-    elif route is Route.EXACT:
-        raise TooLargeError(reason)
     return Solution(problem, optimal, ReachableSets(problem, lifted), Route.LIFTED, reason)
-
-
-def _exact(optima: tuple[BlockOptimum, ...], meter: Meter) -> tuple[BlockSets, ...]:
-    try:
-        return tuple(ExactSets(optimum, meter) for optimum in optima)
-    except EmptyPolytopeError as error:  # the programs show that it is not empty
-        raise UncertainHullError("a set is too thin: it is empty by rounding") from error
 
 
 def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...]) -> None:
@@ -182,20 +162,18 @@ def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...])
                 )
 
 
-def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
-    """Return the reason why exact sets are not computed; None if there is none."""
+def _refusal(problem: ReachabilityProblem) -> str:
+    """Return the reason why exact sets are not computed; empty if there is none."""
     if problem.thrust is ThrustShape.BALL:
         return "for thrust in a ball the sets are not polytopes"
     if problem.between is not None:
         return "constraints within periods couple states and controls"
-    if asked:
-        return None
     largest = max(block.size for block in problem.blocks)
-    if largest > MAX_STATES_BY_CHOICE:
-        return f"the constraints couple {largest} states: in so many dimensions rounding errors lose facets of hulls"
-    if problem.periods > MAX_PERIODS_BY_CHOICE:
-        return f"rounding errors lose facets of hulls after more than {MAX_PERIODS_BY_CHOICE} periods"
-    return None
+    if largest > MAX_STATES:
+        return f"the constraints couple {largest} states; exact sets have at most {MAX_STATES}"
+    if problem.periods > MAX_EXACT_PERIODS:
+        return f"exact sets are computed for at most {MAX_EXACT_PERIODS} periods"
+    return ""
 
 
 def min_periods(problem: ReachabilityProblem) -> int | None:

@@ -1,20 +1,13 @@
-"""Laws that the sets of `rendezvous` obey: polytopes in R^n and reachable sets.
+"""Laws that polytopes in R^n obey.
 
 Shown elsewhere: hulls and intersections are those of exact rationals, supports of sums, images and projections,
-members of intersections, flat sets, empty and unbounded ones (`tests/infoset/geometry/polytope`); exact and lifted
-reachable sets agree with each other and with rationals, samples and selections are members
-(`tests/rendezvous/reachability`). The other problems have no set operations: a front of points
-(`tests/rendezvous/pareto`), paths, or numbers.
+members of intersections, flat sets, empty and unbounded ones (`tests/infoset/geometry/polytope`).
 
 Here: every operation is monotone and includes what it must; cuts, sums, hulls and intersections commute with linear
 maps (shear, shift, scaling, mirror); volumes scale by determinants, multiply in products and obey Brunn and Minkowski.
-Reachable sets: more thrust reaches more; a step is the image, the sum and the cut it is said to be; mirrored starts and
-other units of the state give the mirrored and the scaled sets.
 """
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,7 +19,6 @@ from infoset.geometry.polytope import (
     Polytope,
     product,
 )
-from rendezvous.reachability import EmptyTubeError, ReachabilityProblem, Route, SetKind, Solution, solve
 
 pytestmark = pytest.mark.thorough
 
@@ -139,86 +131,3 @@ def test_volumes(seed: int, space: int, kind: str, part: float) -> None:
     level = np.array([low + (0.05 + 0.9 * part) * (high - low)])
     pieces = one.cut(normal, upper=level).volume() + one.cut(-normal, upper=-level).volume()
     assert pieces == pytest.approx(volume, rel=1e-7)
-
-
-# Reachable sets -------------------------------------------------------------------------------------------------
-
-
-def problem(seed: int) -> ReachabilityProblem:
-    """A random plant of two or three states; what is asked of it is near enough to be reached."""
-    generator = np.random.default_rng(seed)
-    states, periods = int(generator.integers(2, 4)), int(generator.integers(2, 4))
-    return ReachabilityProblem(
-        np.eye(states) + 0.3 * generator.standard_normal((periods, states, states)),
-        np.repeat(np.eye(states)[None], periods, axis=0) + 0.1 * generator.standard_normal((periods, states, states)),
-        generator.uniform(-0.4, 0.4, states),
-        np.full(states, 2.0),
-        generator.uniform(0.5, 1.5, states),
-    )
-
-
-def solved(given_problem: ReachabilityProblem) -> Solution:
-    try:
-        return solve(given_problem, Route.EXACT)
-    except EmptyTubeError:
-        assume(False)
-        raise
-
-
-def probes(seed: int, states: int) -> Floats:
-    return np.vstack([np.eye(states), -np.eye(states), np.random.default_rng(seed).standard_normal((6, states))])
-
-
-@few
-@given(SEED, st.floats(1.0, 2.0))
-def test_more_thrust_and_wider_limits_reach_more(seed: int, more: float) -> None:
-    asked = problem(seed)
-    few_sets = solved(asked).sets
-    seen = probes(seed, asked.states)
-    for wider in (
-        replace(asked, control_bounds=asked.control_bounds * more),
-        replace(asked, state_bounds=asked.state_bounds * more),
-    ):
-        many = solved(wider).sets
-        for time in range(asked.periods + 1):
-            less = few_sets.support(SetKind.FORWARD, time, seen)
-            assert (less <= many.support(SetKind.FORWARD, time, seen) + 1e-8).all()
-
-
-@few
-@given(SEED)
-def test_a_step_is_the_image_the_sum_and_the_cut(seed: int) -> None:
-    asked = problem(seed)
-    sets = solved(asked).sets
-    seen = probes(seed, asked.states)
-    reached = Polytope.from_vertices(asked.initial[None, :])
-    thrust = Polytope.from_box(-asked.control_bounds, asked.control_bounds)
-    limits = Polytope.from_box(-asked.state_bounds, asked.state_bounds)
-    for time in range(asked.periods):
-        pushed = thrust.affine_map(asked.control[time])
-        reached = reached.affine_map(asked.transition[time]).minkowski_sum(pushed).intersection(limits)
-        np.testing.assert_allclose(
-            sets.support(SetKind.FORWARD, time + 1, seen), reached.support_function(seen), atol=1e-7
-        )
-
-
-@few
-@given(SEED)
-def test_mirrored_starts_and_other_units_give_mirrored_and_scaled_sets(seed: int) -> None:
-    asked = problem(seed)
-    plain = solved(asked)
-    unit = 2.0 ** np.random.default_rng(seed).integers(-6, 7, asked.states)
-    scaled = replace(
-        asked,
-        transition=unit[:, None] * asked.transition / unit,
-        control=unit[:, None] * asked.control,
-        initial=unit * asked.initial,
-        state_bounds=unit * asked.state_bounds,
-    )
-    mirrored, other = solved(replace(asked, initial=-asked.initial)), solved(scaled)
-    seen = probes(seed, asked.states)
-    for kind in SetKind:
-        for time in range(asked.periods + 1):
-            wanted = plain.sets.support(kind, time, seen)
-            np.testing.assert_allclose(mirrored.sets.support(kind, time, -seen), wanted, atol=1e-7)
-            np.testing.assert_allclose(other.sets.support(kind, time, seen / unit), wanted, atol=1e-7)

@@ -16,10 +16,10 @@ from rendezvous.reachability import (
     MotionModel,
     NonlinearMotion,
     ReachabilityProblem,
-    Route,
     SetCounts,
     SetKind,
     Solution,
+    ThrustShape,
     effort,
     min_periods,
     minimum_energy,
@@ -74,12 +74,7 @@ TABLE_1_LINEAR = [
 
 @pytest.fixture(scope="module")
 def exact(paper: Paper) -> Solution:
-    return solve(paper(), Route.EXACT)
-
-
-@pytest.fixture(scope="module")
-def lifted(paper: Paper) -> Solution:
-    return solve(paper(), Route.LIFTED)
+    return solve(paper())
 
 
 def test_matrices(paper: Paper) -> None:
@@ -99,11 +94,9 @@ def ends_in_paper(bounds: Floats) -> Floats:
     return np.sort(to_paper(bounds.T).T, axis=1)
 
 
-@pytest.mark.parametrize("route", ["exact", "lifted"])
-def test_bounds_of_forward_sets_and_tube(route: str, request: pytest.FixtureRequest) -> None:
-    solution: Solution = request.getfixturevalue(route)
-    scale = solution.problem.state_bounds[:, None]
-    forward, tube = solution.sets.bounds(SetKind.FORWARD), solution.sets.bounds(SetKind.TUBE)
+def test_bounds_of_forward_sets_and_tube(exact: Solution) -> None:
+    scale = exact.problem.state_bounds[:, None]
+    forward, tube = exact.sets.bounds(SetKind.FORWARD), exact.sets.bounds(SetKind.TUBE)
     for t, expected in FORWARD.items():
         assert np.abs((ends_in_paper(forward[t]) - expected) / scale).max() < 1e-9
     for t, expected in TUBE.items():
@@ -111,13 +104,13 @@ def test_bounds_of_forward_sets_and_tube(route: str, request: pytest.FixtureRequ
     assert np.abs(tube[4] / scale).max() == 0.0
 
 
-def test_counts(exact: Solution, lifted: Solution) -> None:
+def test_counts(exact: Solution, paper: Paper) -> None:
     found = [exact.sets.counts(SetKind.FORWARD, t) for t in range(1, 5)]
     assert found == [SetCounts(10, 7, 3), SetCounts(130, 15, 6), SetCounts(100, 15, 6), SetCounts(96, 15, 6)]
     assert exact.sets.counts(SetKind.TUBE, 2) == SetCounts(27, 9, 6)
     dimensions = [exact.sets.counts(SetKind.TUBE, t) for t in (1, 3)]
     assert [each.dimension for each in dimensions if each is not None] == [3, 3]
-    assert lifted.sets.counts(SetKind.TUBE, 2) is None
+    assert solve(paper(thrust=ThrustShape.BALL)).sets.counts(SetKind.TUBE, 2) is None
 
 
 def test_min_norms(paper: Paper, exact: Solution) -> None:

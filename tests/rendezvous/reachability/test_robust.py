@@ -11,7 +11,6 @@ from scipy.optimize import linprog
 from rendezvous.reachability import (
     EmptyTubeError,
     ReachabilityProblem,
-    Route,
     feedback_plan,
     samples,
     solve,
@@ -42,7 +41,7 @@ def extreme_moves(count: int, periods: int, seed: int) -> Floats:
 def test_tightened_constraints_hold_for_every_disturbance(paper: Paper) -> None:
     problem = paper()
     disturbance = pushes(problem, 1e-3)
-    safe = solve(tightened(problem, disturbance), Route.LIFTED)
+    safe = solve(tightened(problem, disturbance))
     assert safe.optimal.miss == 0.0
     for control in samples(safe.optimal, 5, np.random.default_rng(0)):
         for moves in extreme_moves(50, 4, 1):

@@ -15,10 +15,11 @@ from infoset.geometry.polytope import UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
     ReachabilityProblem,
+    ReachableSets,
     Route,
     SetKind,
     ThrustShape,
-    TooLargeError,
+    TooManyVerticesError,
     analytic_centre,
     chebyshev_centre,
     effort,
@@ -31,7 +32,9 @@ from rendezvous.reachability import (
     vertices,
 )
 from rendezvous.reachability.conic import CONE_TOLERANCE
-from rendezvous.reachability.sets import essential_vertices
+from rendezvous.reachability.optimum import BlockOptimum
+from rendezvous.reachability.sets import LiftedSets, exact_sets
+from rendezvous.reachability.solve import optimal_controls
 
 from .rationals import rational_sets
 
@@ -42,45 +45,41 @@ SHARED = [HealthCheck.function_scoped_fixture]
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
 
 
+def blocks_of(problem: ReachabilityProblem) -> tuple[BlockOptimum, ...]:
+    try:
+        return optimal_controls(problem).blocks
+    except EmptyTubeError:
+        reject()
+
+
 @settings(max_examples=40, deadline=None, suppress_health_check=SHARED)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 6))
 def test_routes_agree_with_each_other(random_problem: Random, seed: int, size: int) -> None:
-    problem = random_problem(seed, size)
-    try:
-        exact, lifted = solve(problem, Route.EXACT), solve(problem, Route.LIFTED)
-    except (EmptyTubeError, TooLargeError, UncertainHullError):
-        reject()
-    for kind in SetKind:
-        one, other = exact.sets.bounds(kind), lifted.sets.bounds(kind)
-        assert np.abs((one - other) / problem.state_bounds[:, None]).max() < 1e-9
-        seen = np.random.default_rng(seed).standard_normal((8, size)) / problem.state_bounds
-        for t in range(1, problem.periods + 1):
-            one, other = exact.sets.support(kind, t, seen), lifted.sets.support(kind, t, seen)
-            assert np.abs(one - other).max() < 1e-9 * np.abs(seen * problem.state_bounds).sum(axis=1).max()
+    for optimum in blocks_of(random_problem(seed, size)):
+        try:
+            exact, lifted = exact_sets(optimum), LiftedSets(optimum)
+        except (TooManyVerticesError, UncertainHullError):
+            reject()
+        for kind in SetKind:
+            assert np.abs(exact.bounds(kind) - lifted.bounds(kind)).max() < 1e-9
 
 
 @needs_ppl
 @settings(max_examples=25, deadline=None, suppress_health_check=SHARED)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 5))
 def test_exact_route_has_the_vertices_of_exact_rationals(random_problem: Random, seed: int, size: int) -> None:
-    problem = random_problem(seed, size)
-    try:
-        exact = solve(problem, Route.EXACT)
-    except (EmptyTubeError, TooLargeError, UncertainHullError):
-        reject()
-    for block, part, optimum in zip(problem.blocks, exact.sets.parts, exact.optimal.blocks, strict=True):
-        forward, tube = rational_sets(block)
-        for t, expected in enumerate(forward):
-            found = part.polytope(SetKind.FORWARD, t)
-            assert found is not None
-            bounds = np.stack(found.bounding_box(), axis=-1)
-            assert np.abs(bounds - expected.bounds).max() < 1e-9
+    for optimum in blocks_of(random_problem(seed, size)):
+        try:
+            exact = exact_sets(optimum)
+        except (TooManyVerticesError, UncertainHullError):
+            reject()
+        forward, tube = rational_sets(optimum.block)
+        for found, expected in zip(exact.forward, forward, strict=True):
+            assert np.abs(np.stack(found.bounding_box(), axis=-1) - expected.bounds).max() < 1e-9
             assert found.dimension == expected.dimension
-            assert essential_vertices(found.vertices) <= len(expected.vertices)
+            assert len(found.vertices) <= len(expected.vertices)
         if optimum.reached:
-            found = part.polytope(SetKind.TUBE, 1)
-            assert found is not None
-            assert np.abs(np.stack(found.bounding_box(), axis=-1) - tube[1].bounds).max() < 1e-9
+            assert np.abs(exact.bounds(SetKind.TUBE)[1] - tube[1].bounds).max() < 1e-9
 
 
 @pytest.mark.parametrize("thrust", list(ThrustShape))
@@ -89,7 +88,7 @@ def test_a_thousand_members_are_optimal_and_a_thousand_others_are_not(
     paper: Paper, thrust: ThrustShape, bound: float
 ) -> None:
     problem = paper(bound=bound, thrust=thrust)
-    optimal = solve(problem, Route.LIFTED).optimal
+    optimal = solve(problem).optimal
     generator = np.random.default_rng(1)
     members = samples(optimal, 1000, generator)
     norms = np.linalg.norm(problem.run(members)[:, -1], axis=1)
@@ -108,7 +107,7 @@ def test_a_thousand_members_are_optimal_and_a_thousand_others_are_not(
 
 
 def test_samples_spread_over_the_set(paper: Paper) -> None:
-    optimal = solve(paper(), Route.LIFTED).optimal
+    optimal = solve(paper()).optimal
     corners, drawn = vertices(optimal), samples(optimal, 1500, np.random.default_rng(0))
     assert len(corners) == 27
     assert float(optimal.excess(corners).max()) < 1e-9
@@ -126,7 +125,7 @@ def test_samples_spread_over_the_set(paper: Paper) -> None:
 
 @pytest.mark.parametrize("thrust", list(ThrustShape))
 def test_each_choice_is_best_of_a_thousand(paper: Paper, thrust: ThrustShape) -> None:
-    optimal = solve(paper(thrust=thrust), Route.LIFTED).optimal
+    optimal = solve(paper(thrust=thrust)).optimal
     drawn = [effort(each) for each in samples(optimal, 1000, np.random.default_rng(2))]
     chosen = {
         "energy": minimum_energy(optimal),
@@ -147,7 +146,7 @@ def test_each_choice_is_best_of_a_thousand(paper: Paper, thrust: ThrustShape) ->
 
 
 def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
-    optimal = solve(paper(), Route.LIFTED).optimal
+    optimal = solve(paper()).optimal
     space, centre = optimal.space, analytic_centre(optimal).ravel()
 
     def product(control: Floats) -> float:
@@ -158,24 +157,22 @@ def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
     assert all(product(each.ravel()) < best for each in samples(optimal, 200, np.random.default_rng(0)))
 
 
-def test_exact_route_is_refused_before_it_takes_too_long_or_too_much(
-    paper: Paper, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pytest.raises(TooLargeError, match="ball"):
-        solve(paper(thrust=ThrustShape.BALL), Route.EXACT)
-    problem = paper(periods=16, period_s=45.0)
-    for name, limit, reason in (("SECONDS", 0.2, "0.2 s"), ("MEGABYTES", 0.01, "0.01 MB"), ("DIMENSION", 3, "3 for")):
-        with monkeypatch.context() as less:
-            less.setattr(f"rendezvous.reachability.sets.MAX_{name}", limit)
-            refused = solve(problem)
-            assert refused.route is Route.LIFTED
-            assert f"more than the limit of {reason}" in refused.reason
-            with pytest.raises(TooLargeError, match=f"limit of {reason}"):
-                solve(problem, Route.EXACT)
+def test_reasons_for_the_lifted_route(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rendezvous.reachability.sets.MAX_VERTICES", 100)
+    for problem, reason in (
+        (paper(), ""),
+        (paper(thrust=ThrustShape.BALL), "thrust in a ball"),
+        (paper(periods=16, period_s=45.0), "more than 100 vertices"),
+        (paper(periods=17, period_s=45.0), "at most 16 periods"),
+    ):
+        solution = solve(problem)
+        assert solution.route is (Route.LIFTED if reason else Route.EXACT)
+        assert reason in solution.reason
 
 
 def test_projections_of_both_routes(paper: Paper) -> None:
-    both = [solve(paper(), route).sets for route in Route]
+    exact = solve(paper())
+    both = [exact.sets, ReachableSets(exact.problem, tuple(map(LiftedSets, exact.optimal.blocks)))]
     for kind, t, axes in ((SetKind.TUBE, 2, (0, 1)), (SetKind.FORWARD, 3, (0, 1, 2)), (SetKind.TUBE, 1, (3, 4, 5))):
         one, other = (sets.projection(kind, t, axes) for sets in both)
         seen = np.random.default_rng(0).standard_normal((40, len(axes)))
