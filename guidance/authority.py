@@ -7,7 +7,7 @@ import numpy as np
 from guidance.situation import Situation
 from guidance.symmetric_impulse import range_at_impulse
 from guidance.thruster import Thruster
-from infoset.arrays import Floats
+from infoset.arrays import Floats, Integers
 
 
 def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
@@ -23,20 +23,35 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
     thruster, e, step_s = situation.thruster, situation.closing_speed_m_s, situation.step_s
     budget = situation.budget_left_m_s[:, None]
     if situation.later_times_s is not None:
-        return _correctable_at_m(situation.later_times_s - situation.time_s, thruster, budget, range_m / e)
+        return correctable_m(situation.later_times_s - situation.time_s, thruster, budget, range_m / e)
     to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
     steps = np.ceil(to_go_s / step_s) - 1.0
     full = np.clip(np.floor(budget / thruster.max_impulse_m_s), 0.0, np.maximum(steps, 0.0))
     return np.asarray(thruster.max_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0)))
 
 
-def _correctable_at_m(times_s: Floats, thruster: Thruster, budget: Floats, to_go_s: Floats) -> Floats:
-    """Return the miss (m) that impulses at some times from now can correct; the last one has the rest of the budget."""
-    number = np.searchsorted(times_s, to_go_s)
+def correctable_m(
+    times_s: Floats, thruster: Thruster, budget: Floats, to_go_s: Floats, first: Integers | int = 0
+) -> Floats:
+    """Return the miss (m) that impulses can correct: as many as the budget allows, the last one with its rest.
+
+    Parameters
+    ----------
+    times_s : ndarray, shape (n,)
+        Times from now at which impulses can be given, increasing.
+    budget, to_go_s : ndarray
+        Budget, m/s, and time to x = 0; broadcast against each other and against `first`.
+    first : ndarray of int or int
+        Index of the first impulse that counts.
+    """
+    number = np.maximum(np.searchsorted(times_s, to_go_s) - first, 0)
     full = np.minimum(budget // thruster.max_impulse_m_s, number).astype(np.int64)
     rest = np.minimum(budget - full * thruster.max_impulse_m_s, thruster.max_impulse_m_s)
     rest = np.where((full < number) & (rest >= thruster.min_impulse_m_s), rest, 0.0)
-    times_s = times_s[: full.max(initial=0) + 1]
+    end = first + full
+    times_s = times_s[: end.max(initial=0) + 1]
     sums_s = np.append(0.0, np.cumsum(times_s))
-    next_s = np.append(times_s, 0.0)[full]
-    return np.asarray(thruster.max_impulse_m_s * (full * to_go_s - sums_s[full]) + rest * (to_go_s - next_s))
+    next_s = np.append(times_s, 0.0)[end]
+    return np.asarray(
+        thruster.max_impulse_m_s * (full * to_go_s - (sums_s[end] - sums_s[first])) + rest * (to_go_s - next_s)
+    )

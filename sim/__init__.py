@@ -5,6 +5,7 @@ from sim.bound.linear_program import BoundError
 from sim.bound.lower_bound import LowerBound, lower_bound
 from sim.campaign import Campaign
 from sim.closed_form import possible_miss_of
+from sim.miss_cause import MissCause
 from sim.parallel import CampaignNoise
 from sim.record import Inconsistency, Record, fly_one
 from sim.requirement import HitRequirement, Requirement
@@ -34,6 +35,7 @@ __all__ = [
     "Inconsistency",
     "LowerBound",
     "Manoeuvre",
+    "MissCause",
     "NothingCountsError",
     "Objective",
     "Outcome",

@@ -79,7 +79,7 @@ def values_of(owner: object, column: Column) -> list[Any]:
     """Return one column as plain Python values, one per run: texts for an enumeration, None if unknown."""
     values: Any = getattr(owner, column.field)
     if isinstance(values, tuple):
-        return [value.value for value in values]
+        return [None if value is None else value.value for value in values]
     if column.component is not None:
         if -column.component > values.shape[1]:  # in a plane nothing is along y
             return [None] * len(values)
@@ -96,7 +96,7 @@ def documented(owner: type[_Owner]) -> type[_Owner]:
         declared: tuple[Column, ...] = field.metadata.get("columns", ())
         if declared:
             last = declared[-1]
-            array = "masked array" if last.nullable else "tuple" if issubclass(last.kind, Enum) else "ndarray"
+            array = "tuple" if issubclass(last.kind, Enum) else "masked array" if last.nullable else "ndarray"
             fewest = sum(not column.optional for column in declared)
             shape = "(B,)" if len(declared) == 1 else f"(B, {fewest} or {len(declared)})"
             meaning = "; ".join(column.meaning for column in declared)

@@ -33,6 +33,7 @@ from sim.draws import Draws
 from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight
 from sim.label_ends import LabelEnds
+from sim.miss_cause import DecisionLog
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
 from sim.target import TargetMotion, acceleration_m_s2, constant_side
@@ -134,6 +135,7 @@ class Engagements:
         self._lead_s = scenario.thruster.delay_steps * model.step_s
         self._not_given = np.zeros(batch)
         self._label_ends = LabelEnds(model, batch)
+        self._decisions = DecisionLog(scenario)
 
     @property
     def flying(self) -> bool:
@@ -157,6 +159,8 @@ class Engagements:
         situation = self._situation(miss, measured, pending)
         wanted = checked_impulses(self._strategy.decide(situation, self._state), situation, tracking, self._strategy)
         wanted = np.where(tracking & situation.may_fire, wanted, 0.0)
+        if situation.may_fire:
+            self._decisions.decide(self.step, tracking, self._budget, miss)
         spent = self._budget < thruster.min_impulse_m_s
         if spent.any():
             self._spent |= spent & (modulus(wanted) >= thruster.min_impulse_m_s)
@@ -180,7 +184,9 @@ class Engagements:
                     self._view,
                 )
             )
-        self._truth.fire(self._executed(self._impulse))
+        executed = self._executed(self._impulse)
+        self._truth.fire(executed)
+        self._decisions.execute(executed)
         self._information.shift(self._impulse, self._flying)
         self._truth_section.shift(self._impulse, given > 0.0)
         self._label_ends.fire(self._impulse, self._flying, self.step * model.step_s)
@@ -359,6 +365,9 @@ class Engagements:
         miss = np.where(passed, self._miss, self._truth.sight().range_m)
         radius_m = self.scenario.radius_m
         not_given = self._not_given + sum(map(modulus, self._queue))
+        hit = np.ma.MaskedArray(miss <= (radius_m or 0.0), mask=radius_m is None)
+        lateral = np.where(passed, self._lateral_miss, present)
+        reasons = self._decisions.reasons(lateral, arrivals_s, ~hit.filled(True))
         return Results(
             runs=runs,
             miss_m=miss,
@@ -368,11 +377,16 @@ class Engagements:
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
             set_emptied=lost,
-            hit=np.ma.MaskedArray(miss <= (radius_m or 0.0), mask=radius_m is None),
+            hit=hit,
+            causes=reasons.causes,
+            unguided_miss_m=reasons.unguided_m,
+            engine_corrects_m=reasons.engine_m,
+            budget_corrects_m=reasons.budget_m,
+            last_possible_m=reasons.last_possible_m,
             truth_margin_m=margin,
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,
-            lateral_miss_m=np.where(passed, self._lateral_miss, present).T,
+            lateral_miss_m=lateral.T,
             guarantees=self._model.is_guaranteed,
             burns_m_s=self._burns_m_s if self._number_of_burn else None,
         )

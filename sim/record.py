@@ -105,8 +105,9 @@ class Record:
 
     @property
     def ending(self) -> str:
-        """The outcome, and `hit` or `missed` if the body has a size."""
-        return ending(self.result.outcomes[0].value, self.result.hit.tolist()[0])
+        """The outcome, and if the body has a size `hit`, or `missed` and why."""
+        result, cause = self.result, self.result.causes[0]
+        return ending(result.outcomes[0].value, result.hit.tolist()[0], cause and cause.value)
 
     def __repr__(self) -> str:
         result = self.result

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from infoset.arrays import Flags, Floats, Integers
 from infoset.set_queries import MaskedFloats
 from sim.columns import Column, columns, columns_with_values, documented, values_of
+from sim.miss_cause import MissCause
 from sim.statistics import HitEstimate, estimate_hits
 
 MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
@@ -46,6 +47,11 @@ _MARGIN = (
 _HELD = "Miss at most the guaranteed miss; unknown without a guarantee"
 _EMPTY = "A measurement left the set empty, whatever the outcome is"
 _HIT = "Miss at most the radius of the body; unknown if the body has no size"
+_CAUSE = "Why the engagement missed the body; unknown for hits"
+_UNGUIDED = "Miss without impulses, of the same true motion"
+_ENGINE = "Maximum change of the miss by all impulses of the flight, without a limit of their sum"
+_BUDGET = "Maximum change of the miss by impulses within the budget"
+_LAST = "Radius of the possible misses at the last decision; unknown without a decision"
 
 
 _along_y = partial(Column, nullable=True, optional=True)
@@ -73,6 +79,13 @@ class Results:
     outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
     set_emptied: Flags = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool)))
     hit: MaskedFlags = field(metadata=columns(Column("hit", "", _HIT, bool, nullable=True)))
+    causes: tuple[MissCause | None, ...] = field(
+        metadata=columns(Column("cause", "", _CAUSE, MissCause, nullable=True, optional=True))
+    )
+    unguided_miss_m: Floats = field(metadata=columns(Column("unguided_miss_m", "m", _UNGUIDED)))
+    engine_corrects_m: Floats = field(metadata=columns(Column("engine_corrects_m", "m", _ENGINE)))
+    budget_corrects_m: Floats = field(metadata=columns(Column("budget_corrects_m", "m", _BUDGET)))
+    last_possible_m: MaskedFloats = field(metadata=columns(Column("last_possible_m", "m", _LAST, nullable=True)))
     truth_kept: Flags = field(
         init=False, metadata=columns(Column("truth_kept", "", "True state inside its section at every step", bool))
     )
@@ -144,9 +157,9 @@ class Results:
         return f"<{len(self)} engagements{hits}: median miss {miss:.3g} m for {fuel:.4g} m/s>"
 
 
-def ending(outcome: str, hit: bool | None) -> str:
-    """Return how an engagement ended as text: the outcome, and `hit` or `missed` if the body has a size."""
-    return outcome if hit is None else f"{outcome}, {'hit' if hit else 'missed'}"
+def ending(outcome: str, hit: bool | None, cause: str | None) -> str:
+    """Return how an engagement ended as text: the outcome, and if the body has a size `hit`, or `missed` and why."""
+    return outcome if hit is None else f"{outcome}, {'hit' if hit else f'missed ({cause})'}"
 
 
 _INPUTS = [declared.name for declared in fields(Results) if declared.init]

@@ -27,7 +27,7 @@ from infoset import ConvexPolygons, Section
 from infoset.limits import MAXIMUM
 from infoset.sensors import SENSORS
 from infoset.set_queries import MIN_RANGE_M
-from sim import Inconsistency, Outcome, Record, Results, Scenario
+from sim import Inconsistency, MissCause, Outcome, Record, Results, Scenario
 from sim.columns import columns_of
 from sim.gravity import on_board_model
 from sim.storage.codec import from_json, to_json
@@ -95,6 +95,7 @@ class Header:
     noise: str | None
     inconsistency: Inconsistency | None
     outcome: Outcome
+    cause: MissCause | None
     format: Literal["infoset-record-3"] = "infoset-record-3"
 
 
@@ -111,7 +112,11 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
     `InputError` if the file cannot be written, or exists already.
     """
     file = record_path("record", Path(path))
-    header = Header(**{name: getattr(record, name) for name in _OF_HEADER}, outcome=record.result.outcomes[0])
+    header = Header(
+        **{name: getattr(record, name) for name in _OF_HEADER},
+        outcome=record.result.outcomes[0],
+        cause=record.result.causes[0],
+    )
     text = json.dumps(to_json(header)).encode()
     stream = io.BytesIO()
     np.savez(stream, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **_to_arrays(record))
@@ -231,7 +236,7 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
     first = header.inconsistency
     if first is not None and not (0 <= first.step < len(arrays["time_s"]) and abs(first.label_m) <= MAXIMUM):
         raise ValueError("inconsistency is not at a step of the record")
-    fields: dict[str, Any] = {"runs": np.array([header.run]), "outcomes": (header.outcome,)}
+    fields: dict[str, Any] = {"runs": np.array([header.run]), "outcomes": (header.outcome,), "causes": (header.cause,)}
     for name, column in _RESULT.items():
         unknown = np.isnan(arrays[name])
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)

@@ -13,7 +13,6 @@ from experiments.interception.published import SINGLE, printed_single_runs
 from experiments.interception.record_file import write_record
 from experiments.interception.runs.shared import allowance, bound_name
 from sim import Record
-from sim.results import ending
 
 FIGURES = ("figure-2-process", "figure-3-sets", "figure-approach")
 MAX_TIMES = 12
@@ -58,11 +57,11 @@ def _yes(value: bool | None) -> str:
 
 
 def _outcome(record: Record) -> str:
-    outcome, contradiction = record.result.outcomes[0].value, record.inconsistency
-    if contradiction is not None:
-        time_s, label_km = float(record.time_s[contradiction.step]), contradiction.label_m / 1e3
-        outcome = f"{outcome} at {time_s:g} s, section {label_km:.0f} km"
-    return ending(outcome, record.result.hit.tolist()[0])
+    outcome, contradiction = record.ending, record.inconsistency
+    if contradiction is None:
+        return outcome
+    time_s, label_km = float(record.time_s[contradiction.step]), contradiction.label_m / 1e3
+    return f"{outcome}; set empty at {time_s:g} s, section {label_km:.0f} km"
 
 
 def read_times(text: str | None, folder: Path | None) -> tuple[float, ...]:
