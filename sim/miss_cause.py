@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guidance.authority import correctable_m
 from infoset import PredictedMiss
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Flags, Floats, Integers
 from infoset.set_queries import MaskedFloats
 from sim.scenario import Scenario
 
@@ -88,56 +89,65 @@ class DecisionLog:
         In space the impulses of a flight reach a disc, so the modulus of M_i is compared with the authority, and the
         radius of the possible misses is that of the disc around their rectangle.
         """
-        thruster, step_s = self._scenario.thruster, self._scenario.set_model.step_s
-        count, delay, shape = len(self._decisions), thruster.delay_steps, lateral_miss_m.shape
-        steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + delay
-        tracking = _rows([flags for _, flags, *_ in self._decisions], shape[1:]).astype(bool)
-        budget = _rows([left for _, _, left, _ in self._decisions], shape[1:])
-        lower, upper = (
-            _rows([getattr(miss, end) for *_, miss in self._decisions], shape) for end in ("lower_m", "upper_m")
-        )
-        executed = np.concatenate([_rows(self._executed, shape), np.zeros((delay + 1, *shape))])
+        scenario, runs = self._scenario, len(arrival_s)
+        thruster, step_s = scenario.thruster, scenario.set_model.step_s
+        steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + thruster.delay_steps
+        times_s: Floats = step_s * steps.astype(np.float64)
+        tracking = _rows([flags for _, flags, *_ in self._decisions], runs) > 0.0
+        budget = _rows([left for _, _, left, _ in self._decisions], runs)
+        lower = _rows([miss.lower_m for *_, miss in self._decisions], *lateral_miss_m.shape)
+        upper = _rows([miss.upper_m for *_, miss in self._decisions], *lateral_miss_m.shape)
+        executed = _with_end(_rows(self._executed, *lateral_miss_m.shape))
         given = executed[np.minimum(steps, len(executed) - 1)]
-        corrected = given * np.maximum(arrival_s - step_s * steps[:, None], 0.0)[:, None]
-        after = np.append(np.cumsum(corrected[::-1], axis=0)[::-1], np.zeros((1, *shape)), axis=0)
-        miss = lateral_miss_m + after
-        without_limit = np.full_like(budget, thruster.max_impulse_m_s * (count + 1))
-        # The errors of execution count in favour of the engine: what it cannot correct then, it never can.
+        changes = given * np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
+        miss = lateral_miss_m + _with_end(np.cumsum(changes[::-1], axis=0)[::-1])
+        # What the engine cannot correct with the errors of its impulses in its favour, it never can.
+        favour, first = 1.0 + thruster.execution_error_relative, np.arange(len(steps))[:, None]
+        limits = np.full_like(budget, thruster.max_impulse_m_s * (len(steps) + 1)), budget
         engine, within_budget = (
-            (1.0 + thruster.execution_error_relative)
-            * np.append(
-                correctable_m(step_s * steps, thruster, limit, arrival_s, np.arange(count)[:, None]),
-                np.zeros((1, *shape[1:])),
-                axis=0,
-            )
-            for limit in (without_limit, budget)
+            _with_end(favour * correctable_m(times_s, thruster, limit, arrival_s, first)) for limit in limits
         )
-        middle, radius = 0.5 * (lower + upper), np.hypot.reduce(0.5 * (upper - lower), axis=1)
-        # Beyond the radius if the set has lost the true state.
-        unknown = np.maximum(radius, np.hypot.reduce(miss[:-1] - middle, axis=1))
-        decided, last = tracking.any(axis=0), _last(tracking)
-        causes: list[MissCause | None] = [None] * shape[1]
-        for at, cause in zip(
-            np.flatnonzero(missed).tolist(),
+        radius, off = _modulus(0.5 * (upper - lower)), _modulus(miss[:-1] - 0.5 * (upper + lower))
+        # A set that has lost the true state knows less than its width says.
+        unknown = np.maximum(radius, off)
+        found = iter(
             _causes(
-                np.hypot.reduce(miss, axis=1)[:, missed],
+                _modulus(miss)[:, missed],
                 engine[:, missed],
                 within_budget[:, missed],
-                np.append(unknown, np.full((1, *shape[1:]), np.inf), axis=0)[:, missed],
+                _with_end(unknown, np.inf)[:, missed],
                 tracking[:, missed],
-                self._scenario.radius_m or 0.0,
-            ),
-            strict=True,
-        ):
-            causes[at] = cause
-        at_last = np.append(radius, np.zeros((1, *shape[1:])), axis=0)[last, np.arange(shape[1])]
+                scenario.radius_m or 0.0,
+            )
+        )
         return MissReasons(
-            tuple(causes),
-            np.hypot.reduce(miss[0]),
+            tuple(next(found) if flag else None for flag in missed.tolist()),
+            _modulus(miss)[0],
             engine[0],
             within_budget[0],
-            np.ma.MaskedArray(at_last, mask=~decided),
+            np.ma.MaskedArray(_with_end(radius)[_last(tracking), np.arange(runs)], mask=~tracking.any(axis=0)),
         )
+
+
+def count_causes(
+    causes: NDArray[np.object_], unguided_m: Floats, engine_m: Floats, last_possible_m: Floats
+) -> dict[str, Any]:
+    """Return the number of misses of each cause by name, and what explains them: columns of results, shape (N,).
+
+    `needed_m` and `corrected_m` are the maximum miss without impulses of the misses by the engine, and what their
+    impulses correct; `possible_m` the maximum radius of the possible misses of those by knowledge. None without such
+    misses.
+    """
+
+    def maximum(values_m: Floats, cause: MissCause) -> float | None:
+        return max(values_m[causes == cause.value].tolist(), default=None)
+
+    return {
+        **{cause.value: int((causes == cause.value).sum()) for cause in MissCause},
+        "needed_m": maximum(unguided_m, MissCause.ENGINE),
+        "corrected_m": maximum(engine_m, MissCause.ENGINE),
+        "possible_m": maximum(last_possible_m, MissCause.KNOWLEDGE),
+    }
 
 
 def _causes(
@@ -167,11 +177,21 @@ def _causes(
     return [order[index] for index in np.argmax(conditions, axis=0).tolist()]
 
 
-def _rows(values: list[Floats] | list[Flags], shape: tuple[int, ...]) -> Floats:
-    """Return recorded arrays as one, which is empty without any."""
+def _rows(values: Sequence[Floats] | Sequence[Flags], *shape: int) -> Floats:
+    """Return recorded arrays of a shape as one array, which is empty without any."""
     return np.reshape(np.array(values, dtype=np.float64), (len(values), *shape))
 
 
-def _last(flags: Flags) -> Any:
+def _modulus(lateral: Floats) -> Floats:
+    """Return the moduli of values along the lateral axes, the second axis of an array."""
+    return np.asarray(np.hypot.reduce(lateral, axis=1))
+
+
+def _with_end(rows: Floats, value: float = 0.0) -> Floats:
+    """Return rows with one more of a value: after the last decision."""
+    return np.append(rows, np.full((1, *rows.shape[1:]), value), axis=0)
+
+
+def _last(flags: Flags) -> Integers:
     """Return the last row with a flag in each column; -1 without one."""
-    return np.where(flags.any(axis=0), len(flags) - 1 - np.argmax(flags[::-1], axis=0), -1) if len(flags) else -1
+    return np.asarray(np.max(np.where(flags, np.arange(len(flags))[:, None], -1), axis=0, initial=-1))

@@ -7,13 +7,14 @@ import math
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import Checked, Fraction, Positive
+from sim.miss_cause import MissCause
 from sim.statistics import estimate_hits, number_text, order_statistics, shows
 from sim.stopping_rule import DIGITS, QUANTITIES, QuantileName
 
@@ -21,8 +22,10 @@ CONFIDENCE = 0.95
 MAX_RUNS_NEEDED = 1_000_000
 """Maximum number of runs that `Verdict.runs_needed` names."""
 _TAIL = 0.5 * (1.0 - CONFIDENCE)
+_CAUSES = "|".join(cause.value for cause in MissCause)
 _FORM = re.compile(
-    rf"\s*(?:hit\s*>=?\s*(?P<share>{DIGITS})|(?P<quantity>\w+)(?:\s+p(?P<level>{DIGITS}))?\s*<\s*(?P<bound>{DIGITS}))\s*"
+    rf"\s*(?:(?:hit|no-(?P<cause>{_CAUSES}))\s*>=?\s*(?P<share>{DIGITS})"
+    rf"|(?P<quantity>\w+)(?:\s+p(?P<level>{DIGITS}))?\s*<\s*(?P<bound>{DIGITS}))\s*"
 )
 _DEFAULT_LEVEL = "99"
 """Quantile, in percent, of a requirement that names none."""
@@ -59,9 +62,6 @@ class Requirement(Checked):
     quantile: QuantileName
     bound: Positive
 
-    unknown: ClassVar[float] = math.inf
-    """Value of a run without the quantity, for example without a bound Phi: it does not satisfy the bound."""
-
     def __str__(self) -> str:
         return f"{self.quantile}<{number_text(self.bound)}"
 
@@ -75,6 +75,10 @@ class Requirement(Checked):
         """Column of the results that it uses."""
         return self.quantile.quantity
 
+    def numbers(self, column: Any) -> Floats:
+        """Return the values of the quantity in a table of runs; a run without one does not satisfy the bound."""
+        return np.asarray(column.to_numpy(np.float64, na_value=np.inf))
+
     def holds(self, values: Floats) -> Flags:
         """Return for each of the quantity's `values` whether it is below the bound."""
         return np.asarray(values < self.bound)
@@ -82,29 +86,45 @@ class Requirement(Checked):
 
 @dataclass(frozen=True)
 class HitRequirement(Checked):
-    """A lower bound of the probability of a hit, written `hit>=0.95`.
+    """A lower bound of the probability of a hit, `hit>=0.95`, or of no miss of one cause, `no-engine>=0.99`.
 
     Parameters
     ----------
     share : float
-        Minimum share of the runs that hit, between 0 and 1.
+        Minimum share of the runs that hit, or that hit or miss because of something else, between 0 and 1.
+    cause : MissCause or None
+        None is any miss.
     """
 
     share: Fraction
-
-    quantity: ClassVar[str] = "hit"
-    unknown: ClassVar[float] = 0.0
+    cause: MissCause | None = None
 
     def __str__(self) -> str:
-        return f"hit>={number_text(self.share)}"
+        return f"{self.name}>={number_text(self.share)}"
+
+    @property
+    def name(self) -> str:
+        """What is required, without its probability."""
+        return "hit" if self.cause is None else f"no-{self.cause.value}"
+
+    @property
+    def quantity(self) -> str:
+        """Column of the results that it uses."""
+        return "hit" if self.cause is None else "cause"
 
     @property
     def bound(self) -> float:
         """Bound of the probability."""
         return self.share
 
+    def numbers(self, column: Any) -> Floats:
+        """Return 1 for the runs of a table that hit, or do not have the cause, and 0 for the others."""
+        if self.cause is not None:
+            return np.asarray(column != self.cause.value, dtype=np.float64)
+        return np.asarray(column.to_numpy(np.float64, na_value=0.0))
+
     def holds(self, values: Floats) -> Flags:
-        """Return for each of the `values` of the column, 0 or 1, whether the run hits."""
+        """Return whether the `values` of runs are 1."""
         return np.asarray(values > 0.0)
 
 
@@ -112,15 +132,16 @@ AnyRequirement = Requirement | HitRequirement
 
 
 def parse_requirement(text: str) -> AnyRequirement:
-    """Read `hit>=0.95`, `miss_m p99<10`, or `miss_m<10`, which is p99 too; raise ValueError for any other text."""
+    """Read a requirement, in which `miss_m<10` is the 99 % quantile; raise ValueError for any other text."""
     match = _FORM.fullmatch(text[:100])
     if match is None:
         raise ValueError(
-            'must be hit>=SHARE or QUANTITY pLEVEL<BOUND, for example "hit>=0.95" or "miss_m p99<10", with a quantity '
-            f"of {', '.join(QUANTITIES)}; found {text[:100]!r}"
+            'must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY pLEVEL<BOUND, for example "hit>=0.95" or "miss_m p99<10", '
+            f"with a cause of {_CAUSES.replace('|', ', ')}, and a quantity of "
+            f"{', '.join(QUANTITIES)}; found {text[:100]!r}"
         )
     if match["share"] is not None:
-        return HitRequirement(float(match["share"]))
+        return HitRequirement(float(match["share"]), MissCause(match["cause"]) if match["cause"] else None)
     quantile = QuantileName.parse(f"{match['quantity']} p{match['level'] or _DEFAULT_LEVEL}")
     return Requirement(quantile, float(match["bound"]))
 
@@ -160,7 +181,7 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     Parameters
     ----------
     values : ndarray, shape (n,)
-        The required quantity, in the order of the runs. It is `requirement.unknown` in runs without a value.
+        The required quantity, in the order of the runs: `requirement.numbers`.
     watched : bool
         Whether the number of runs may depend on the values, because runs were added after a look at them. False: the
         number of runs was fixed before.

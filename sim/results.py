@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from infoset.arrays import Flags, Floats, Integers
 from infoset.set_queries import MaskedFloats
 from sim.columns import Column, columns, columns_with_values, documented, values_of
-from sim.miss_cause import MissCause
+from sim.miss_cause import MissCause, count_causes
 from sim.statistics import HitEstimate, estimate_hits
 
 MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
@@ -80,7 +80,7 @@ class Results:
     set_emptied: Flags = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool)))
     hit: MaskedFlags = field(metadata=columns(Column("hit", "", _HIT, bool, nullable=True)))
     causes: tuple[MissCause | None, ...] = field(
-        metadata=columns(Column("cause", "", _CAUSE, MissCause, nullable=True, optional=True))
+        metadata=columns(Column("cause", "", _CAUSE, MissCause, nullable=True))
     )
     unguided_miss_m: Floats = field(metadata=columns(Column("unguided_miss_m", "m", _UNGUIDED)))
     engine_corrects_m: Floats = field(metadata=columns(Column("engine_corrects_m", "m", _ENGINE)))
@@ -128,6 +128,12 @@ class Results:
         """Probability of a hit with its confidence interval; None if the body has no size."""
         runs = int(self.hit.count())
         return estimate_hits(int(self.hit.sum()), runs) if runs else None
+
+    @property
+    def missed(self) -> dict[str, Any]:
+        """Number of misses of each cause, and what explains them (`sim.miss_cause.count_causes`)."""
+        causes = np.array([cause and cause.value for cause in self.causes], dtype=object)
+        return count_causes(causes, self.unguided_miss_m, self.engine_corrects_m, self.last_possible_m.filled(0.0))
 
     def to_dict(self) -> dict[str, list[Any]]:
         """Return the columns by name as plain values, one per run: texts for outcomes, None if unknown."""

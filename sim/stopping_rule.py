@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import Any
+
+import numpy as np
 
 from infoset.arrays import Floats
 from infoset.limits import Checked, Fraction, Positive, check_fields
@@ -83,6 +86,10 @@ class StoppingRule(Checked):
     def quantity(self) -> str:
         """Column of the results that it uses."""
         return self.quantile.quantity
+
+    def numbers(self, column: Any) -> Floats:
+        """Return the values of the quantity in a table of runs, NaN if unknown."""
+        return np.asarray(column.to_numpy(np.float64, na_value=np.nan))
 
     def met_by(self, sample: Floats) -> bool:
         """Whether a sample is large enough."""

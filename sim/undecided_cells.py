@@ -52,11 +52,11 @@ class ShareSample:
         self._runs = self._holding = 0
 
     def add(self, values: Floats) -> None:
-        """Add the values of a chunk; NaN is unknown."""
+        """Add the values of a chunk."""
         if not values.size:
             return
         required = self._required
-        counts = self._holding + np.cumsum(required.holds(np.where(np.isnan(values), required.unknown, values)))
+        counts = self._holding + np.cumsum(required.holds(values))
         runs = np.arange(self._runs + 1, self._runs + values.size + 1)
         self.decided |= bool(decides(runs, counts, required.share).any())
         self._runs, self._holding = int(runs[-1]), int(counts[-1])
@@ -143,6 +143,6 @@ class UndecidedCells:
             frame = self._folder.read_chunks([(number, runs)], ["noise", self._rule.quantity])
             for noise, sample in cell.samples.items():
                 values = frame.loc[frame["noise"] == noise, self._rule.quantity]
-                sample.add(values.to_numpy(dtype=np.float64, na_value=np.nan))
+                sample.add(self._rule.numbers(values))
             cell.judged += 1
         cell.waiting.clear()

@@ -20,7 +20,8 @@ Required = Annotated[
         "--require",
         metavar="RULE",
         help='Requirement: the upper bound of a quantile, "miss_m p99<10" (without a quantile p99: "miss_m<10"), or '
-        'the minimum probability of a hit, "hit>=0.95". Each cell meets it, does not meet it, or is undecided, with '
+        'the minimum probability of a hit, "hit>=0.95", or of no miss of a cause (engine, budget, knowledge, '
+        'saturated, guidance), "no-engine>=0.99". Each cell meets it, does not meet it, or is undecided, with '
         "95 % confidence. Default: in a report, that of the sweep; otherwise hit>=0.95 if the body has a size, else "
         "miss_m p99<10.",
     ),

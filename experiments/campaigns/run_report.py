@@ -75,7 +75,7 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> I
     sized = bool(folder.runs(["hit"])["hit"].count())
     default = folder.manifest.require or default_requirement(has_size=sized)
     required, shown = quantile_options(options.require, options.show, default)
-    if required.quantity == "hit" and not sized:
+    if required.quantity in ("hit", "cause") and not sized:
         raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")
     if required.quantity == "guaranteed_miss_m" and scenario.set_model.is_guaranteed and not folder.manifest.guarantee:
         raise InputError(
@@ -129,6 +129,7 @@ def _parts(folder: CampaignFolder, table: pd.DataFrame, related: pd.DataFrame, w
     yield from ("", "the worst runs, each with the command that simulates it again:")
     for row in records(worst):
         miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
-        yield f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}"
+        how = ending(row["outcome"], row["hit"], row["cause"])
+        yield f"  miss {miss} m, impulse {impulse} m/s, {how}: {row['replay']}"
     if not (folder.path / SCENARIO_FILE).is_file():
         yield f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)"

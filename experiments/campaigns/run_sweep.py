@@ -33,7 +33,7 @@ def run(options: Options) -> None:
         cells = sweep_cells(scenario, axes)
         sized = cells[0].body is not None
         required, shown = quantile_options(options.require, options.show, default_requirement(has_size=sized))
-        if required.quantity == "hit" and not sized:
+        if required.quantity in ("hit", "cause") and not sized:
             raise InputError(
                 f"--require {required}: the scenario {scenario.name} has no [body]; set its radius, for example "
                 "--set body.radius_m=80"

@@ -15,8 +15,9 @@ from rich.table import Table
 from experiments.campaigns.sweep_axes import tied_keys
 from experiments.common.screen import Part, number, number_table, quantile_notes, some_runs
 from experiments.interception.runs.shared import bound_name
-from experiments.interception.study import SetCounts, hit_text, noise_notes, set_warnings
+from experiments.interception.study import SetCounts, hit_text, miss_text, noise_notes, set_warnings
 from sim import CampaignNoise, HitEstimate, Outcome, estimate_hits, estimate_quantiles
+from sim.miss_cause import count_causes
 from sim.statistics import correlation_interval, level_name, shows
 from sim.stopping_rule import QUANTITIES
 from sim.storage import CampaignFolder, fingerprint
@@ -28,7 +29,9 @@ OUTCOMES = {outcome.value.replace("-", "_"): outcome.value for outcome in Outcom
 """Columns of the numbers of runs with each outcome."""
 
 
-COLUMNS = ("cell", "noise", "outcome", "hit", "truth_kept", "set_emptied", "phi_held", *QUANTITIES)
+CAUSE = ("cause", "unguided_miss_m", "engine_corrects_m", "last_possible_m")
+"""Columns of the runs that say why they missed."""
+COLUMNS = ("cell", "noise", "outcome", "hit", *CAUSE, "truth_kept", "set_emptied", "phi_held", *QUANTITIES)
 """Columns of the runs that `summary` needs."""
 CI = ("95 % CI\nfrom", "\nto")
 """Titles of the ends of an interval in a table for the screen."""
@@ -51,9 +54,9 @@ def summary(folder: CampaignFolder, runs: pd.DataFrame, levels: Sequence[float] 
     """Return a table with a row for each cell and noise.
 
     The columns are the varied keys; the numbers of all runs, of those with each outcome, and of those in which the
-    sets and the bound Phi held; the share of hits; and for each quantity the maximum and the quantiles at some levels.
-    Shares and quantiles have the ends of their 95 % confidence intervals. NaN is unknown: the share of hits of a body
-    without a size, and a quantile that so few runs do not show.
+    sets and the bound Phi held; the share of hits; the misses by cause, and what explains them; and for each quantity
+    the maximum and the quantiles at some levels. Shares and quantiles have the ends of their 95 % confidence intervals.
+    NaN is unknown: the share of hits of a body without a size, and a quantile that so few runs do not show.
     """
     rows = []
     for cell, noise, chosen in groups(folder, runs):
@@ -68,6 +71,7 @@ def summary(folder: CampaignFolder, runs: pd.DataFrame, levels: Sequence[float] 
 def _counts(runs: pd.DataFrame) -> dict[str, Any]:
     sized = int(runs["hit"].count())
     hits = vars(estimate_hits(int(runs["hit"].sum()), sized)) if sized else {}
+    missed = count_causes(*(runs[name].to_numpy() for name in CAUSE))
     return {
         "runs": len(runs),
         **{name: int((runs["outcome"] == outcome).sum()) for name, outcome in OUTCOMES.items()},
@@ -78,6 +82,7 @@ def _counts(runs: pd.DataFrame) -> dict[str, Any]:
         "phi_held": int(runs["phi_held"].sum()),
         "hits": hits.get("hits", math.nan),
         **{f"hit_{name}": hits.get(name, math.nan) for name in ("probability", "lower", "upper")},
+        **{f"missed_{name}": or_nan(value) for name, value in missed.items()},
     }
 
 
@@ -124,7 +129,7 @@ def worst_runs(folder: CampaignFolder, runs: pd.DataFrame, scenario_file: Path) 
     file, _, version = folder.manifest.strategy.rpartition(" sha256:")
     own = f" --strategy {shlex.quote(file)}" if version and file else ""
     own_noise = shlex.quote((folder.manifest.own_noise or "").partition(" sha256:")[0])
-    worst = runs.nlargest(WORST, "miss_m")[["run", "noise", "outcome", "hit", "miss_m", "impulse_m_s"]]
+    worst = runs.nlargest(WORST, "miss_m")[["run", "noise", "outcome", "hit", "cause", "miss_m", "impulse_m_s"]]
     command = f"infoset engage {shlex.quote(str(scenario_file))} --noise {{}} --seed {folder.manifest.seed} --run {{}}"
     noises = worst["noise"].astype(str).replace(CampaignNoise.OWN.value, own_noise)
     replay = [command.format(noise, run) + own for noise, run in zip(noises, worst["run"], strict=True)]
@@ -199,6 +204,9 @@ def _notes(folder: CampaignFolder, row: Mapping[str, Any], sets: SetCounts, nois
     if row["hits"] is not None:
         ends = (row["hit_probability"], row["hit_lower"], row["hit_upper"])
         yield hit_text(HitEstimate(row["runs"], row["hits"], *ends), folder.manifest.scenario)
+        missed = {name.removeprefix("missed_"): value for name, value in row.items() if name.startswith("missed_")}
+        if causes := miss_text(missed, row["runs"], folder.manifest.scenario):
+            yield causes
     held = (
         f"; miss within the bound Phi: {row['phi_held']} of {some_runs(row['phi_known'])}" if row["phi_known"] else ""
     )

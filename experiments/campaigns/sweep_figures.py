@@ -50,6 +50,7 @@ QUANTITY_NAMES = {
     "impulse_m_s": "impulse spent, m/s",
     "guaranteed_miss_m": "guaranteed miss, m",
     "hit": "probability of a hit",
+    "cause": "probability of no miss by this cause",
 }
 _PANEL_MM, _LEGEND_MM = 66.0, 24.0
 _TICK_LETTERS, _LABEL_LETTERS = 32, 40
@@ -84,8 +85,8 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
     (axis,), required = table.axes, table.required
     levels = sorted({quantile.level for quantile in shown}, reverse=True)
     lines: dict[str, list[tuple[str, dict[str, Any]]]] = {required.quantity: []}
-    if required.quantity == "hit":
-        lines["hit"].append(("required_value", {"color": INK, "marker": "o"}))
+    if not isinstance(required, Requirement):
+        lines[required.quantity].append(("required_value", {"color": INK, "marker": "o"}))
     for quantile in shown:
         look = LINE_LOOKS[levels.index(quantile.level) % len(LINE_LOOKS)] | {"label": level_name(quantile.level)}
         lines.setdefault(quantile.quantity, []).append((_column(table, quantile), look))
@@ -93,7 +94,7 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
     for axes, (quantity, columns) in zip(panels, lines.items(), strict=True):
         for column, look in columns:
             _draw_estimates(axes, cells, column, look)
-        if quantity == "hit":
+        if quantity in ("hit", "cause"):
             axes.set_ylim(-0.03, 1.03)
         elif spans_decades(cells[[column for column, _ in columns]].stack()):
             axes.set_yscale("log")
@@ -239,6 +240,7 @@ def _column(table: SweepTable, quantile: QuantileName) -> str:
 def requirement_words(required: AnyRequirement) -> str:
     """Return a requirement in words: `miss p99 under 10 m`."""
     if not isinstance(required, Requirement):
-        return f"probability of a hit at least {number_text(required.share)}"
+        what = "a hit" if required.cause is None else f"no miss by {required.cause.value}"
+        return f"probability of {what} at least {number_text(required.share)}"
     name, unit = QUANTITY_NAMES[required.quantity].split(", ")
     return f"{name} {level_name(required.quantile.level)} under {required.bound:g} {unit}"

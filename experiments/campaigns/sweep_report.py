@@ -100,7 +100,7 @@ class SweepReport:
         """Yield the number of cells with each decision, and tables of the limits and of the decisions."""
         required, rows = self.table.required, self.table.of_noise(noise)
         counts, first = Counter(rows["requirement"]), self.table.axes[0].key
-        is_bounded = required.quantity in ("miss_m", "hit")  # game noise is one adversary
+        is_bounded = required.quantity in ("miss_m", "hit", "cause")  # game noise is one adversary
         against = " against this adversary" if noise == NoiseKind.GAME.value and is_bounded else ""
         decisions = ", ".join(
             f"{decision}{against if decision is Decision.MET else ''} in {counts[decision.value]}"
@@ -134,7 +134,7 @@ class SweepReport:
     def _printed(self, rows: pd.DataFrame) -> pd.DataFrame:
         """Return the decisions as a table for the screen, with the values of the keys as they are."""
         required = self.table.required
-        name = str(required.quantile) if isinstance(required, Requirement) else required.quantity
+        name = str(required.quantile) if isinstance(required, Requirement) else required.name
         printed = rows[self.table.keys].map("{:.6g}".format)
         printed["decision"] = rows["requirement"].fillna("not simulated").str.replace("-", " ")
         printed["runs"] = rows["runs"].astype(str)

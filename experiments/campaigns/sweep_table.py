@@ -70,7 +70,7 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Seq
 
 
 def _decision(runs: pd.DataFrame, required: AnyRequirement, folder: CampaignFolder) -> dict[str, Any]:
-    values = runs[required.quantity].to_numpy(np.float64, na_value=required.unknown)
+    values = required.numbers(runs[required.quantity])
     verdict = judge(values, required, watched=folder.manifest.is_watched) if values.size else None
     row: dict[str, Any] = {"requirement": None if verdict is None else verdict.decision.value}
     row |= {f"required_{name}": or_nan(getattr(verdict, name, None)) for name in ("value", "lower", "upper", "known")}
@@ -78,7 +78,7 @@ def _decision(runs: pd.DataFrame, required: AnyRequirement, folder: CampaignFold
     row["runs_needed"] = len(noises_of(folder)) * or_nan(getattr(verdict, "runs_needed", None))
     if isinstance(required, Requirement):
         return row | {"limit_quantile": row["required_value"]}
-    shown = shows(len(runs), required.share) and len(runs)
+    shown = required.cause is None and shows(len(runs), required.share) and len(runs)
     return row | {"limit_quantile": float(np.quantile(runs["miss_m"], required.share)) if shown else math.nan}
 
 

@@ -149,9 +149,9 @@ def outcome_columns(results: Results) -> dict[str, list[Cell]]:
     return {name: values for name, values in results.to_dict().items() if not name.startswith(("run", "start_", "hit"))}
 
 
-def hit_key(hits: HitEstimate | None) -> dict[str, object]:
-    """Return the key `hit` of a curve, a sample or a cell in JSON; nothing if the body has no size."""
-    return {} if hits is None else {"hit": vars(hits)}
+def hit_key(hits: HitEstimate | None, missed: Mapping[str, object]) -> dict[str, object]:
+    """Return the keys `hit` and `missed` of a curve or a sample in JSON; nothing if the body has no size."""
+    return {} if hits is None else {"hit": vars(hits), "missed": missed}
 
 
 def to_json(value: object) -> str:

@@ -216,11 +216,12 @@ def record_titles(records: Sequence[Record]) -> list[str]:
 
 
 def outcome_title(record: Record) -> str:
-    """Return miss and impulse, the outcome if it is not the arrival, and `hit` or `missed` if the body has a size."""
+    """Return miss and impulse, the outcome if it is not the arrival, and for a body with a size how it ended."""
     result = record.result
     text = f"miss {_shown(float(result.miss_m[0]))} m, impulse spent {float(result.impulse_m_s[0]):.1f} m/s"
-    outcome = _OUTCOMES.get(result.outcomes[0])
-    return ending(text if outcome is None else f"{text}, {outcome}", result.hit.tolist()[0])
+    outcome, cause = _OUTCOMES.get(result.outcomes[0]), result.causes[0]
+    text = text if outcome is None else f"{text}, {outcome}"
+    return ending(text, result.hit.tolist()[0], cause and cause.value)
 
 
 def _shown(metres: float) -> str:

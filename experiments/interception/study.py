@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from experiments.common.screen import some_runs
+from experiments.common.screen import number, some_runs
+from experiments.common.units import M_PER_KM
 from guidance import NoiseKind, NoiseSource, Strategy, TieRule
 from guidance.gaussian_noise import share_cut
 from infoset import Model
 from infoset.arrays import Flags, Floats
-from sim import HitEstimate, Results, Scenario, estimate_hits
+from sim import HitEstimate, MissCause, Results, Scenario, estimate_hits
+from sim.results import join
 from sim.statistics import shown_quantiles
 
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
@@ -98,6 +100,13 @@ class Comparison:
         """Runs that hit with every tie rule; None if the body has no size."""
         hit = self._worst("hit", np.ma.all)
         return estimate_hits(int(hit.sum()), len(hit)) if hit.count() else None
+
+    @property
+    def missed(self) -> dict[str, Any]:
+        """Number of misses of each cause, of each run with its worst tie rule (`sim.miss_cause.count_causes`)."""
+        results = [*self.results.values()]
+        worst, runs = np.argmax([each.miss_m for each in results], axis=0), len(results[0])
+        return join(results).take(worst * runs + np.arange(runs)).missed
 
 
 Compared = tuple[str, str, TieRule | None]
@@ -227,6 +236,32 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
     return (
         f"hit (miss at most {scenario.body.radius_m:g} m): {hits.hits} of {some_runs(hits.runs)} "
         f"({percent(hits.probability)}), 95 % CI {percent(hits.lower)} to {percent(hits.upper)}"
+    )
+
+
+def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
+    """Return the numbers of misses by cause, from `sim.miss_cause.count_causes`; an empty text without misses."""
+    thruster = scenario.thruster
+    reasons = {
+        MissCause.ENGINE: "by the engine (it corrects {corrected_m}, the starts need up to {needed_m})",
+        MissCause.BUDGET: f"by the budget of {thruster.budget_m_s:g} m/s",
+        MissCause.KNOWLEDGE: "by knowledge (at the last decision misses of +-{possible_m} are still possible)",
+        MissCause.SATURATED: f"saturated (known too late for impulses of {thruster.max_impulse_m_s:g} m/s)",
+        MissCause.GUIDANCE: "by the guidance (to compare strategies: infoset compare)",
+    }
+    lengths = {name: _length(value) for name, value in missed.items() if name.endswith("_m")}
+    parts = [
+        f"{missed[cause.value]} {text.format(**lengths)}" for cause, text in reasons.items() if missed[cause.value]
+    ]
+    count = sum(missed[cause.value] for cause in MissCause)
+    return f"missed {count} of {some_runs(runs)}: {', '.join(parts)}" if parts else ""
+
+
+def _length(length_m: float | None) -> str:
+    return (
+        f"{number(length_m / M_PER_KM)} km"
+        if length_m is not None and length_m >= M_PER_KM
+        else f"{number(length_m)} m"
     )
 
 

@@ -149,14 +149,14 @@ def test_no_requirement(text: str) -> None:
 
 def test_runs_without_a_value_do_not_satisfy_the_bound() -> None:
     median = Requirement(QuantileName("guaranteed_miss_m", 0.5), 60.0)
-    values = np.where(np.arange(80) % 13, median.unknown, 5.0)
+    values = np.where(np.arange(80) % 13, np.inf, 5.0)
     for watched in (True, False):
         verdict = judge(values, median, watched=watched)
         assert (verdict.decision, verdict.known, verdict.runs) == (Decision.NOT_MET, 7, 80)
         assert (verdict.value, verdict.lower, verdict.upper) == (None, 60.0, None)
-        most = judge(np.where(np.arange(80) % 13, 5.0, median.unknown), median, watched=watched)
+        most = judge(np.where(np.arange(80) % 13, 5.0, np.inf), median, watched=watched)
         assert (most.decision, most.known, most.value) == (Decision.MET, 73, 5.0)
-    few = np.append(np.ones(19), median.unknown)
+    few = np.append(np.ones(19), np.inf)
     assert judge(few, Requirement(QuantileName("guaranteed_miss_m", 0.9), 60.0), watched=False).upper is None
 
 

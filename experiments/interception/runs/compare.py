@@ -21,6 +21,7 @@ from experiments.interception.study import (
     SetCounts,
     compared_scenarios,
     comparisons,
+    miss_text,
     noise_notes,
     percent,
     scenario_title,
@@ -34,7 +35,18 @@ from sim.parallel import Task
 
 FIGURE = "figure-comparison"
 TIES = "for each run, the worst of the four tie rules"
-COLUMNS = ("run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit", "miss_y_m", "miss_z_m")
+COLUMNS = (
+    "run",
+    "miss_m",
+    "impulse_m_s",
+    "outcome",
+    "truth_kept",
+    "set_emptied",
+    "hit",
+    "cause",
+    "miss_y_m",
+    "miss_z_m",
+)
 
 
 def run(options: Compare) -> None:
@@ -95,7 +107,7 @@ def _summary(comparison: Comparison) -> dict[str, object]:
         "noise": comparison.noise,
         "miss_m": summary(comparison.miss_m),
         "impulse_m_s": summary(comparison.impulse_m_s),
-        **hit_key(comparison.hits),
+        **hit_key(comparison.hits, comparison.missed),
         "truth_kept": int(comparison.truth_kept.sum()),
         "set_emptied": int(comparison.set_emptied.sum()),
         "phi_held": int(phi_held.sum()) if phi_held.count() else None,
@@ -143,6 +155,9 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
     yield f"{scenario_title(scenario)}: quantiles of {some_runs(runs)}{ties}"
     yield table
     yield from ("", f"of the {some_runs(runs)}:", sets)
+    for comparison in compared:
+        if comparison.hits is not None and (causes := miss_text(comparison.missed, runs, scenario)):
+            yield f"{comparison.noise} noise, {comparison.strategy}: {causes}"
     if len(noises) > 1:
         yield from ("", "what depends on the noise, 90 % quantile of the miss, m:", _by_noise(compared, noises))
         yield _best(compared, noises)

@@ -28,6 +28,7 @@ from experiments.interception.study import (
     SetCounts,
     curve_scenarios,
     hit_text,
+    miss_text,
     noise_notes,
     set_counts,
     set_warnings,
@@ -87,7 +88,7 @@ def run(options: Experiment) -> None:
                 "curves": [
                     {
                         **_key(curve),
-                        **hit_key(curve.results.hits),
+                        **hit_key(curve.results.hits, curve.results.missed),
                         **burns_key(scenario, curve.results),
                         **outcome_columns(curve.results),
                     }
@@ -142,6 +143,8 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> Iterator[Part]:
         lines = [hit_text(results.hits, scenario), certificate(results)]
         lines += [f"{outcome}: {count}" for outcome, count in outcomes.items()]
         yield f"curve {curve.number}: {'; '.join(filter(None, lines))}"
+        if causes := miss_text(results.missed, runs, scenario):
+            yield f"curve {curve.number}: {causes}"
     yield from set_warnings(scenario.information_set.model, counts)
     *others, game = noise_notes(scenario, dict.fromkeys(curve.noise for curve in curves))
     yield from (*others, f"{game}; infoset compare shows the worst of all tie rules")

@@ -96,7 +96,7 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Command, swept: 
     [
         (["--vary", "thruster.budget=1:2:2"], "did you mean thruster.budget_m_s?"),
         (["--vary", "thruster.max_impulse_m_s=0.01:5:3"], "brief with thruster.max_impulse_m_s = 0.01"),
-        (["--require", "miss_m 10"], "--require: must be hit>=SHARE or QUANTITY pLEVEL<BOUND, for example"),
+        (["--require", "miss_m 10"], "--require: must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY"),
         (["--require", "hit>=0.95"], "has no [body]; set its radius, for example --set body.radius_m=80"),
         (["--show", "miss_m p99,fuel p50"], "--show: there is no quantity fuel"),
         (["--runs", 300_000], "give --yes"),
