@@ -29,10 +29,11 @@ class MissCause(Enum):
     BUDGET = "budget"
     """With more budget, a hit would have been possible at the start, or after the critical decision."""
     KNOWLEDGE = "knowledge"
-    """At the critical decision the possible misses were too wide for what could be corrected after it, and at the last
-    decision they were still wider than the body."""
+    """At the critical decision no impulse was right for all possible misses, and at the last decision these were still
+    wider than the body."""
     SATURATED = "saturated"
-    """At the critical decision they were too wide, but at the last one they were narrow: known too late."""
+    """At the critical decision no impulse was right for all possible misses, but at the last one these were narrow: the
+    miss was known too late."""
     GUIDANCE = "guidance"
     """An impulse at the critical decision would have kept a hit possible for all possible misses."""
 
@@ -109,13 +110,14 @@ class DecisionLog:
         )
         radius, off = _modulus(0.5 * (upper - lower)), _modulus(miss[:-1] - 0.5 * (upper + lower))
         # A set that has lost the true state knows less than its width says.
-        unknown = np.maximum(radius, off)
+        unknown, farthest = np.maximum(radius, off), _modulus(np.maximum(upper, -lower))
         found = iter(
             _causes(
                 _modulus(miss)[:, missed],
                 engine[:, missed],
                 within_budget[:, missed],
                 _with_end(unknown, np.inf)[:, missed],
+                _with_end(farthest)[:, missed],
                 tracking[:, missed],
                 scenario.radius_m or 0.0,
             )
@@ -151,7 +153,13 @@ def count_causes(
 
 
 def _causes(
-    miss: Floats, engine: Floats, budget: Floats, unknown: Floats, tracking: Flags, radius_m: float
+    miss: Floats,
+    engine: Floats,
+    budget: Floats,
+    unknown: Floats,
+    farthest: Floats,
+    tracking: Flags,
+    radius_m: float,
 ) -> list[MissCause]:
     """Return the causes of misses; the arrays have a row for each decision, all but `tracking` one more for the end.
 
@@ -165,7 +173,9 @@ def _causes(
     then = np.minimum(critical + 1, len(miss) - 1)
     later_m = np.where(is_last, 0.0, engine[then, runs])
     by_budget = exists & ~is_last & ~beyond[then, runs]
-    wide = ~exists | (unknown[critical, runs] > later_m + radius_m)
+    # The maximum miss beyond the later impulses, after the impulse that is best for all possible misses.
+    beyond_m = np.maximum(unknown[critical, runs] - later_m, farthest[critical, runs] - engine[critical, runs])
+    wide = ~exists | (beyond_m > radius_m)
     conditions = (
         beyond[0],
         ~reach[0] | by_budget,
