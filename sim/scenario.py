@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from guidance.noise import NoiseKind, NoiseSource, TieRule
 from guidance.strategy import Strategy
 from guidance.thruster import Thruster
-from infoset.limits import Checked, Description, Limits, Name, NotNegative, Positive, check_fields
+from infoset.limits import Checked, Description, Limits, Name, NotNegative, Positive, check_fields, shown
 from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
 
@@ -288,7 +288,15 @@ def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
 
 
 def with_strategy(scenario: Scenario, strategy: Strategy | str | None) -> tuple[Scenario, Strategy | None]:
-    """Return the scenario with a strategy if it is a registered name, and the strategy if it is an object."""
+    """Return the scenario with a strategy if it is a registered name, and the strategy if it is an object.
+
+    TypeError if the scenario is none.
+    """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(
+            f"scenario must be a Scenario: got {shown(scenario)}; experiments.simulate takes names and files, and "
+            "experiments.load_scenario reads them"
+        )
     if isinstance(strategy, str):
         return replace(scenario, strategy=strategy), None
     return scenario, strategy

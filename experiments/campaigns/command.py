@@ -117,6 +117,7 @@ class Campaign(Flight):
             help="Compute the bound Phi in the model guaranteed (2 to 3.5 times the run time).",
         ),
     ] = True
+    csv: Csv = None
 
 
 @dataclass(frozen=True, kw_only=True)

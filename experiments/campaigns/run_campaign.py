@@ -55,5 +55,6 @@ def run(options: Options) -> None:
         written.enter(options.out, "shards")
         written.save(SCENARIO_FILE, to_toml(scenario))
         written.save(SUMMARY, to_json(results), "--json")
+        written.deliver("--csv", table.drop(columns="cell").to_csv(index=False))
     parts.append(f"to see the results: infoset report {stored.path}")
     show(parts, options.quiet, stdout_taken=written.stdout_taken)

@@ -22,6 +22,7 @@ from matplotlib.ticker import LogLocator
 from experiments.campaigns.sweep_axes import key_label
 from experiments.campaigns.sweep_table import SweepTable, above_bound, spans_decades
 from experiments.common.figure_style import (
+    GUARANTEED,
     HALO,
     IMPULSE,
     INK,
@@ -167,7 +168,7 @@ def _draw_decisions(axes: Axes, table: SweepTable, cells: pd.DataFrame) -> None:
     if {Decision.MET.value, Decision.NOT_MET.value} <= set(cells["requirement"]):
         _draw_zero(axes, table, cells, "limit_quantile", color=INK, label="limit by interpolation of the quantiles")
     if "closed_form_m" in cells:
-        look = {"color": "#2f6b3a", "linestyle": "--", "label": "closed form: worst errors, no later images"}
+        look = {"color": GUARANTEED, "linestyle": "--", "label": "closed form: worst errors, no later images"}
         _draw_zero(axes, table, cells, "closed_form_m", **look)
 
 

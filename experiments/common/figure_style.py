@@ -30,6 +30,10 @@ IMPULSE = "#8c1c13"
 SET_FILL = "#c6d9ec"
 SET_EDGE = "#3f6f9f"
 LIMIT = "#707070"
+GAME = "#7f2704"
+GUARANTEED = "#2f6b3a"
+BODY_FILL = "#f0e6d8"
+REGION_FILL = "#e8e8e8"
 
 SET: dict[str, Any] = {"facecolor": SET_FILL, "edgecolor": SET_EDGE, "linewidth": 0.8}
 """Patch of a set."""
@@ -41,9 +45,9 @@ HALO = [withStroke(linewidth=2.0, foreground="white")]
 """White outline of a text or a line over others."""
 
 CURVE_LOOKS: dict[int, dict[str, Any]] = {
-    1: {"color": "#08306b", "linestyle": "-"},
+    1: {"color": TRUTH, "linestyle": "-"},
     2: {"color": "#5a9bd4", "linestyle": (0, (4, 1.5))},
-    3: {"color": "#7f2704", "linestyle": "-"},
+    3: {"color": GAME, "linestyle": "-"},
     4: {"color": "#f08a24", "linestyle": (0, (4, 1.5))},
 }
 """Dark and solid without the range sensor, light and dashed with it; blue random, brown game."""
@@ -51,8 +55,8 @@ CURVE_LOOKS: dict[int, dict[str, Any]] = {
 LINE_LOOKS: tuple[dict[str, Any], ...] = (
     {"color": TRUTH, "linestyle": "-", "marker": "o"},
     {"color": MEASURED, "linestyle": (0, (5, 1.5)), "marker": "s"},
-    {"color": "#7f2704", "linestyle": (0, (1.2, 1.0)), "marker": "^"},
-    {"color": "#2f6b3a", "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
+    {"color": GAME, "linestyle": (0, (1.2, 1.0)), "marker": "^"},
+    {"color": GUARANTEED, "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
     {"color": "#4d4d4d", "linestyle": (0, (3, 1, 1, 1, 1, 1)), "marker": "v"},
 )
 """Lines and marks that differ in grey too, for craft, optimal controls and components."""

@@ -41,7 +41,7 @@ class Output:
 
     @property
     def stdout_taken(self) -> bool:
-        """Whether a file is printed on stdout, so that tables go to stderr."""
+        """Whether a file is printed on stdout, so that no tables are printed."""
         return any(str(file) == STDOUT for file in self.files.values())
 
     def wants(self, option: str) -> bool:

@@ -47,9 +47,9 @@ def say_warnings(warnings: Iterable[str], quiet: bool, notes: Iterable[str] = ()
 
 
 def show(parts: Iterable[Part], quiet: bool, *, stdout_taken: bool = False) -> None:
-    """Print lines, which the terminal wraps, and tables on stdout, or on stderr if a file is printed on stdout."""
-    if not quiet:
-        console = Console(stderr=stdout_taken, highlight=False, markup=False, emoji=False)
+    """Print lines, which the terminal wraps, and tables on stdout; nothing if a file is printed there."""
+    if not (quiet or stdout_taken):
+        console = Console(highlight=False, markup=False, emoji=False)
         for part in parts:
             if isinstance(part, Table):
                 for column in part.columns:  # no word and no number is divided: a line may be longer than the screen

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from experiments.common.units import SECONDS
 from guidance.thruster import modulus
 from infoset.arrays import Floats, Integers
 from sim import Outcome, Record, Scenario
@@ -22,9 +23,6 @@ MAX_STEPS = 400
 
 MAX_COURSES = 1000
 """Maximum number of runs whose courses are kept."""
-
-UNITS = (("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0))
-"""Units of times before the arrival."""
 
 
 @dataclass(frozen=True)
@@ -103,9 +101,9 @@ def marks(scenario: Scenario) -> dict[str, float]:
 
 def duration_text(seconds: float) -> str:
     """Return a time in the maximum unit of which it has exactly one or at least two: ``2.5 min``, ``100 s``."""
-    fitting = ((name, unit) for name, unit in UNITS if seconds == unit or seconds >= 2.0 * unit)
-    name, unit = next(fitting, UNITS[-1])
-    return f"{seconds / unit:.3g} {name}"
+    fitting = [name for name, unit in SECONDS.items() if seconds == unit or seconds >= 2.0 * unit]
+    name = fitting[-1] if fitting else "s"
+    return f"{seconds / SECONDS[name]:.3g} {name}"
 
 
 def true_predicted_misses(record: Record) -> Floats:

@@ -42,7 +42,6 @@ _NAMES = {
     "chebyshev": "Chebyshev centre",
     "analytic": "analytic centre",
 }
-_MAX_MEMBERS = 4
 _START: dict[str, Any] = {"marker": "o", "markerfacecolor": "none", "markersize": 7.5, "label": "start"}
 _END: dict[str, Any] = {"marker": "*", "markersize": 9.0, "label": "terminal state of minimum norm"}
 _AXES = (*AXIS_TITLES, *component_titles("v"))
@@ -52,7 +51,16 @@ _PLANES = ((1, 0), (1, 2), (4, 3), (4, 5))
 def _shown(report: Report) -> list[tuple[dict[str, Any], Member, Floats]]:
     """Return the line style, the member and the trajectory of each member drawn."""
     looks = [{**look, "linewidth": 1.0} for look in LINE_LOOKS]
-    return [(look, *pair) for look, pair in zip(looks, report.shown[:_MAX_MEMBERS], strict=False)]
+    return [(look, *pair) for look, pair in zip(looks, report.shown, strict=False)]
+
+
+def _legend(figure: Figure, report: Report) -> None:
+    """Draw the legend, with the names of the members that are not drawn."""
+    drawn = [member.name for _, member, _ in _shown(report)]
+    hidden = [_NAMES.get(member.name, member.name) for member in report.members if member.name not in drawn]
+    names = ", ".join(hidden) if len(hidden) <= len(_NAMES) else f"{len(hidden)} of {len(report.members)}"
+    note = f"not drawn, as equal to others or beyond the first {len(LINE_LOOKS)}: {names}" if hidden else None
+    legend_below(figure, 3, title=note)
 
 
 def shown_times(periods: int, most: int = _MAX_TIMES) -> list[int]:
@@ -76,7 +84,7 @@ def draw_space(report: Report, first: int) -> Figure:
     _draw_motion(axes, report, list(range(first, first + 3)), _MAX_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE)
     axes.view_init(elev=22.0, azim=-58.0)
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.1)
-    legend_below(figure, 3)
+    _legend(figure, report)
     return figure
 
 
@@ -87,7 +95,7 @@ def draw_planes(report: Report) -> Figure:
     for axes, plane in zip(grid.flat, _PLANES, strict=True):
         _draw_motion(axes, report, list(plane), _MAX_TIMES, _TOLERANCE)
     letters([*grid.flat])
-    legend_below(figure, 3)
+    _legend(figure, report)
     return figure
 
 
@@ -147,5 +155,5 @@ def draw_controls(report: Report) -> Figure:
         axes.margins(y=0.08)
         axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
     letters(row)
-    legend_below(figure, 3)
+    _legend(figure, report)
     return figure

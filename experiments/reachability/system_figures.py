@@ -9,7 +9,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from experiments.common.figure_style import LINE_LOOKS, SET_EDGE, SET_FILL, legend_below, plain, style, subplots
+from experiments.common.figure_style import (
+    LINE_LOOKS,
+    REGION_FILL,
+    SET_EDGE,
+    SET_FILL,
+    legend_below,
+    plain,
+    style,
+    subplots,
+)
 from experiments.reachability.system import Report
 
 
@@ -26,7 +35,7 @@ def draw_states(report: Report) -> Figure:
     figure, grid = subplots(30.0 + 40.0 * len(names), len(names), 1, sharex=True)
     for i, (name, (axes,)) in enumerate(zip(map(plain, names), grid, strict=True)):
         periods = np.arange(len(report.tube))
-        axes.fill_between(periods, *report.forward[:, i].T, color="#eeeeee", label="reachable states")
+        axes.fill_between(periods, *report.forward[:, i].T, color=REGION_FILL, label="reachable states")
         axes.fill_between(periods, *report.tube[:, i].T, color=SET_FILL, label="states of all optimal controls")
         for look, states in zip(LINE_LOOKS, report.states.items(), strict=False):
             axes.plot(states[1][:, i], label=states[0], **look | {"linewidth": 1.0})

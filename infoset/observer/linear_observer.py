@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal
@@ -68,7 +68,7 @@ class Record:
         return exact_hull(self.initial, self.events[: self.count], run, step, sizes)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
     """The sets of possible states of all runs at a step; with `single` there is one run, without an axis of runs.
 
@@ -76,10 +76,17 @@ class Estimate:
     """
 
     step: int
-    sets: Sets = field(repr=False)
+    sets: Sets
     single: bool
     states: int
-    record: Record = field(repr=False)
+    record: Record
+
+    def __repr__(self) -> str:
+        head, ends = f"<estimate of {self.states} states at step {self.step}:", np.stack(self._hull, axis=-1)
+        if not self.single:
+            return f"{head} {len(ends)} runs, {int(self.is_empty.sum())} of them without a possible state>"
+        bounds = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in ends)
+        return f"{head} {'no state is possible' if self.is_empty else bounds}>"
 
     @property
     def is_empty(self) -> Flags:

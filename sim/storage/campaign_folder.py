@@ -33,6 +33,13 @@ class CampaignFolder:
         with reporting(shards):
             self._names = {file.name for file in shards.iterdir()} if shards.is_dir() else set()
 
+    def __repr__(self) -> str:
+        manifest, cells = self.manifest, f", {self.manifest.cells} cells" if self.manifest.axes else ""
+        return (
+            f"<{manifest.kind} of {manifest.scenario.name} in {self.path}: {manifest.strategy}, {manifest.noise.value} "
+            f"noise, seed {manifest.seed}{cells}, {self.finished_runs} of {self.wanted_runs} runs stored>"
+        )
+
     @classmethod
     def read(cls, path: Path) -> CampaignFolder:
         """Open a folder; StorageError if it contains no campaign."""

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal
 
 from experiments.common.figure_style import (
+    GAME,
     HALO,
     SET_EDGE,
     TRUTH,
@@ -49,7 +50,6 @@ _ELLIPSES: tuple[tuple[float, str, Any], ...] = (
     (0.5, "ellipse: 50 % of the runs", "-"),
     (0.99, "ellipse: 99 % of the runs", (0, (4, 1.5))),
 )
-_CIRCLE_COLOUR = "#7f2704"
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     for level, name, dashes in _CIRCLES:
         if shows(count, level):
             quantile = float(np.quantile(each.miss_m, level))
-            axes.plot(*ring(quantile), label=name, color=_CIRCLE_COLOUR, linestyle=dashes, linewidth=0.9, **line)
+            axes.plot(*ring(quantile), label=name, color=GAME, linestyle=dashes, linewidth=0.9, **line)
             known.append(f"{'median' if level == 0.5 else f'{100 * level:g} %'} {number(quantile)} m")
     for level, name, dashes in _ELLIPSES:
         if shows(count, level) and (outline := _ellipse_within(each, level)) is not None:

@@ -9,7 +9,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import BOUND, CURVE_LOOKS, INK, SET_EDGE, SET_FILL, letters, style, subplots
+from experiments.common.figure_style import (
+    BOUND,
+    CURVE_LOOKS,
+    INK,
+    REGION_FILL,
+    SET_EDGE,
+    SET_FILL,
+    letters,
+    style,
+    subplots,
+)
 from experiments.common.screen import number
 from infoset.arrays import Floats
 from sim import Scenario
@@ -105,7 +115,7 @@ def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -
     rows = sorted(worst_m.items(), key=lambda item: item[1])
     places, misses = np.arange(len(rows)), np.array([miss_m for _, miss_m in rows])
     maximum = max(bound_m, float(misses[-1]))
-    axes.axvspan(0.0, bound_m, color="#e8e8e8", linewidth=0.0)
+    axes.axvspan(0.0, bound_m, color=REGION_FILL, linewidth=0.0)
     axes.axvline(bound_m, color=INK, linewidth=1.2)
     axes.hlines(places, bound_m, misses, color=SET_EDGE, linewidth=0.8)
     axes.plot(misses, places, marker="o", markersize=4.0, linestyle="none", color=_LOOKS[1]["color"])

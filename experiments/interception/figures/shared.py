@@ -9,26 +9,23 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullFormatter
 
-from experiments.common.figure_style import EVENT, HALO, INK
+from experiments.common.figure_style import BODY_FILL, EVENT, GUARANTEED, HALO, INK
+from experiments.common.units import SECONDS, length_unit
 from experiments.interception.course import duration_text, marks, min_to_go_s
 from sim import Scenario
 
 RADIUS: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
 """Line of the radius of the body."""
-GUARANTEE: dict[str, Any] = {"color": "#2f6b3a", "linestyle": (0, (7, 1.5)), "linewidth": 1.4}
+GUARANTEE: dict[str, Any] = {"color": GUARANTEED, "linestyle": (0, (7, 1.5)), "linewidth": 1.4}
 """Line of the guaranteed miss."""
-BODY_FILL = "#f0e6d8"
-"""Colour of the disc of the body."""
 MAX_VECTORS = 2000
 """Number of points above which they are pixels in the PDF file."""
 
-_TICKS_S = (0.01, 1.0, 60.0, 3600.0, 86400.0)
-_MORE_TICKS_S = (0.1, 10.0, 600.0, 21600.0, 864000.0)
+_TICKS_S = (0.01, *SECONDS.values())
+_MORE_TICKS_S = (0.1, 10.0, 10.0 * SECONDS["min"], 6.0 * SECONDS["h"], 10.0 * SECONDS["d"])
 """Ticks of the time before the arrival, and those that have a label only in a short flight."""
 _LONG = 1000.0
 """Ratio of the first and the last time from which a flight is long."""
-_KM_FROM = 5000.0
-"""Extent of the B-plane, m, from which its axes are in kilometres."""
 _MIN_DISC = 0.02
 """Share of the axes below which the disc of a body is not drawn: it would be hidden by the mark of its centre."""
 
@@ -56,12 +53,12 @@ def draw_body(axes: Axes, half_m: float, guaranteed_m: float | None, radius_m: f
         axes.plot(*ring(guaranteed_m), label="guaranteed miss Φ", zorder=3.1, **GUARANTEE)
     centre: dict[str, Any] = {"color": INK, "marker": "+", "markersize": 7.0, "linestyle": "none", "zorder": 4.0}
     axes.plot(0.0, 0.0, markeredgewidth=1.1, label="centre of the body", **centre)
-    unit, metres = ("km", 1e3) if half_m >= _KM_FROM else ("m", 1.0)
+    unit, per_m = length_unit(half_m)
     axes.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m), aspect="equal", xlabel=f"miss along y, {unit}")
     axes.set_ylabel(f"miss along z, {unit}")
     for one in (axes.xaxis, axes.yaxis):
         one.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
-        one.set_major_formatter(lambda tick, _: f"{tick / metres:g}".replace("-", "\N{MINUS SIGN}"))
+        one.set_major_formatter(lambda tick, _: f"{tick * per_m:g}".replace("-", "\N{MINUS SIGN}"))
 
 
 def ring(radius: float) -> Any:

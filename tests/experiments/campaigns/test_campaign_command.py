@@ -66,8 +66,11 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
     code, out, err = infoset(*asked, "--resume", "--json", "-")
     assert code == 0
     assert json.loads(out)["runs"] == 150
-    assert "miss, m" in err
-    assert infoset(*asked, "--resume", "--quiet") == (0, "", "")
+    assert "miss, m" not in err
+    assert infoset(*asked, "--resume", "--quiet", "--csv", "table.csv") == (0, "", "")
+    assert pd.read_csv("table.csv")["miss_m_p50"].tolist() == [sample["miss_m_p50"] for sample in found["samples"]]
+    what = f"<campaign of brief in {folder}: symmetric-miss, mixed noise, seed 4, 150 of 150 runs stored>"
+    assert repr(CampaignFolder.read(folder)) == what
     code, _, err = infoset(*asked)
     assert code == 2
     assert "contains a campaign already; continue it with --resume" in err

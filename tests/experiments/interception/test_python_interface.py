@@ -6,10 +6,12 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import experiments
 import sim
 from experiments import find_worst, fly_one, load_scenario, lower_bound, save, simulate
 from experiments.common.errors import InputError
@@ -45,6 +47,18 @@ def test_the_search_and_the_bound_take_names(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("sim.bound.lower_bound.REFINEMENTS", 0)
     assert find_worst(NAME, budget=4, strategy="patient").strategy == "patient"
     assert len(repr(lower_bound(NAME))) < 100
+
+
+def test_a_name_given_to_sim_says_which_functions_take_names() -> None:
+    name: Any = NAME
+    for function in (sim.simulate, sim.fly_one, sim.find_worst):
+        with pytest.raises(TypeError, match=r"got 'asteroid-1997-single'; experiments\.simulate .*load_scenario"):
+            function(name)
+
+
+def test_dir_lists_the_public_names() -> None:
+    assert dir(experiments) == sorted(experiments.__all__)
+    assert all(hasattr(experiments, name) for name in dir(experiments))
 
 
 def test_unknown_names_are_refused() -> None:

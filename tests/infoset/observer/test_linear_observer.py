@@ -90,6 +90,17 @@ def exact_sets() -> list[list[Exact]]:
     return sets
 
 
+def test_an_estimate_says_what_is_in_it() -> None:
+    box, still = Zonotope.box([0.0, -1.0], [0.0, 1.0]), np.eye(2)
+    one = LinearObserver(still, [[0.0, 1.0]], box, noise=0.5)
+    assert repr(one.estimate()) == "<estimate of 2 states at step 0: 0 to 0, -1 to 1>"
+    one.update([9.0])
+    assert repr(one.estimate()) == "<estimate of 2 states at step 0: no state is possible>"
+    many = LinearObserver(still, [[0.0, 1.0]], box, noise=0.5, runs=2)
+    many.update([[0.0], [9.0]])
+    assert repr(many.estimate()) == "<estimate of 2 states at step 0: 2 runs, 1 of them without a possible state>"
+
+
 def test_the_sets_of_the_published_example_equal_the_exact_ones() -> None:
     estimates = published().run(measurements())
     assert len(estimates) == 20
