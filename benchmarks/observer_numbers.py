@@ -19,7 +19,8 @@ import shapely
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from experiments.observer.file import ObserverProblem, load_observer
+from experiments.common.input_file import load_problem
+from experiments.observer.file import ObserverProblem
 from infoset import LinearObserver, Zonotope
 from tests.infoset.observer.test_random_observers import System
 
@@ -39,7 +40,7 @@ TARGET_BATCH_US = 0.5
 
 def main() -> None:
     """Print the times and errors."""
-    problem = load_observer("observer-2005")
+    problem = load_problem("observer-2005")
     measured = problem.measured
     assert measured is not None
     rows: list[tuple[str, float, float]] = []

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from experiments.common.hill_axes import to_paper
-from experiments.reachability.file import load_rendezvous
+from experiments.common.input_file import load_problem
 from experiments.reachability.published import PROBLEM, flown_controls, printed_tables, published_motion
 from infoset.arrays import Floats
 from rendezvous.reachability import minimum_energy, solve
@@ -28,7 +28,7 @@ GROSS = 5.0
 
 def main() -> None:
     """Fit and print."""
-    rendezvous = load_rendezvous(PROBLEM)
+    rendezvous = load_problem(PROBLEM)
     problem = rendezvous.problem
     controls = flown_controls(rendezvous, minimum_energy(solve(problem).optimal))
     linear = to_paper(problem.run(controls))[:, 1:]

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from experiments.multipoint.file import load_multipoint
-from experiments.pareto.file import load_pareto
+from experiments.common.input_file import load_problem
 from rendezvous.multipoint import Nodes, best_order, best_times, solve_segments
 from rendezvous.pareto import analyse_coalitions, solve_encounter
 from rendezvous.relative_motion import ClohessyWiltshire
@@ -45,7 +44,7 @@ def equally_spaced(count: int) -> Nodes:
 
 
 def test_pareto(benchmark: BenchmarkFixture, under: Check) -> None:
-    encounter = load_pareto("pareto-2008").encounter
+    encounter = load_problem("pareto-2008").encounter
     benchmark.pedantic(solve_encounter, args=(encounter,), rounds=300, warmup_rounds=5)
     under("pareto, 3 craft", 1e3 * best_s(lambda: solve_encounter(encounter), 500), 1.0, "ms")
     both = 1e3 * best_s(lambda: analyse_coalitions(solve_encounter(encounter)), 300)
@@ -83,13 +82,13 @@ def test_time_is_linear(under: Check) -> None:
 
 
 def test_order_and_times_of_five(benchmark: BenchmarkFixture, under: Check) -> None:
-    problem = load_multipoint("service-5")
+    problem = load_problem("service-5")
     benchmark.pedantic(best_order, args=(problem.tour, problem.limits()), rounds=3, warmup_rounds=1)
     under("N = 5, order and times", best_s(lambda: best_order(problem.tour, problem.limits()), 3), 2.0, "s")
 
 
 def test_the_asteroid_tour(benchmark: BenchmarkFixture, under: Check) -> None:
-    problem = load_multipoint("asteroid-tour")
+    problem = load_problem("asteroid-tour")
     assert problem.times_s is not None
     times, order = problem.times_s, (0, 1, 2)
     problem.tour.fly(order, times)

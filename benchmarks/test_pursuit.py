@@ -16,7 +16,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from experiments.pursuit.file import load_pursuit
+from experiments.common.input_file import load_problem
 from rendezvous.pursuit_evasion import Game, Player, PointStatus, Solution, capture_map, solve
 from rendezvous.pursuit_evasion.game import scaled_craft, units_of
 from rendezvous.two_body import OrbitalElements
@@ -31,7 +31,8 @@ PHASES, INCLINATIONS = 101, 21
 @pytest.fixture(scope="module")
 def game() -> Game:
     """The game of the slides: thrusts of 20 N and 10 N."""
-    return load_pursuit("geo-pursuit").game
+    game: Game = load_problem("geo-pursuit").game
+    return game
 
 
 @pytest.fixture(scope="module")

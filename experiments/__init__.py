@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from experiments.common.input_file import load_problem
     from experiments.interception.figures.bound import draw_bound
     from experiments.interception.figures.commands import plot
     from experiments.interception.figures.process import draw_process
@@ -16,16 +17,12 @@ if TYPE_CHECKING:
     from experiments.interception.python_interface import find_worst, fly_one, lower_bound, save, simulate
     from experiments.interception.record_file import load_record
     from experiments.interception.scenario_file import load_scenario
-    from experiments.multipoint.file import load_multipoint
-    from experiments.observer.file import load_observer
     from experiments.pareto.figures import draw_trajectories
-    from experiments.pareto.file import load_pareto
     from experiments.pursuit.figures import draw_distance
-    from experiments.pursuit.file import load_pursuit
     from experiments.pursuit.map_figure import draw_map
-    from experiments.reachability.file import load_rendezvous, load_system
 
 _NAMES = {
+    "common.input_file": ("load_problem",),
     "interception.scenario_file": ("load_scenario",),
     "interception.record_file": ("load_record",),
     "interception.python_interface": ("find_worst", "fly_one", "lower_bound", "save", "simulate"),
@@ -33,12 +30,7 @@ _NAMES = {
     "interception.figures.bound": ("draw_bound",),
     "interception.figures.process": ("draw_process",),
     "interception.figures.sets": ("draw_sets",),
-    "observer.file": ("load_observer",),
-    "pareto.file": ("load_pareto",),
     "pareto.figures": ("draw_trajectories",),
-    "multipoint.file": ("load_multipoint",),
-    "reachability.file": ("load_rendezvous", "load_system"),
-    "pursuit.file": ("load_pursuit",),
     "pursuit.figures": ("draw_distance",),
     "pursuit.map_figure": ("draw_map",),
 }
@@ -53,14 +45,9 @@ __all__ = [
     "draw_trajectories",
     "find_worst",
     "fly_one",
-    "load_multipoint",
-    "load_observer",
-    "load_pareto",
-    "load_pursuit",
+    "load_problem",
     "load_record",
-    "load_rendezvous",
     "load_scenario",
-    "load_system",
     "lower_bound",
     "plot",
     "save",

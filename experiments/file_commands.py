@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from experiments.common.built_in_files import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files, kind_of, taken_by
-from experiments.common.errors import InputError
+from experiments.common.built_in_files import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files
 from experiments.common.options import AsJson, Overwrite, Quiet
 
 BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
@@ -78,6 +76,7 @@ def _print_list(files: Sequence[BuiltIn]) -> None:
 
 def _print_check(file: str, kinds: Sequence[str], json: bool, quiet: bool) -> None:
     """Check a file of one of these kinds; print its name, fingerprint and warnings."""
+    from experiments.common.input_file import load_problem
     from experiments.common.output import to_json
     from experiments.common.screen import say_warnings
     from experiments.interception.scenario_file import load_scenario, scenario_warnings
@@ -88,27 +87,13 @@ def _print_check(file: str, kinds: Sequence[str], json: bool, quiet: bool) -> No
         read: Any = load_scenario(file)
         head, warnings = {"scenario_hash": fingerprint(read)}, scenario_warnings(read)
     else:
-        problem = PROBLEMS[_problem_kind(file)]
-        read = getattr(import_module(f"experiments.{problem.folder}.file"), problem.loader)(file)
+        read = load_problem(file)
         head, warnings = {"kind": read.kind, "problem_hash": fingerprint(read)}, []
     if json:
         typer.echo(to_json({"versions": versions(), "name": read.name, **head, "warnings": warnings}), nl=False)
     elif not quiet:
         typer.echo(f"ok  {read.name}  {fingerprint(read)}")
     say_warnings(warnings, quiet or json)
-
-
-def _problem_kind(file: str) -> str:
-    """Return the kind of a problem file; raise `InputError` if it has none."""
-    from experiments.common.input_file import parse, source_of
-
-    text, source = source_of(file, PROBLEMS)
-    kind = kind_of(parse(text, source))
-    if kind is None:
-        raise InputError(f"{source}: kind: must be one of {', '.join(PROBLEMS)}; write it above the first table")
-    if kind == SCENARIO:
-        raise InputError(f"{source}: {taken_by(kind)}")
-    return kind
 
 
 scenarios = _commands(SCENARIO, "A scenario is an interception.", "own-scenario")

@@ -14,20 +14,20 @@ SCENARIO = "scenario"
 
 
 class ProblemKind(NamedTuple):
-    """Command of a kind of problem, its folder in `experiments`, and the loader in the module `file` there."""
+    """Command of a kind of problem, and the module in `experiments` and the name of its dataclass."""
 
     command: str
-    folder: str
-    loader: str
+    module: str
+    owner: str
 
 
 PROBLEMS = {
-    "pareto-encounter": ProblemKind("pareto", "pareto", "load_pareto"),
-    "multipoint": ProblemKind("multipoint", "multipoint", "load_multipoint"),
-    "reachable-rendezvous": ProblemKind("reach", "reachability", "load_rendezvous"),
-    "reachable-system": ProblemKind("reach", "reachability", "load_system"),
-    "pursuit-evasion": ProblemKind("pursuit", "pursuit", "load_pursuit"),
-    "observer": ProblemKind("observe", "observer", "load_observer"),
+    "pareto-encounter": ProblemKind("pareto", "pareto.file", "ParetoProblem"),
+    "multipoint": ProblemKind("multipoint", "multipoint.file", "MultipointProblem"),
+    "reachable-rendezvous": ProblemKind("reach", "reachability.file", "Rendezvous"),
+    "reachable-system": ProblemKind("reach", "reachability.system_file", "ReachableSystem"),
+    "pursuit-evasion": ProblemKind("pursuit", "pursuit.file", "PursuitProblem"),
+    "observer": ProblemKind("observe", "observer.file", "ObserverProblem"),
 }
 """Kinds of problems by the `kind` of their files."""
 _SCENARIO_TABLES = {"uncertainty", "dispersion", "angle_sensor", "camera", "thruster", "information_set"}

@@ -17,12 +17,13 @@ from dataclasses import fields, is_dataclass, replace
 from decimal import Context, Decimal, InvalidOperation
 from enum import Enum
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from pydantic import ValidationError
 
-from experiments.common.built_in_files import SCENARIO, built_in, built_in_names, kind_of, taken_by
+from experiments.common.built_in_files import PROBLEMS, SCENARIO, built_in, built_in_names, kind_of, taken_by
 from experiments.common.errors import InputError, nearest, shown
 from experiments.common.units import quantity_and_unit, si_factor
 from infoset.limits import LONGEST_DESCRIPTION
@@ -75,6 +76,21 @@ def read_file(owner: type[Kind], name_or_path: str | os.PathLike[str], settings:
         lines = [line for line in (made.description, f"with {', '.join(settings)}") if line]
         made = replace(made, description="; ".join(lines)[:LONGEST_DESCRIPTION])
     return made  # type: ignore[no-any-return]  # the type of the result is `owner`
+
+
+def load_problem(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Any:
+    """Read a built-in problem or a problem file of any kind, with `settings` as in `read_file`.
+
+    Returns the dataclass of its kind; raises `InputError` as `read_file` does.
+    """
+    text, source = source_of(name_or_path, PROBLEMS)
+    kind = kind_of(parse(text, source))
+    if kind == SCENARIO:
+        raise InputError(f"{source}: {taken_by(kind)}")
+    if kind is None:
+        raise InputError(f"{source}: kind: must be one of {', '.join(PROBLEMS)}; write it above the first table")
+    owner: type = getattr(import_module(f"experiments.{PROBLEMS[kind].module}"), PROBLEMS[kind].owner)
+    return read_file(owner, name_or_path, settings)
 
 
 def read_text(owner: type[Kind], text: str, source: str, settings: Sequence[str] | None = None) -> Kind:

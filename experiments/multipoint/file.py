@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, ClassVar
@@ -11,7 +9,6 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from experiments.common.input_file import read_file
 from experiments.common.orbit_checks import check_angle, check_orbit, check_rate
 from infoset.arrays import Floats
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
@@ -142,8 +139,3 @@ class MultipointProblem:
         if self.eccentricity > 0.0:
             motion = TschaunerHempel(EllipticOrbit(self.orbit_rate_rad_s, self.eccentricity, self.true_anomaly_rad))
         return Tour(motion, DriftingTargets(targets, motion, states), start)
-
-
-def load_multipoint(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> MultipointProblem:
-    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
-    return read_file(MultipointProblem, name_or_path, settings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +10,6 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from experiments.common.input_file import read_file
 from experiments.observer.command import MAX_STEPS
 from infoset import ConvexPolygons, LinearObserver, Zonotope
 from infoset.arrays import Floats
@@ -171,8 +169,3 @@ def _series(key: str, rows: Sequence[Row], size: int) -> Floats | None:
     if rows and values.shape[1] != size:
         raise ValueError(f"{key} must have {size} numbers a row: got {values.shape[1]}")
     return values if rows else None
-
-
-def load_observer(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> ObserverProblem:
-    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
-    return read_file(ObserverProblem, name_or_path, settings)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal
@@ -11,7 +9,6 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from experiments.common.input_file import read_file
 from experiments.common.orbit_checks import check_angle, check_rate
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Positive
 from rendezvous.pareto import Component, Craft, Encounter, Meeting
@@ -101,8 +98,3 @@ class ParetoProblem:
         free = tuple(Component[name.upper()] for name in self.free)
         fixed = np.array(astuple(self.terminal))
         return Encounter(craft, self.duration_s, free, fixed, self.meet)
-
-
-def load_pareto(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> ParetoProblem:
-    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
-    return read_file(ParetoProblem, name_or_path, settings)

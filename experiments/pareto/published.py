@@ -11,8 +11,9 @@ from itertools import groupby
 import numpy as np
 
 from experiments.common.hill_axes import to_paper
+from experiments.common.input_file import read_file
 from experiments.common.printed_numbers import Paper, PrintedNumber, Progress, read_paper
-from experiments.pareto.file import load_pareto
+from experiments.pareto.file import ParetoProblem
 from infoset.arrays import Floats
 from rendezvous.pareto import EncounterSolution, Plan, solve_encounter
 from rendezvous.relative_motion import ClohessyWiltshire
@@ -29,7 +30,7 @@ _TIMES_S = (10.0, 20.0, 30.0)
 def compute(_progress: Progress) -> dict[str, Sequence[float]]:
     """Compute the numbers by source."""
     paper = read_paper("pareto")
-    encounter = load_pareto(PROBLEM, paper.options[STARTS]["settings"]).encounter
+    encounter = read_file(ParetoProblem, PROBLEM, paper.options[STARTS]["settings"]).encounter
     starts = np.array([to_paper(craft.state[3:]) for craft in encounter.craft])
     return {STARTS: starts.ravel().tolist(), **results(solve_encounter(encounter), paper)}
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from experiments.common.input_file import read_file
 from infoset.limits import Description, Name, NotNegative, Positive
 from rendezvous.pursuit_evasion import Game, Gravity, Player
 from rendezvous.two_body import OrbitalElements
@@ -83,8 +80,3 @@ class PursuitProblem:
         pursuer, evader = (craft.player(self.gravity.parameter_m3_s2) for craft in (self.pursuer, self.evader))
         longest_s = math.inf if self.longest_s is None else self.longest_s
         return Game(self.gravity, pursuer, evader, self.capture_radius_m, longest_s)
-
-
-def load_pursuit(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> PursuitProblem:
-    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
-    return read_file(PursuitProblem, name_or_path, settings)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
@@ -12,9 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from experiments.common.input_file import read_file
 from experiments.common.orbit_checks import check_angle, check_orbit
-from experiments.reachability.system_file import ReachableSystem
 from infoset.arrays import Floats
 from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive
 from rendezvous.reachability import (
@@ -261,13 +257,3 @@ class Rendezvous:
             offsets = np.hstack([offsets, np.where(times >= region.from_period, offsets_m, np.inf)])
             names += [name.format(row) for row in range(1, len(rows) + 1)]
         return normals, offsets, tuple(names)
-
-
-def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Rendezvous:
-    """Read a built-in problem or a problem file, as `experiments.common.input_file.read_file`."""
-    return read_file(Rendezvous, name_or_path, settings)
-
-
-def load_system(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> ReachableSystem:
-    """Read a built-in linear system or such a file, as `experiments.common.input_file.read_file`."""
-    return read_file(ReachableSystem, name_or_path, settings)

@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.common.hill_axes import from_paper, to_paper
+from experiments.common.input_file import read_file
 from experiments.common.printed_numbers import Ours, PrintedNumber, Progress, read_paper
-from experiments.reachability.file import Rendezvous, load_rendezvous
+from experiments.reachability.file import Rendezvous
 from experiments.reachability.report import Member
 from experiments.reachability.run import fly_members
 from infoset.arrays import Flags, Floats
@@ -67,7 +68,7 @@ def printed_tables() -> tuple[PrintedTable, ...]:
 
 def compute(progress: Progress) -> dict[str, Sequence[Ours]]:
     """Compute the numbers by source."""
-    rendezvous = load_rendezvous(PROBLEM)
+    rendezvous = read_file(Rendezvous, PROBLEM)
     problem, tables = rendezvous.problem, printed_tables()
     optimal = solve(problem).optimal
     progress(0.5)

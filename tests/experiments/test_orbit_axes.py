@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.common.hill_axes import from_paper, to_paper
-from experiments.reachability.file import load_rendezvous
+from experiments.common.input_file import load_problem
 from tests.experiments.command_line import Command
 
 
@@ -16,7 +16,7 @@ def test_the_papers_axes() -> None:
     assert from_paper([[-3.0, 7.0, 2.0], [3.0, 0.0, 0.0]]).tolist() == [[7.0, 3.0, 2.0], [0.0, -3.0, 0.0]]
     # The published initial state.
     printed = [2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0]
-    assert to_paper(load_rendezvous("rendezvous-2021").problem.initial).tolist() == printed
+    assert to_paper(load_problem("rendezvous-2021").problem.initial).tolist() == printed
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.common.input_file import load_problem
 from experiments.common.printed_numbers import (
     Comparison,
     Ours,
@@ -21,7 +22,6 @@ from experiments.common.printed_numbers import (
     last_digit,
     read_paper,
 )
-from experiments.pareto.file import load_pareto
 from experiments.pareto.published import PROBLEM, STARTS, results
 from experiments.reproduced_numbers import PAPERS, reproduce_paper
 from rendezvous.pareto import solve_encounter
@@ -107,7 +107,7 @@ def differences(velocities: np.ndarray, paper: Paper) -> np.ndarray:
         "orbit_rate_rad_s=0.00117689",
         *(f"craft.{index}.velocity_m_s={each.tolist()}" for index, each in enumerate(velocities, start=1)),
     ]
-    ours: dict[str, Sequence[float]] = results(solve_encounter(load_pareto(PROBLEM, settings).encounter), paper)
+    ours: dict[str, Sequence[float]] = results(solve_encounter(load_problem(PROBLEM, settings).encounter), paper)
     return np.array(
         [
             (value - number.value) / last_digit(number.printed)
@@ -120,16 +120,16 @@ def differences(velocities: np.ndarray, paper: Paper) -> np.ndarray:
 
 def test_the_start_velocities_of_the_encounter_are_the_least_squares_fit() -> None:
     paper = read_paper("pareto")
-    encounter = load_pareto(PROBLEM, paper.options[STARTS]["settings"]).encounter
+    encounter = load_problem(PROBLEM, paper.options[STARTS]["settings"]).encounter
     fitted = np.array([craft.state[3:] for craft in encounter.craft])
-    printed = np.array([craft.state[3:] for craft in load_pareto(PROBLEM).encounter.craft])
+    printed = np.array([craft.state[3:] for craft in load_problem(PROBLEM).encounter.craft])
     assert np.abs(fitted - printed).max() < 0.5e-4
     at, unit = differences(fitted, paper), 1e-4
     slopes = [differences(fitted + unit * step.reshape(3, 3), paper) - at for step in np.eye(9)]
     # A step of the Gauss-Newton method changes nothing, in units of the last printed digit.
     assert np.abs(np.linalg.lstsq(np.stack(slopes, axis=1), at, rcond=None)[0]).max() < 1e-5
     # The printed velocities alone do not give the last digits, but give the positions of the table to 4e-4 m.
-    rounded = results(solve_encounter(load_pareto(PROBLEM, ["orbit_rate_rad_s=0.00117689"]).encounter), paper)
+    rounded = results(solve_encounter(load_problem(PROBLEM, ["orbit_rate_rad_s=0.00117689"]).encounter), paper)
     for number, value in zip(paper.tables["table"], rounded["table"], strict=True):
         low, high = interval(number.printed, 0.5, 4e-4)
         assert number.corrected is not None or low <= value <= high, number.name

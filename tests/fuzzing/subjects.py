@@ -12,14 +12,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from experiments.common.built_in_files import SCENARIO, built_in_files
-from experiments.common.input_file import read_text, to_toml
+from experiments.common.input_file import load_problem, read_text, to_toml
 from experiments.interception import record_file
 from experiments.interception.scenario_file import load_scenario, scenario_warnings
-from experiments.multipoint.file import MultipointProblem, load_multipoint
-from experiments.observer.file import ObserverProblem, load_observer
-from experiments.pareto.file import ParetoProblem, load_pareto
-from experiments.pursuit.file import PursuitProblem, load_pursuit
-from experiments.reachability.file import Rendezvous, load_rendezvous, load_system
+from experiments.multipoint.file import MultipointProblem
+from experiments.observer.file import ObserverProblem
+from experiments.pareto.file import ParetoProblem
+from experiments.pursuit.file import PursuitProblem
+from experiments.reachability.file import Rendezvous
 from experiments.reachability.system_file import ReachableSystem
 from sim import Record, Scenario, fly_one
 from tests.records import first_steps
@@ -56,12 +56,12 @@ def text_files() -> Mapping[str, TextFile]:
     """Return the kinds of files that people write, by name."""
     readers: dict[str, tuple[type, Callable[[str], Any]]] = {
         SCENARIO: (Scenario, load_scenario),
-        "pareto-encounter": (ParetoProblem, load_pareto),
-        "multipoint": (MultipointProblem, load_multipoint),
-        "observer": (ObserverProblem, load_observer),
-        "pursuit-evasion": (PursuitProblem, load_pursuit),
-        "reachable-rendezvous": (Rendezvous, load_rendezvous),
-        "reachable-system": (ReachableSystem, load_system),
+        "pareto-encounter": (ParetoProblem, load_problem),
+        "multipoint": (MultipointProblem, load_problem),
+        "observer": (ObserverProblem, load_problem),
+        "pursuit-evasion": (PursuitProblem, load_problem),
+        "reachable-rendezvous": (Rendezvous, load_problem),
+        "reachable-system": (ReachableSystem, load_problem),
     }
     return {
         kind: TextFile(owner, tuple(each.text for each in built_in_files().values() if each.kind == kind), load)

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.common.input_file import changed, read_file, read_text
+from experiments.common.input_file import changed, load_problem, read_file, read_text
 from experiments.interception.scenario_file import load_scenario
-from experiments.pareto.file import load_pareto
 from sim import Scenario
 from tests.built_in import problem_text, scenario_text
 
@@ -168,13 +167,13 @@ def test_settings_are_in_any_unit_and_named_in_the_description() -> None:
 
 
 def test_tables_of_an_array_are_numbered_from_1() -> None:
-    problem = load_pareto("pareto-2008", ["craft.3.weight=2.5", "craft.1.position_m=[1, 2, 3]", "name=my meeting"])
+    problem = load_problem("pareto-2008", ["craft.3.weight=2.5", "craft.1.position_m=[1, 2, 3]", "name=my meeting"])
     assert [each.weight for each in problem.craft] == [1.0, 1.0, 2.5]
     assert problem.craft[0].position_m == (1.0, 2.0, 3.0)
     assert problem.name == "my meeting"
     for number in ("4", "0", "0000012", "\u00b2"):
         with pytest.raises(InputError, match=rf'has no key "craft\.{number}\.weight"'):
-            load_pareto("pareto-2008", [f"craft.{number}.weight=2.5"])
+            load_problem("pareto-2008", [f"craft.{number}.weight=2.5"])
 
 
 def test_changed_checks_as_a_file() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.multipoint.file import load_multipoint
+from experiments.common.input_file import load_problem
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 
@@ -108,7 +108,7 @@ def test_the_asteroid_tour(infoset: Command, mine: Callable[[str], Path]) -> Non
     results = found(infoset, "asteroid-tour")
     assert results["order"] == ["Itokawa", "Bennu", "Ryugu"]
     assert "inertial" in results["units"]
-    problem = load_multipoint("asteroid-tour")
+    problem = load_problem("asteroid-tour")
     assert problem.times_s is not None
     where = problem.tour.targets.states(np.arange(3), problem.times_s)
     for node, state in zip(results["nodes"], where, strict=True):

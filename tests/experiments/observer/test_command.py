@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from experiments.common.built_in_files import built_in_files
+from experiments.common.input_file import load_problem
 from experiments.observer.command import Errors
 from experiments.observer.data import simulate
-from experiments.observer.file import load_observer
 from tests.experiments.command_line import Command, strict
 
 PUBLISHED = json.loads((Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text())
@@ -147,7 +147,7 @@ def test_a_contradiction_is_reported(infoset: Command) -> None:
 
 @pytest.mark.parametrize("errors", list(Errors))
 def test_simulated_errors_are_within_their_bounds(errors: Errors) -> None:
-    problem = load_observer("vehicle")
+    problem = load_problem("vehicle")
     data = simulate(problem, errors, 5)
     assert data.states is not None
     off = np.abs(data.measured - data.states @ np.transpose(problem.system.C)).ravel()
@@ -166,7 +166,7 @@ def test_a_set_may_be_given_by_its_vertices(infoset: Command) -> None:
     one, other = (infoset.json("observe", name, "--data", "data.csv")["final"] for name in ("mine.toml", "vehicle"))
     np.testing.assert_allclose(one["lower"] + one["upper"], other["lower"] + other["upper"])
     for errors in Errors:
-        states = simulate(load_observer("mine.toml"), errors, 1).states
+        states = simulate(load_problem("mine.toml"), errors, 1).states
         assert states is not None
         assert (np.abs(states[0] - [0.0, 10.0]) <= 10.0).all()
 

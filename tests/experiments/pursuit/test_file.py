@@ -5,8 +5,8 @@ import re
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.common.input_file import read_text
-from experiments.pursuit.file import PursuitProblem, load_pursuit
+from experiments.common.input_file import load_problem, read_text
+from experiments.pursuit.file import PursuitProblem
 from experiments.pursuit.map import game_at
 from sim.storage.codec import fingerprint
 from tests.built_in import problem_text
@@ -21,17 +21,17 @@ def with_state(position: str = "[42000.0, 100.0, 0.0]", velocity: str = "[0.0, 3
 
 
 def test_the_slides_case_is_what_the_slides_say() -> None:
-    game = load_pursuit("geo-pursuit").game
+    game = load_problem("geo-pursuit").game
     assert (game.pursuer.thrust_n, game.evader.thrust_n) == (20.0, 10.0)
     assert (game.pursuer.mass_kg, game.pursuer.specific_impulse_s) == (2000.0, 350.0)
     assert game.distance_m == pytest.approx(6621.8e3, rel=1e-5)
 
 
 def test_values_can_be_set() -> None:
-    changed = load_pursuit("geo-pursuit", ["evader.thrust_N=5", "capture_radius_m = 1e4"])
+    changed = load_problem("geo-pursuit", ["evader.thrust_N=5", "capture_radius_m = 1e4"])
     assert changed.game.evader.thrust_n == 5.0
     assert changed.game.capture_radius_m == 10e3
-    assert fingerprint(changed) != fingerprint(load_pursuit("geo-pursuit"))
+    assert fingerprint(changed) != fingerprint(load_problem("geo-pursuit"))
 
 
 def test_a_player_may_be_given_by_a_state() -> None:
@@ -66,7 +66,7 @@ def test_what_is_no_game_is_refused(text: str, line: str) -> None:
 
 
 def test_what_maps_vary() -> None:
-    problem = load_pursuit("geo-pursuit")
+    problem = load_problem("geo-pursuit")
     assert game_at(problem, {"thrust_ratio": 0.9}).evader.thrust_n == pytest.approx(18.0)
     assert game_at(problem, {"evader.mass_kg": 1800.0}).evader.mass_kg == 1800.0
     assert game_at(problem, {"capture_radius_km": 5.0}).capture_radius_m == 5e3

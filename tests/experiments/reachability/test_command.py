@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.common.input_file import read_text
+from experiments.common.input_file import load_problem, read_text
 from experiments.reachability.command import Reach
-from experiments.reachability.file import Rendezvous, load_rendezvous
+from experiments.reachability.file import Rendezvous
 from experiments.reachability.run import COMMAND
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
@@ -114,7 +114,7 @@ def test_the_published_problem_with_less_thrust(infoset: Command) -> None:
 
 @pytest.mark.thorough
 def test_the_cone_is_inside_its_angle_and_kept() -> None:
-    given = load_rendezvous("approach-cone")
+    given = load_problem("approach-cone")
     problem = given.problem
     assert problem.normals is not None
     assert problem.offsets is not None

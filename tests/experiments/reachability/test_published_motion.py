@@ -15,14 +15,14 @@ from scipy.optimize import linprog
 
 from benchmarks import published_radius
 from experiments.common.hill_axes import from_paper, to_paper
+from experiments.common.input_file import load_problem
 from experiments.common.printed_numbers import Comparison, Verdict, read_paper
-from experiments.reachability.file import load_rendezvous
 from experiments.reachability.published import PROBLEM, printed_tables, published_motion
 from experiments.reproduced_numbers import reproduce_paper
 from infoset.arrays import Floats
 from rendezvous.reachability import minimum_energy, solve
 
-RENDEZVOUS = load_rendezvous(PROBLEM)
+RENDEZVOUS = load_problem(PROBLEM)
 TABLES = printed_tables()
 START = np.array([2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0])
 PERIOD_S, PUSH_M_S2, RADIUS_M = 180.0, 0.15, 90e3

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.reachability.file import load_rendezvous
+from experiments.common.input_file import load_problem
 from rendezvous.reachability import (
     EmptyTubeError,
     ReachabilityProblem,
@@ -64,7 +64,7 @@ def assert_precise(problem: ReachabilityProblem, miss: float) -> bool:
 
 @pytest.mark.parametrize("name", ["near_0.172", "near_0.1726", "s2_1_193", "s2_2_133", "s2_2_26", "s2_2_68"])
 def test_misses_that_were_wrong_or_refused(name: str) -> None:
-    problem = load_rendezvous(CASES / f"{name}.toml").problem
+    problem = load_problem(CASES / f"{name}.toml").problem
     miss = solve(problem).optimal.miss
     if problem.periods <= 4:
         assert assert_precise(problem, miss)
@@ -74,7 +74,7 @@ def test_misses_that_were_wrong_or_refused(name: str) -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["s2_2_26", "s2_2_68"])
 def test_misses_with_thrust_in_a_ball_to_forty_digits(name: str) -> None:
-    problem = load_rendezvous(CASES / f"{name}.toml").problem
+    problem = load_problem(CASES / f"{name}.toml").problem
     assert assert_precise(problem, solve(problem).optimal.miss)
 
 

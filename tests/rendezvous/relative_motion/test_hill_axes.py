@@ -7,9 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from experiments.multipoint.file import load_multipoint
-from experiments.pareto.file import load_pareto
-from experiments.reachability.file import load_rendezvous
+from experiments.common.input_file import load_problem
 from rendezvous.multipoint import Tour
 from rendezvous.pursuit_evasion import orbital_axes
 from rendezvous.reachability import NonlinearMotion
@@ -104,9 +102,9 @@ def test_the_nonlinear_motion_is_two_body_motion(eccentricity: float, anomaly: f
 def test_the_problems_of_three_commands_are_in_these_axes() -> None:
     # Each built-in problem's own motion moves the same state as two-body motion about its reference orbit.
     cone, encounter, tour = (
-        load_rendezvous("approach-cone"),
-        load_pareto("pareto-2008"),
-        load_multipoint("service-2").tour,
+        load_problem("approach-cone"),
+        load_problem("pareto-2008"),
+        load_problem("service-2").tour,
     )
     assert isinstance(tour, Tour)
     small = np.array([40.0, -60.0, 30.0, 0.03, 0.02, -0.01])
