@@ -121,7 +121,7 @@ def _row(each: Comparison, notes: Sequence[str]) -> tuple[str, ...]:
     number, ours = each.number, each.ours
     verdict = each.verdict.value
     if ours.spread is not None:
-        verdict += f", 90 % of ours: {ours.spread[0]:.3g} to {ours.spread[1]:.3g}"
+        verdict += f", most of ours: {ours.spread[0]:.3g} to {ours.spread[1]:.3g}"
     if number.corrected not in {None, number.printed}:
         verdict += f", right: {number.corrected}"
     if number.note:

@@ -25,6 +25,8 @@ class Verdict(Enum):
 
     AGREED = "agreed"
     """Ours is the printed number, to the last digit."""
+    POSSIBLE = "possible"
+    """The printed number is that of one run, and runs of ours have it; their interval is too wide to confirm it."""
     MISPRINT = "misprint"
     """The correct number is known, and it is ours, or that of the other model if there is one."""
     EXPLAINED = "explained by another model"
@@ -87,7 +89,7 @@ class Ours:
         Added to the tolerance, for the rounding of the inputs of the computation.
     spread : (float, float) or None
         Interval of most of our values, if ours is the median of many runs and the printed number is one run. The
-        printed number must then lie in this interval.
+        printed number must then lie in this interval, which confirms it if its ends differ by less than a factor of 2.
     """
 
     value: float
@@ -122,8 +124,9 @@ class Comparison:
                 if _within(ours.value if ours.other is None else ours.other, right)
                 else Verdict.DISAGREED
             )
+        low, high = self.band
         if _within(ours.value if ours.spread is None else number.value, self.band):
-            return Verdict.AGREED
+            return Verdict.AGREED if ours.spread is None or high < 2.0 * low else Verdict.POSSIBLE
         if ours.other is not None and _within(ours.other, self.band):
             return Verdict.EXPLAINED
         known = _within(ours.value, interval(number.printed, number.unexplained))

@@ -79,7 +79,7 @@ def draw_all(report: Report) -> Iterator[Figure]:
 @style()
 def draw_space(report: Report, first: int) -> Figure:
     """Draw three of the six states in space: positions (0) or velocities (3)."""
-    figure = new_figure(130.0)
+    figure = new_figure(145.0)
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
     _draw_motion(axes, report, list(range(first, first + 3)), _MAX_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE)
     axes.view_init(elev=22.0, azim=-58.0)
