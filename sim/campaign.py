@@ -7,7 +7,7 @@ import hashlib
 import math
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from guidance import NoiseSource, Strategy
@@ -87,8 +87,7 @@ class Campaign:
             if name != "chunk" or self.chunk is not None:
                 limits.need(name, getattr(self, name))
         if self._own_noise is not None and not (hasattr(self.noise, "measure") or callable(self.noise)):
-            choices = ", ".join(map(str, CampaignNoise))
-            raise TypeError(f"noise must be None, one of {choices}, or have the method measure: got {self.noise!r}")
+            raise TypeError(f"noise must be None, a CampaignNoise, or have the method measure: got {self.noise!r}")
         if len(self.cells) != (math.prod(len(axis.values) for axis in self.axes) if self.axes else 0):
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
         if self.max_runs is not None:
@@ -101,6 +100,7 @@ class Campaign:
         workers: int | None = None,
         resume: bool = False,
         progress: Callable[[float], None] | None = None,
+        within_chunks: bool = False,
     ) -> CampaignFolder:
         """Simulate the engagements that are not stored yet.
 
@@ -116,6 +116,8 @@ class Campaign:
             Whether the folder may contain this campaign already. The number of runs may be greater than before.
         progress : callable or None
             Called after each chunk with the fraction done, from 0 to 1; with `until`, of the maximum number of runs.
+        within_chunks : bool
+            Whether threads call `progress` after each step of a chunk, too.
 
         Returns
         -------
@@ -133,7 +135,8 @@ class Campaign:
             If results are not finite.
         """
         with CampaignFolder.begin(Path(self.folder), self.manifest(), resume=resume) as folder:
-            self._simulate_missing(folder, executor, workers, progress)
+            within = within_chunks and executor is None
+            self._simulate_missing(folder, executor, workers, progress, within)
         return folder
 
     def manifest(self) -> Manifest:
@@ -196,16 +199,31 @@ class Campaign:
         executor: Executor | None,
         workers: int | None,
         progress: Callable[[float], None] | None,
+        within_chunks: bool,
     ) -> None:
         done, total = folder.finished_runs, folder.wanted_runs
         is_stopped = bool(folder.manifest.cell_runs)
         cells = None if self.until is None or is_stopped else UndecidedCells(folder, self.until, self.runs)
         missing = (chunk for chunk in folder.manifest.chunks() if not folder.has(*chunk))
-        tasks = (self._task(cell, runs) for cell, runs in (missing if cells is None else cells.missing()))
+        running: dict[tuple[int, int], float] = {}
+
+        def task_of(cell: int, runs: range) -> Task:
+            task = self._task(cell, runs)
+            if progress is None or not within_chunks:
+                return task
+
+            def report(share: float) -> None:
+                running[cell, runs.start] = share * len(runs)
+                progress(min(1.0, (done + sum([*running.values()])) / total))
+
+            return replace(task, progress=report)
+
+        tasks = (task_of(cell, runs) for cell, runs in (missing if cells is None else cells.missing()))
         with contextlib.closing(simulate_tasks(tasks, executor, workers)) as finished:
             for task, results in finished:
                 (folder.write if cells is None else cells.store)(task.cell, task.runs, results)
                 done += len(task.runs)
+                running.pop((task.cell, task.runs[0]), None)
                 if progress is not None:
                     progress(done / total)
         if cells is not None and cells.runs:

@@ -18,6 +18,8 @@ ENGAGEMENTS_AT_ONCE = 200
 SECTIONS_AT_ONCE = 6000
 STEPS_AT_ONCE = 500_000
 """Maximum number of engagements of a batch times their steps; each takes about 600 bytes."""
+FLIGHT_SHARE = 0.75
+"""Share of the steps in the time of a batch; afterwards margins and bounds are computed from the whole history."""
 
 
 def simulate(
@@ -87,7 +89,7 @@ def simulate(
         while flight.flying:
             flight.advance(observe_batch)
             if progress is not None:
-                progress((first + chunk.size * min(1.0, flight.step / steps)) / numbers.size)
+                progress((first + FLIGHT_SHARE * chunk.size * min(1.0, flight.step / steps)) / numbers.size)
         parts.append(flight.results(chunk))
         if progress is not None:
             progress((first + chunk.size) / numbers.size)

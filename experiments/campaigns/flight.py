@@ -65,7 +65,9 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
         progress_bar(options.quiet) as begin,
     ):
         began_s = time.perf_counter()
-        folder = campaign.run(executor, workers=workers, resume=options.resume, progress=begin("campaign"))
+        folder = campaign.run(
+            executor, workers=workers, resume=options.resume, progress=begin("campaign"), within_chunks=True
+        )
     return Flown(folder, warnings, time.perf_counter() - began_s)
 
 

@@ -21,6 +21,8 @@ Part = str | Text | Table
 """A line or a table of a result on the screen."""
 LINE_EVERY_S = 30.0
 """Time between two lines of progress in a log."""
+LONG_S, ESTIMATE_AFTER_S = 10.0, 2.0
+"""Time from which a command is long and its estimate is printed, and the time from which the rate is taken."""
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
@@ -70,7 +72,7 @@ def number_table(*titles: str, left: int = 1) -> Table:
 
 @contextlib.contextmanager
 def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
-    """Show progress on stderr: bars on a terminal, otherwise a line every `LINE_EVERY_S`.
+    """Show progress on stderr: bars on a terminal, otherwise a line every `LINE_EVERY_S`; and the estimated time.
 
     The context is a function that starts a bar with a title, and returns a function that sets the fraction done.
     """
@@ -78,28 +80,83 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
         yield lambda _name: lambda _done: None
         return
     if not sys.stderr.isatty():
-        yield _progress_lines
+        estimate = _Estimate(lambda line: say(line, quiet=False))
+        yield lambda name: _progress_lines(name, estimate)
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        estimate = _Estimate(progress.console.print)
 
         def begin(name: str) -> Callable[[float], None]:
-            task = progress.add_task(name, total=1.0)
-            return lambda done: progress.update(task, completed=done)
+            task, part = progress.add_task(name, total=1.0), estimate.begin()
+
+            def update(done: float) -> None:
+                progress.update(task, completed=done)
+                estimate.update(part, done)
+
+            return update
 
         yield begin
 
 
-def _progress_lines(name: str) -> Callable[[float], None]:
-    last_s = time.monotonic()
+class _Estimate:
+    """The time that all bars together take, from the rate of their first seconds: told once if it is long.
+
+    The time before the first report, in which kernels are loaded or compiled, is not part of the rate.
+    """
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
+        self._done: dict[object, float] = {}
+        self._first: tuple[float, float] | None = None
+        self._is_told = False
+
+    def begin(self) -> object:
+        """Return the key of another bar; the first one after finished bars begins a new estimate."""
+        if all(done >= 1.0 for done in self._done.values()):
+            self._done.clear()
+            self._first, self._is_told = None, False
+        part = object()
+        self._done[part] = 0.0
+        return part
+
+    def update(self, part: object, done: float) -> float | None:
+        """Set the fraction done of a bar; return the time left, s, or None if it is not known yet."""
+        now_s, self._done[part] = time.monotonic(), done
+        share = sum(self._done.values()) / len(self._done)
+        if self._first is None:
+            self._first = now_s, share
+        first_s, first_share = self._first
+        if share <= first_share or now_s < first_s + ESTIMATE_AFTER_S:
+            return None
+        left_s = (1.0 - share) * (now_s - first_s) / (share - first_share)
+        if not self._is_told:
+            self._is_told = True
+            if now_s - first_s + left_s > LONG_S:
+                self._tell(f"estimated time: {time_text(now_s - first_s + left_s)}")
+        return left_s
+
+
+def _progress_lines(name: str, estimate: _Estimate) -> Callable[[float], None]:
+    part, last_s = estimate.begin(), time.monotonic()
 
     def progress(done: float) -> None:
         nonlocal last_s
+        left_s = estimate.update(part, done)
         if time.monotonic() - last_s >= LINE_EVERY_S:
             last_s = time.monotonic()
-            say(f"{name}: {100.0 * done:.0f} %", quiet=False)
+            left = "" if left_s is None else f", {time_text(left_s)} left"
+            say(f"{name}: {100.0 * done:.0f} %{left}", quiet=False)
 
     return progress
+
+
+def time_text(seconds: float) -> str:
+    """Return a time in seconds, or from two of them on in minutes or hours."""
+    for unit_s, unit in ((3600.0, "h"), (60.0, "min")):
+        if seconds >= 2.0 * unit_s:
+            return f"{seconds / unit_s:.3g} {unit}"
+    return f"{seconds:.0f} s"
 
 
 def number(value: float | None) -> str:

@@ -316,6 +316,37 @@ def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str], monkeyp
     assert capsys.readouterr().err == "patient: 50 %\n"
 
 
+def test_a_long_command_says_its_time_once_and_the_time_left(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 0.0
+    monkeypatch.setattr("time.monotonic", lambda: now_s)
+    with screen.progress_bar(quiet=False) as begin:
+        one, two = begin("one"), begin("two")
+        now_s = 50.0  # kernels are compiled before the first report
+        one(0.01)
+        now_s = 51.0
+        one(0.03)
+        assert "estimated" not in capsys.readouterr().err
+        now_s = 53.0
+        one(0.13)  # of both bars 6 % in 3 s, after the first half per cent
+        assert capsys.readouterr().err == "estimated time: 50 s\n"
+        now_s = 90.0
+        two(0.4)
+    assert capsys.readouterr().err == "two: 40 %, 113 s left\n"
+
+
+def test_a_short_command_says_no_time(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+    monkeypatch.setattr("time.monotonic", lambda: now_s)
+    with screen.progress_bar(quiet=False) as begin:
+        report = begin("one")
+        for second in range(10):
+            now_s = float(second)
+            report(0.11 * second)
+    assert capsys.readouterr().err == ""
+
+
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device", "k.nbi"), MemoryError("Unable to allocate")])
 def test_errors_of_the_system_are_messages(error: Exception, infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:

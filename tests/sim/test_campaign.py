@@ -398,7 +398,7 @@ def test_numbers_that_make_no_campaign(brief: Scenario, tmp_path: Path) -> None:
     for name, value in {"runs": 0, "seed": -1, "chunk": 0}.items():
         with pytest.raises(ValueError, match=f"{name} must be at least"):
             replace(mixed(brief, tmp_path), **{name: value})  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="noise must be None or one of CampaignNoise"):
+    with pytest.raises(TypeError, match="noise must be None, a CampaignNoise, or have the method measure"):
         Campaign(brief, 4, tmp_path, noise="foo")  # type: ignore[arg-type]
     batch = ENGAGEMENTS_AT_ONCE
     sizes = [mixed(brief, tmp_path, runs, None).manifest().chunk for runs in (1, 256 * batch, 256 * batch + 1, 10**9)]
