@@ -16,7 +16,7 @@ OfTime = Callable[[Floats], Floats]
 
 NODES = 8
 AGREEMENT = 2e-13
-ROUNDING = 1e-10
+ROUNDING = 1e-8
 MAX_PANELS = 4096
 MAX_BREAKS = 200_000
 
@@ -28,23 +28,20 @@ class _Solution(Segment):
     held: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class TimeVaryingMotion(LinearMotion):
-    """x' = A(t) x + B u; `matrix_at` returns A of times of shape (k,), s: shape (k, 6, 6).
+class CollocatedMotion(LinearMotion):
+    """A linear motion whose A(t) is known.
 
-    Notes
-    -----
     The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
     = Psi(t)' at the nodes gives the Gramian and the held control as sums of positive weights. Panels are doubled until
     two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
     """
 
-    matrix_at: OfTime
+    def _clock(self, start_s: Floats, end_s: Floats, position: Floats) -> tuple[Floats, Floats]:
+        """Return times from the end (position 0) to the start (1) of n intervals, and by how much time falls with it.
 
-    def dynamics(self, time_s: ArrayLike) -> Floats:
-        """A(t), shape (..., 6, 6)."""
-        times = np.asarray(time_s, dtype=np.float64)
-        return np.asarray(self.matrix_at(times.ravel()), dtype=np.float64).reshape(*times.shape, 6, 6)
+        `start_s` and `end_s` have shape (n, 1, 1); the results have that of the `position` after it, (n, p, k).
+        """
+        return end_s - (end_s - start_s) * position, (end_s - start_s) * np.ones_like(position)
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
@@ -64,6 +61,23 @@ class TimeVaryingMotion(LinearMotion):
         """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
         checked_durations(start_s, end_s)
         return self._solved(start_s, end_s).held
+
+    def _solved(self, start_s: ArrayLike, end_s: ArrayLike) -> _Solution:
+        starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
+        solution, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
+        return _Solution(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
+
+
+@dataclass(frozen=True, eq=False)
+class TimeVaryingMotion(CollocatedMotion):
+    """x' = A(t) x + B u; `matrix_at` returns A of times of shape (k,), s: shape (k, 6, 6)."""
+
+    matrix_at: OfTime
+
+    def dynamics(self, time_s: ArrayLike) -> Floats:
+        """A(t), shape (..., 6, 6)."""
+        times = np.asarray(time_s, dtype=np.float64)
+        return np.asarray(self.matrix_at(times.ravel()), dtype=np.float64).reshape(*times.shape, 6, 6)
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
@@ -88,13 +102,8 @@ class TimeVaryingMotion(LinearMotion):
             starts, ends = np.concatenate([starts[long], middles]), np.concatenate([middles, ends[long]])
         return np.unique(np.concatenate(settled))
 
-    def _solved(self, start_s: ArrayLike, end_s: ArrayLike) -> _Solution:
-        starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
-        solution, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
-        return _Solution(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
 
-
-def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Solution:
+def _refined(motion: CollocatedMotion, starts: Floats, ends: Floats) -> _Solution:
     """Double the panels until two solutions agree, or differ by rounding only; many intervals in parts."""
     panels = _first_panels(motion, starts, ends)
     if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
@@ -114,12 +123,12 @@ def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Soluti
     raise ValueError(f"A(t) changes too fast: {MAX_PANELS} panels an interval do not agree to {AGREEMENT:g}")
 
 
-def _first_panels(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> int:
+def _first_panels(motion: CollocatedMotion, starts: Floats, ends: Floats) -> int:
     """One panel for each radian of the fastest motion at the ends and the middle."""
     if not len(starts):
         return 1
-    matrices = motion.dynamics(np.stack([starts, 0.5 * (starts + ends), ends]))
-    radians = float((_rates(matrices) * np.abs(ends - starts)).max())
+    times, speeds = motion._clock(starts[:, None, None], ends[:, None, None], np.array([[0.0, 0.5, 1.0]]))
+    radians = float((_rates(motion.dynamics(times)) * np.abs(speeds)).max())
     return int(np.clip(np.ceil(radians), 1, MAX_PANELS // 4))
 
 
@@ -141,16 +150,17 @@ def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
     return 0.5 * (nodes + 1.0), 0.5 * weights, 0.5 * integrals @ np.linalg.inv(values)
 
 
-def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels: int) -> _Solution:
-    """Solve on equal panels; s = end - t runs backwards, and states are divided by (T, T, T, 1, 1, 1)."""
+def _collocated(motion: CollocatedMotion, starts: Floats, ends: Floats, panels: int) -> _Solution:
+    """Solve on equal panels of the clock, which runs backwards; states are divided by (T, T, T, 1, 1, 1)."""
     nodes, weights, integrals = _gauss_collocation()
     durations = ends - starts
-    width = durations / panels
     positions = (np.arange(panels)[:, None] + nodes) / panels
-    times = ends[:, None, None] - durations[:, None, None] * positions
+    times, speeds = motion._clock(starts[:, None, None], ends[:, None, None], positions)
+    steps = speeds / panels
+    spans = weights * steps
     scale = state_scales(durations)
     ratio = (scale[:, None, :] / scale[:, :, None])[:, None, None]
-    adjoint = np.swapaxes(motion.dynamics(times) * ratio, -1, -2) * width[:, None, None, None, None]
+    adjoint = np.swapaxes(motion.dynamics(times) * ratio, -1, -2) * steps[..., None, None]
     # (1 - h a_jk A_k') Psi_k = 1, for the 8 nodes of each panel at once.
     system = -np.einsum("jk,npkab->npjakb", integrals, adjoint).reshape(len(durations), panels, 6 * NODES, 6 * NODES)
     system[..., np.arange(6 * NODES), np.arange(6 * NODES)] += 1.0
@@ -162,14 +172,14 @@ def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels:
     gramian, held = np.zeros((len(durations), 6, 6)), np.zeros((len(durations), 6, 3))
     for panel in range(panels):
         turned = power[:, None] @ effect[:, panel]
-        gramian = gramian + np.einsum("k,nkai,nkbi->nab", weights, turned, turned)
-        held = held + np.einsum("k,nkai->nai", weights, turned)
+        gramian = gramian + np.einsum("nk,nkai,nkbi->nab", spans[:, panel], turned, turned)
+        held = held + np.einsum("nk,nkai->nai", spans[:, panel], turned)
         power = power @ np.swapaxes(last[:, panel], -1, -2)
     outer = scale[:, :, None] * scale[:, None, :]
     return _Solution(
         power * (scale[:, :, None] / scale[:, None, :]),
-        gramian * outer * width[:, None, None],
-        held * scale[:, :, None] * width[:, None, None],
+        gramian * outer,
+        held * scale[:, :, None],
     )
 
 
