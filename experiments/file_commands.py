@@ -14,6 +14,14 @@ from experiments.common.options import AsJson, Overwrite, Quiet
 BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
 FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
 Like = Annotated[str, typer.Option("--like", metavar="NAME", help="The built-in file to copy.")]
+LikeScenario = Annotated[
+    str, typer.Option("--like", metavar="NAME", help="The scenario whose sensors, engine and body it takes.")
+]
+Sigmas = Annotated[
+    float,
+    typer.Option("--sigma", min=0.1, max=10.0, help="Standard deviations that uncertainty and dispersion contain."),
+]
+Out = Annotated[Path, typer.Option("--out", metavar="FILE", help="The scenario file to write; - is stdout.")]
 NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
 
 
@@ -44,15 +52,13 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
         help=f"Copy a built-in {noun} file, to be changed.", epilog=f"Example: {name} new mine.toml --like {example}"
     )
     def new(file: NewFile, like: Like = example, overwrite: Overwrite = False, quiet: Quiet = False) -> None:
-        from experiments.common.output import STDOUT, write_file
-
-        text = built_in(like, kinds).text
-        if str(file) == STDOUT:
-            typer.echo(text, nl=False)
-            return
-        write_file(file, text, overwrite=overwrite)
-        if not quiet:
-            typer.echo(f"wrote {file}, a copy of {like}; change it, then: {name} check {file}", err=True)
+        _write(
+            file,
+            built_in(like, kinds).text,
+            f"a copy of {like}; change it, then: {name} check {file}",
+            overwrite,
+            quiet,
+        )
 
     @app.command(
         help=f"Check a {noun} file. The exit code is 2 if it has errors; all are listed.",
@@ -62,6 +68,18 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
         _print_check(file, kinds, json, quiet)
 
     return app
+
+
+def _write(file: Path, text: str, note: str, overwrite: bool, quiet: bool) -> None:
+    """Write a new file, and print a note about it on stderr; - is stdout."""
+    from experiments.common.output import STDOUT, write_file
+
+    if str(file) == STDOUT:
+        typer.echo(text, nl=False)
+        return
+    write_file(file, text, overwrite=overwrite)
+    if not quiet:
+        typer.echo(f"wrote {file}, {note}", err=True)
 
 
 def _print_list(files: Sequence[BuiltIn]) -> None:
@@ -97,4 +115,27 @@ def _print_check(file: str, kinds: Sequence[str], json: bool, quiet: bool) -> No
 
 
 scenarios = _commands(SCENARIO, "A scenario is an interception.", "own-scenario")
-problems = _commands("problem", "A problem is one of rendezvous, pursuit or estimation.", "service-2")
+
+
+@scenarios.command("from-states", epilog="Example: infoset scenarios from-states two-states --sigma 3 --out mine.toml")
+def from_states(
+    file: FileName,
+    out: Out,
+    like: LikeScenario = "dart-2022",
+    sigma: Sigmas = 3.0,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make a scenario from the states of a spacecraft and an object, and their covariance."""
+    from experiments.common.screen import say_warnings
+    from experiments.interception.scenario_file import load_scenario, scenario_warnings
+    from experiments.interception.trajectory_file import scenario_of
+
+    model = load_scenario(like)
+    scenario, text = scenario_of(file, model, sigma)
+    note = f"with the sensors and the engine of {model.name}; change them, then: infoset scenarios check {out}"
+    _write(out, text, note, overwrite, quiet)
+    say_warnings(scenario_warnings(scenario), quiet)
+
+
+problems = _commands("problem", "A problem is one of rendezvous, pursuit or estimation, or a trajectory.", "service-2")

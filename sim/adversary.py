@@ -225,7 +225,7 @@ class _Search:
     def __init__(
         self, scenario: Scenario, strategy: Strategy | None, objective: Objective, seed: int, keep_set: bool
     ) -> None:
-        self.scenario = replace(scenario, dispersion=scenario.set_model.bounds)
+        self.scenario = replace(scenario, dispersion=scenario.set_model.bounds, covariance=None)
         self.evaluations = self.sets_emptied = 0
         self.history: list[tuple[int, float]] = []
         self._objective, self._seed, self._keep_set = objective, seed, keep_set

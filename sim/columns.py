@@ -78,10 +78,12 @@ def columns_with_values(owner: Any) -> tuple[Column, ...]:
 def values_of(owner: object, column: Column) -> list[Any]:
     """Return one column as plain Python values, one per run: texts for an enumeration, None if unknown."""
     values: Any = getattr(owner, column.field)
+    if values is None:
+        return [None] * len(cast("Any", owner))
     if isinstance(values, tuple):
         return [None if value is None else value.value for value in values]
     if column.component is not None:
-        if -column.component > values.shape[1]:  # in a plane nothing is along y
+        if -column.component > values.shape[1]:  # in a plane nothing is along y, and there is no B-plane
             return [None] * len(values)
         values = values[:, column.component]
     plain: list[Any] = values.tolist()

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance import NoiseKind, TieRule
-from infoset import StateBox
-from infoset.arrays import Floats
+from infoset.arrays import Floats, Integers
+from sim.covariance import Covariance
 from sim.gravity import max_impulses_m_s, with_gravity
-from sim.scenario import Scenario
+from sim.scenario import Scenario, corners
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
 """Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""
@@ -40,6 +40,8 @@ class Draws:
         Constant errors of the centroid of a camera in units of their bound; None for a camera with random errors.
     images : ndarray, shape (B, steps), or None
         Uniform in [0, 1); an image is lost if its number is less than the probability of that. None loses no image.
+    redraws : ndarray of int, shape (B,), or None
+        Normal starts outside the dispersion that were drawn again; None for uniform starts.
     """
 
     position_m: Floats
@@ -51,6 +53,7 @@ class Draws:
     pointing: Floats | None = None
     bias: Floats | None = None
     images: Floats | None = None
+    redraws: Integers | None = None
 
     @property
     def steps(self) -> int:
@@ -62,12 +65,17 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     """Return the random numbers of some runs; run k has the same numbers in every call with the same seed."""
     steps = max_number_of_steps(scenario)
     lower, upper = corners(scenario.dispersion)
-    axes = scenario.set_model.axes
-    starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
-    if "y" in axes:
-        along_y = np.stack([generator(seed, run, START + Y).uniform(size=2) for run in runs])
-        starts = np.insert(starts, [0, 2], along_y, axis=1)
-    position_m, velocity_m_s = np.split(lower + (upper - lower) * starts, 2, axis=1)
+    axes, redraws = scenario.set_model.axes, None
+    if scenario.covariance is None:
+        starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
+        if "y" in axes:
+            along_y = np.stack([generator(seed, run, START + Y).uniform(size=2) for run in runs])
+            starts = np.insert(starts, [0, 2], along_y, axis=1)
+        starts = lower + (upper - lower) * starts
+    else:
+        of_run = [_normal_start(lower, upper, scenario.covariance, generator(seed, run, START)) for run in runs]
+        starts, redraws = np.stack([start for start, _ in of_run]), np.array([count for _, count in of_run])
+    position_m, velocity_m_s = np.split(starts, 2, axis=1)
 
     def uniform(stream: int, size: int = steps) -> Floats:
         return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=size) for run in runs])
@@ -95,16 +103,20 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
             if camera.miss_probability > 0.0
             else None
         ),
+        redraws=redraws,
     )
 
 
-def corners(box: StateBox) -> tuple[Floats, Floats]:
-    """Return minimum and maximum (z, x, V_z, V_x) of a box, or (y, z, x, V_y, V_z, V_x) of one in space."""
-    lateral = [box.axis(name) for name in box.axes]
-    intervals = np.array(
-        [*(axis.z_m for axis in lateral), box.x_m, *(axis.vz_m_s for axis in lateral), box.vx_m_s], dtype=np.float64
-    )
-    return intervals[:, 0], intervals[:, 1]
+def _normal_start(
+    lower: Floats, upper: Floats, covariance: Covariance, random: np.random.Generator
+) -> tuple[Floats, int]:
+    """Return a normal start around the middle of a box that is within it, and how many starts before it were not."""
+    redraws = 0
+    while True:
+        start = 0.5 * (lower + upper) + (covariance.root * random.standard_normal(covariance.size)).sum(axis=1)
+        if ((lower <= start) & (start <= upper)).all():
+            return start, redraws
+        redraws += 1
 
 
 def generator(seed: int, run: int, stream: int) -> np.random.Generator:

@@ -388,7 +388,9 @@ class Engagements:
             velocity_m_s=self._draws.velocity_m_s,
             lateral_miss_m=lateral.T,
             guarantees=self._model.is_guaranteed,
+            redraws=self._draws.redraws,
             burns_m_s=self._burns_m_s if self._number_of_burn else None,
+            b_plane_t_rad=self.scenario.b_plane_t_rad,
         )
 
 

@@ -70,8 +70,8 @@ class KeplerMotion:
     """Motion of the object relative to the spacecraft, both in the Sun's gravity, or in free space without a `sun`.
 
     `position_m` and `velocity_m_s` are the relative position and velocity at t = 0, shape (B, C + 1), along the lateral
-    axes, z in a plane, y and z in space, and x. The spacecraft's orbit is circular at t = 0, in the plane of the Sun
-    and the x axis and toward +x; it gives the position of the Sun. Impulses change it.
+    axes, z in a plane, y and z in space, and x. The spacecraft's orbit gives the position of the Sun: circular at
+    t = 0, in the plane of the Sun and the x axis and toward +x, unless `sun` has its velocity. Impulses change it.
 
     The motion is integrated in leaps of order four (`leap`) on the exact difference of the two accelerations. The error
     of the position at arrival is below 1 mm, or 1e-9 of the miss if that is greater.
@@ -174,12 +174,15 @@ class KeplerMotion:
 
 
 def sun_and_orbit(sun: Sun) -> tuple[Floats, Floats]:
-    """Return the directions (y, z, x) of the Sun and of the spacecraft's velocity in its orbit.
+    """Return (y, z, x) of the Sun's direction, and of the spacecraft's velocity in units of that of a circular orbit.
 
-    The second one is the part of +x across the first, or along z if the Sun is on the x axis.
+    Without a velocity in `sun` the second is a direction: the part of +x across the first, or z if the Sun is on x.
     """
     level = np.cos(sun.elevation_rad)
     y, z, x = np.sin(sun.elevation_rad), level * np.sin(sun.direction_rad), level * np.cos(sun.direction_rad)
+    if sun.spacecraft_velocity_m_s is not None:
+        velocity = np.array([0.0, *sun.spacecraft_velocity_m_s])[-3:]
+        return np.array([y, z, x]), velocity / np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
     across = np.hypot(y, z)
     along = np.array([-x * (y / across), -x * (z / across), across]) if across > 0.0 else np.array([0.0, x, 0.0])
     return np.array([y, z, x]), along

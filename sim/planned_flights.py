@@ -14,8 +14,7 @@ from guidance.scripted_noise import errors_made, measure_with_errors
 from infoset import InformationSetView
 from infoset.arrays import Flags, Floats, Integers
 from infoset.sensors import Measurements, Sensor
-from sim.draws import corners
-from sim.scenario import Manoeuvre, Scenario
+from sim.scenario import Manoeuvre, Scenario, corners
 from sim.target import amplitudes_m_s2
 
 ROWS = ("angle", "range", "rate")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.set_queries import MaskedFloats
+from sim.b_plane import b_plane
 from sim.columns import Column, columns, columns_with_values, documented, values_of
 from sim.miss_cause import MissCause, count_causes
 from sim.statistics import HitEstimate, estimate_hits
@@ -55,6 +56,8 @@ _LAST = "Radius of the possible misses at the last decision; unknown without a d
 
 
 _along_y = partial(Column, nullable=True, optional=True)
+_REDRAWS = "Normal starts outside the dispersion that were drawn again; unknown for uniform starts"
+_B_DOT_T = "B.T of the closest approach; unknown without a reference plane"
 
 
 @documented
@@ -70,6 +73,8 @@ class Results:
         Whether `guaranteed_miss_m` is a bound: the set's model is the guaranteed one.
     burns_m_s : ndarray, shape (B, n), or None
         Moduli of the impulses at the times of the schedule, m/s; None without a schedule, and for results from files.
+    b_plane_t_rad : float or None
+        Direction of the axis T of the B-plane from y toward z, rad; None without a reference plane.
     """
 
     runs: Integers = field(metadata=columns(Column("run", "", "Run number", int)))
@@ -111,14 +116,23 @@ class Results:
             Column("miss_z_m", "m", "true z"),
         )
     )
+    b_plane_m: Floats = field(
+        init=False,
+        metadata=columns(_along_y("b_dot_t_m", "m", _B_DOT_T), _along_y("b_dot_r_m", "m", "B.R")),
+    )
+    redraws: Integers | None = field(
+        default=None, metadata=columns(Column("redraws", "", _REDRAWS, int, nullable=True, optional=True))
+    )
     guarantees: bool = False
     burns_m_s: Floats | None = None
+    b_plane_t_rad: float | None = None
 
     def __post_init__(self) -> None:
         unknown = np.ma.getmaskarray(self.guaranteed_miss_m) | (not self.guarantees)
         within = self.miss_m <= self.guaranteed_miss_m.filled(np.inf)
         object.__setattr__(self, "truth_kept", self.truth_margin_m.filled(0.0) >= 0.0)
         object.__setattr__(self, "phi_held", np.ma.MaskedArray(within, mask=unknown))
+        object.__setattr__(self, "b_plane_m", b_plane(self.lateral_miss_m, self.b_plane_t_rad))
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -134,6 +148,11 @@ class Results:
         """Number of misses of each cause, and what explains them (`sim.miss_cause.count_causes`)."""
         causes = np.array([cause and cause.value for cause in self.causes], dtype=object)
         return count_causes(causes, self.unguided_miss_m, self.engine_corrects_m, self.last_possible_m.filled(0.0))
+
+    @property
+    def redrawn_share(self) -> float | None:
+        """Share of the normal starts that were outside the dispersion and drawn again; None for uniform starts."""
+        return None if self.redraws is None else float(1.0 - len(self) / (len(self) + self.redraws.sum()))
 
     def to_dict(self) -> dict[str, list[Any]]:
         """Return the columns by name as plain values, one per run: texts for outcomes, None if unknown."""
@@ -151,7 +170,7 @@ class Results:
         """Return the results at some indices, in the order of the indices."""
 
         def taken(values: Any) -> Any:
-            if isinstance(values, bool) or values is None:
+            if not isinstance(values, tuple | np.ndarray):
                 return values
             return tuple(values[index] for index in indices) if isinstance(values, tuple) else values[indices]
 
@@ -179,8 +198,8 @@ def join(parts: Sequence[Results]) -> Results:
 def _joined(parts: Sequence[Any]) -> Any:
     if isinstance(parts[0], bool):
         return all(parts)
-    if parts[0] is None:
-        return None
+    if parts[0] is None or isinstance(parts[0], float):
+        return parts[0]
     if isinstance(parts[0], tuple):
         return tuple(value for part in parts for value in part)
     return (np.ma.concatenate if isinstance(parts[0], np.ma.MaskedArray) else np.concatenate)(parts)

@@ -9,18 +9,24 @@ from enum import Enum
 from functools import cached_property
 from typing import Annotated, Any
 
+import numpy as np
+
 from guidance.noise import NoiseKind, NoiseSource, TieRule
 from guidance.strategy import Strategy
 from guidance.thruster import Thruster
-from infoset.limits import Checked, Description, Limits, Name, NotNegative, Positive, check_fields, shown
+from infoset.arrays import Floats
+from infoset.limits import NUMBER, Checked, Description, Limits, Name, NotNegative, Positive, check_fields, shown
 from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
+from sim.covariance import Covariance
 
 _DIRECTION = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
 _ELEVATION = Limits(minimum=-0.5 * math.pi, maximum=0.5 * math.pi)
 _SIGMA = Limits(minimum=0.01, maximum=10.0)
 MAX_STEPS = 100_000
 """Maximum number of steps of a flight; all random numbers are drawn before it starts."""
+MIN_SHARE_WITHIN = 0.01
+"""Minimum share of the starts of a covariance within the dispersion; a start is drawn again at most some 1000 times."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +43,16 @@ class Sun(Checked):
         Direction of the Sun seen from the spacecraft at t = 0, from the x axis toward z, rad.
     elevation_rad : float
         Angle of that direction out of the plane (x, z), toward y, rad. For space only.
+    spacecraft_velocity_m_s : tuple of float, or None
+        Velocity of the spacecraft from the Sun at t = 0 along y, z and x, in a plane along z and x, m/s. None is a
+        circular orbit, in the plane of the Sun and the x axis and toward +x.
     """
 
     gravitational_parameter_m3_s2: Positive
     distance_m: Positive
     direction_rad: Annotated[float, _DIRECTION]
     elevation_rad: Annotated[float, _ELEVATION] = 0.0
+    spacecraft_velocity_m_s: Annotated[tuple[float, ...], NUMBER] | None = None
 
 
 class Manoeuvre(Enum):
@@ -116,6 +126,12 @@ class Scenario:
         Starts that are possible on board (B x D).
     dispersion : StateBox
         True starts (B0 x D0), uniform, unknown on board. A fixed value has equal ends.
+    covariance : Covariance or None
+        True starts are normal around the middle of the dispersion, and are drawn again until they are within it. The
+        components are along (y, z, x), in a plane along (z, x).
+    b_plane_t_rad : float or None
+        Direction of the axis T of the B-plane, the line in which it meets the reference plane, from y toward z, rad.
+        None: the reference plane is not known. For space only.
     angle_sensor : AngleSensor or None
         The sensor of the line-of-sight angles, if it is not a camera.
     camera : Camera or None
@@ -145,9 +161,11 @@ class Scenario:
     tie: TieRule = TieRule.UPPER
     noise_sigma: Annotated[float, _SIGMA] = 1.0 / 3.0
     noise_correlation_s: Positive | None = None
+    b_plane_t_rad: Annotated[float, _DIRECTION] | None = None
     sun: Sun | None = None
     uncertainty: StateBox
     dispersion: StateBox
+    covariance: Covariance | None = None
     angle_sensor: AngleSensor | None = None
     camera: Camera | None = None
     range_sensor: RangeSensor | None = None
@@ -196,18 +214,32 @@ class Scenario:
         )
 
     def _check_axes(self) -> None:
-        """Check that start and set are both in a plane or both in space, and that a plane has no values of space."""
+        """Check that all values are in a plane, or all in space, and that the dispersion contains normal starts."""
         if self.dispersion.axes != self.set_model.axes:
             raise ValueError(
                 "Scenario: uncertainty and dispersion must both have y_m and vy_m_s (an engagement in space), or "
                 "neither"
             )
+        components = len(self.set_model.axes) + 1
+        velocity = None if self.sun is None else self.sun.spacecraft_velocity_m_s
+        if velocity is not None and len(velocity) != components:
+            raise ValueError(f"sun.spacecraft_velocity_m_s must have {components} components: got {len(velocity)}")
+        if self.covariance is not None:
+            if self.covariance.size != 2 * components:
+                raise ValueError(f"covariance must have {2 * components} components: got {self.covariance.size}")
+            share = self.covariance.share_within(*corners(self.dispersion))
+            if share < MIN_SHARE_WITHIN:
+                raise ValueError(
+                    f"covariance: {100.0 * share:.2g} % of its starts are within dispersion, at least "
+                    f"{100.0 * MIN_SHARE_WITHIN:g} % must be: widen dispersion, or reduce the deviations"
+                )
         if self.is_spatial:
             return
         for name, is_set in (
             ("sun.elevation_rad", self.sun is not None and self.sun.elevation_rad != 0.0),
             ("target.acceleration_y_m_s2", self.target is not None and self.target.acceleration_y_m_s2 is not None),
             ("thruster.pointing_error_rad", self.thruster.pointing_error_rad > 0.0),
+            ("b_plane_t_rad", self.b_plane_t_rad is not None),
         ):
             if is_set:
                 raise ValueError(
@@ -262,6 +294,15 @@ class Scenario:
         """Sensors on board by name, in the order in which a step applies their measurements."""
         fitted = (self.range_sensor, self.bearing_sensor, self.rate_sensor)
         return {sensor.name: sensor for sensor in fitted if sensor is not None}
+
+
+def corners(box: StateBox) -> tuple[Floats, Floats]:
+    """Return minimum and maximum (z, x, V_z, V_x) of a box, or (y, z, x, V_y, V_z, V_x) of one in space."""
+    lateral = [box.axis(name) for name in box.axes]
+    intervals = np.array(
+        [*(axis.z_m for axis in lateral), box.x_m, *(axis.vz_m_s for axis in lateral), box.vx_m_s], dtype=np.float64
+    )
+    return intervals[:, 0], intervals[:, 1]
 
 
 def of_model(model: SetModel) -> dict[str, Any]:

@@ -49,8 +49,9 @@ def draw_all(folder: CampaignFolder, runs: pd.DataFrame) -> Iterator[Figure]:
             Sample(title, _look(noise), miss_m, impulse_m_s, bounds_m.dropna().to_numpy(), f"{noise} noise: {bound}")
         )
         most_m = max_guarantee(bounds_m.fillna(np.inf).tolist()) if guaranteed else None
-        across_m = chosen[["miss_y_m", "miss_z_m"]].to_numpy()
-        clouds.append(Cloud(f"{noise} noise, {some_runs(len(chosen))}", across_m, miss_m, most_m))
+        has_axes = scenario.b_plane_t_rad is not None
+        across_m = chosen[["b_dot_t_m", "b_dot_r_m"] if has_axes else ["miss_y_m", "miss_z_m"]].to_numpy()
+        clouds.append(Cloud(f"{noise} noise, {some_runs(len(chosen))}", across_m, miss_m, most_m, has_axes))
     yield draw_samples(samples, scenario.radius_m)
     yield draw_convergence(by_noise)
     yield draw_dispersion(by_noise)

@@ -15,7 +15,7 @@ from rich.table import Table
 from experiments.campaigns.sweep_axes import tied_keys
 from experiments.common.screen import Part, number, number_table, quantile_notes, some_runs
 from experiments.interception.runs.shared import bound_name
-from experiments.interception.study import SetCounts, hit_text, miss_text, noise_notes, set_warnings
+from experiments.interception.study import SetCounts, hit_text, miss_text, noise_notes, redrawn_text, set_warnings
 from sim import CampaignNoise, HitEstimate, Outcome, estimate_hits, estimate_quantiles
 from sim.miss_cause import count_causes
 from sim.statistics import correlation_interval, level_name, shows
@@ -31,7 +31,7 @@ OUTCOMES = {outcome.value.replace("-", "_"): outcome.value for outcome in Outcom
 
 CAUSE = ("cause", "unguided_miss_m", "engine_corrects_m", "last_possible_m")
 """Columns of the runs that say why they missed."""
-COLUMNS = ("cell", "noise", "outcome", "hit", *CAUSE, "truth_kept", "set_emptied", "phi_held", *QUANTITIES)
+COLUMNS = ("cell", "noise", "outcome", "hit", *CAUSE, "truth_kept", "set_emptied", "phi_held", "redraws", *QUANTITIES)
 """Columns of the runs that `summary` needs."""
 CI = ("95 % CI\nfrom", "\nto")
 """Titles of the ends of an interval in a table for the screen."""
@@ -72,6 +72,7 @@ def _counts(runs: pd.DataFrame) -> dict[str, Any]:
     sized = int(runs["hit"].count())
     hits = vars(estimate_hits(int(runs["hit"].sum()), sized)) if sized else {}
     missed = count_causes(*(runs[name].to_numpy() for name in CAUSE))
+    redraws = runs["redraws"].sum()
     return {
         "runs": len(runs),
         **{name: int((runs["outcome"] == outcome).sum()) for name, outcome in OUTCOMES.items()},
@@ -83,6 +84,7 @@ def _counts(runs: pd.DataFrame) -> dict[str, Any]:
         "hits": hits.get("hits", math.nan),
         **{f"hit_{name}": hits.get(name, math.nan) for name in ("probability", "lower", "upper")},
         **{f"missed_{name}": or_nan(value) for name, value in missed.items()},
+        **({"redrawn_share": redraws / (len(runs) + redraws)} if runs["redraws"].count() else {}),
     }
 
 
@@ -207,6 +209,8 @@ def _notes(folder: CampaignFolder, row: Mapping[str, Any], sets: SetCounts, nois
         missed = {name.removeprefix("missed_"): value for name, value in row.items() if name.startswith("missed_")}
         if causes := miss_text(missed, row["runs"], folder.manifest.scenario):
             yield causes
+    if started := redrawn_text(row.get("redrawn_share")):
+        yield started
     held = (
         f"; miss within the bound Phi: {row['phi_held']} of {some_runs(row['phi_known'])}" if row["phi_known"] else ""
     )

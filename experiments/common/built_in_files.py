@@ -28,6 +28,7 @@ PROBLEMS = {
     "reachable-system": ProblemKind("reach", "reachability.system_file", "ReachableSystem"),
     "pursuit-evasion": ProblemKind("pursuit", "pursuit.file", "PursuitProblem"),
     "observer": ProblemKind("observe", "observer.file", "ObserverProblem"),
+    "trajectory": ProblemKind("scenarios from-states", "interception.trajectory_file", "Trajectory"),
 }
 """Kinds of problems by the `kind` of their files."""
 _SCENARIO_TABLES = {"uncertainty", "dispersion", "angle_sensor", "camera", "thruster", "information_set"}

@@ -10,6 +10,8 @@ UNITS = {
     "m": ("length", Decimal(1)),
     "km": ("length", Decimal(1000)),
     "au": ("length", Decimal(149_597_870_700)),
+    "m2": ("covariance", Decimal(1)),
+    "km2": ("covariance", Decimal(10) ** 6),
     "s": ("time", Decimal(1)),
     "min": ("time", Decimal(60)),
     "h": ("time", Decimal(3600)),

@@ -241,7 +241,7 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
         unknown = np.isnan(arrays[name])
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)
         fields[column.field] = np.ma.MaskedArray(values, mask=unknown) if column.nullable else values
-    result = Results(**fields, guarantees=model.is_guaranteed)
+    result = Results(**fields, guarantees=model.is_guaranteed, b_plane_t_rad=header.scenario.b_plane_t_rad)
     known: dict[str, Any] = {name: getattr(header, name) for name in _OF_HEADER}
     return Record(
         **known | {name: arrays[name] for name in _OF_STEPS},

@@ -265,6 +265,11 @@ def _length(length_m: float | None) -> str:
     )
 
 
+def redrawn_text(share: float | None) -> str:
+    """Return the share of the normal starts that were drawn again; an empty text for uniform starts."""
+    return "" if share is None else f"normal starts: {percent(share)} were outside the dispersion and drawn again"
+
+
 def max_guarantee_m(results: Results) -> float | None:
     """Return the maximum guaranteed miss of runs, m; None if a run has no guarantee."""
     bounds = results.guaranteed_miss_m

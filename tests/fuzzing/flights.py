@@ -12,9 +12,9 @@ from infoset import AngleSensor, Camera, InitialSet, Model, RateSensor, SetModel
 from infoset.arrays import Floats
 from infoset.model import Interval
 from sim import Body, Results, Scenario, Target
-from sim.draws import Draws, corners, max_number_of_steps
+from sim.draws import Draws, max_number_of_steps
 from sim.engagement import Engagements, Step
-from sim.scenario import of_model
+from sim.scenario import corners, of_model
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from experiments.common.built_in_files import SCENARIO, built_in_files
 from experiments.common.input_file import load_problem, read_text, to_toml
 from experiments.interception import record_file
 from experiments.interception.scenario_file import load_scenario, scenario_warnings
+from experiments.interception.trajectory_file import Trajectory
 from experiments.multipoint.file import MultipointProblem
 from experiments.observer.file import ObserverProblem
 from experiments.pareto.file import ParetoProblem
@@ -56,6 +57,7 @@ def text_files() -> Mapping[str, TextFile]:
     """Return the kinds of files that people write, by name."""
     readers: dict[str, tuple[type, Callable[[str], Any]]] = {
         SCENARIO: (Scenario, load_scenario),
+        "trajectory": (Trajectory, load_problem),
         "pareto-encounter": (ParetoProblem, load_problem),
         "multipoint": (MultipointProblem, load_problem),
         "observer": (ObserverProblem, load_problem),

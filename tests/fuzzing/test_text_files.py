@@ -101,7 +101,8 @@ def test_a_mutated_file_is_refused_with_exit_code_2(kind: str, infoset: Infoset,
         if not attempted(lambda: FILES[kind].read(str(file)), InputError)[1]:
             continue
         done += 1
-        code, out, err = infoset(COMMANDS[kind], file, "--json", tmp_path / "x.json")
+        option = "--out" if kind == "trajectory" else "--json"
+        code, out, err = infoset(*COMMANDS[kind].split(), file, option, tmp_path / "x.json")
         assert (code, out) == (2, "")
         assert err.startswith(f"error: {file}")
         assert "Traceback" not in err

@@ -13,10 +13,10 @@ from infoset import InitialSet, Model, RateSensor
 from sim import Outcome, Scenario
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.closed_form import worst_shift_m
-from sim.draws import corners, draw
+from sim.draws import draw
 from sim.engagement import Engagements
 from sim.planned_flights import PlannedTarget, Plans
-from sim.scenario import of_model
+from sim.scenario import corners, of_model
 from sim.target import GivenTarget
 
 BUDGET = 40

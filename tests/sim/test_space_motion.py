@@ -11,9 +11,10 @@ from scipy.integrate import solve_ivp
 from infoset import Model, SetModel
 from infoset.arrays import Floats
 from sim import Manoeuvre, Scenario, Sun, Target
-from sim.draws import Draws, corners, draw
+from sim.draws import Draws, draw
 from sim.gravity import max_impulses_m_s, on_board_model, with_gravity
 from sim.kepler import KeplerMotion, sun_and_orbit
+from sim.scenario import corners
 from sim.target import acceleration_m_s2
 from tests.space import in_space
 

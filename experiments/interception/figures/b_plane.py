@@ -59,28 +59,32 @@ class Cloud:
     Parameters
     ----------
     across_m : ndarray, shape (N, 2)
-        Positions (y, z) at the closest approach, m.
+        Positions (y, z), or (B.T, B.R), at the closest approach, m.
     miss_m : ndarray, shape (N,)
         Distances at the closest approach, m.
     guaranteed_m : float or None
         Maximum guaranteed miss of the runs, m; None if a run has no guarantee.
+    has_axes : bool
+        Whether the axes are T, to the right, and R, downward; otherwise they are y and z.
     """
 
     title: str
     across_m: Floats
     miss_m: Floats
     guaranteed_m: float | None = None
+    has_axes: bool = False
 
 
 def cloud(title: str, samples: Sequence[Results]) -> Cloud:
     """Return the misses of runs in space; with several results of the same runs, the worst result of each run."""
     misses = np.array([results.miss_m for results in samples])
-    across = np.array([results.lateral_miss_m for results in samples])
+    has_axes = samples[0].b_plane_t_rad is not None
+    across = np.array([results.b_plane_m if has_axes else results.lateral_miss_m for results in samples])
     worst, runs = misses.argmax(axis=0), np.arange(misses.shape[1])
     bounds = [
         float(bound) for results in samples if results.guarantees for bound in results.guaranteed_miss_m.filled(np.inf)
     ]
-    return Cloud(title, across[worst, runs], misses[worst, runs], max_guarantee(bounds))
+    return Cloud(title, across[worst, runs], misses[worst, runs], max_guarantee(bounds), has_axes)
 
 
 def max_guarantee(bounds_m: Sequence[float]) -> float | None:
@@ -157,6 +161,8 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
         if shows(count, level) and (outline := _ellipse_within(each, level)) is not None:
             axes.plot(*outline, label=name, color=TRUTH, linestyle=dashes, **line)
     draw_body(axes, half, each.guaranteed_m, radius_m)
+    if each.has_axes:
+        axes.set(xlabel=r"$B\cdot T$, m", ylabel=r"$B\cdot R$, m", ylim=(half, -half))
     outside = int((np.abs(each.across_m) > half).any(axis=1).sum())
     if outside:
         place: dict[str, Any] = {"xycoords": "axes fraction", "ha": "right", "va": "bottom", "path_effects": HALO}

@@ -35,18 +35,8 @@ from sim.parallel import Task
 
 FIGURE = "figure-comparison"
 TIES = "for each run, the worst of the four tie rules"
-COLUMNS = (
-    "run",
-    "miss_m",
-    "impulse_m_s",
-    "outcome",
-    "truth_kept",
-    "set_emptied",
-    "hit",
-    "cause",
-    "miss_y_m",
-    "miss_z_m",
-)
+ACROSS = ("miss_y_m", "miss_z_m", "b_dot_t_m", "b_dot_r_m")
+COLUMNS = ("run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit", "cause", *ACROSS)
 
 
 def run(options: Compare) -> None:

@@ -30,6 +30,7 @@ from experiments.interception.study import (
     hit_text,
     miss_text,
     noise_notes,
+    redrawn_text,
     set_counts,
     set_warnings,
     summary,
@@ -89,6 +90,7 @@ def run(options: Experiment) -> None:
                     {
                         **_key(curve),
                         **hit_key(curve.results.hits, curve.results.missed),
+                        **({"redrawn_share": share} if (share := curve.results.redrawn_share) is not None else {}),
                         **burns_key(scenario, curve.results),
                         **outcome_columns(curve.results),
                     }
@@ -145,6 +147,8 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> Iterator[Part]:
         yield f"curve {curve.number}: {'; '.join(filter(None, lines))}"
         if causes := miss_text(results.missed, runs, scenario):
             yield f"curve {curve.number}: {causes}"
+    if started := redrawn_text(curves[0].results.redrawn_share):
+        yield started
     yield from set_warnings(scenario.information_set.model, counts)
     *others, game = noise_notes(scenario, dict.fromkeys(curve.noise for curve in curves))
     yield from (*others, f"{game}; infoset compare shows the worst of all tie rules")

@@ -14,7 +14,8 @@ from experiments.interception.scenario_file import load_scenario, scenario_warni
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.model import Model, SetModel, SetSettings, StateBox
-from infoset.sensors import AngleSensor, RangeSensor, RateSensor
+from infoset.sensors import AngleSensor, Camera, RangeSensor, RateSensor
+from sim.covariance import Covariance
 from sim.scenario import Body, Scenario, Sun, Target, of_model
 from sim.storage.codec import fingerprint
 from tests.built_in import scenario_names, scenario_text
@@ -93,7 +94,8 @@ def test_the_start_for_an_own_scenario_is_the_paper_s_in_the_guaranteed_model_wi
 def test_the_start_for_an_own_scenario_has_every_key() -> None:
     text = scenario_text("own-scenario")
     keys = re.findall(r"^(?:# )?(\w+) = ", text, re.M)
-    for owner in (Scenario, Sun, StateBox, AngleSensor, RangeSensor, RateSensor, Target, Body, Thruster, SetSettings):
+    sensors = AngleSensor, Camera, RangeSensor, RateSensor
+    for owner in (Scenario, Sun, StateBox, Covariance, *sensors, Target, Body, Thruster, SetSettings):
         for field in dataclasses.fields(owner):
             assert f"[{field.name}]" in text or any(si_factor(key, field.name) for key in keys), field.name
 

@@ -1,0 +1,118 @@
+"""The covariance of a start: a matrix, or standard deviations and correlations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+
+from infoset.arrays import Floats
+from infoset.limits import NOT_NEGATIVE, check_fields
+
+Rows = tuple[tuple[float, ...], ...]
+ROUNDING = 1e-6
+"""Differences of correlations that are rounding: files have about seven digits."""
+SAMPLE = 2000
+"""Starts that estimate the share within a box."""
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """Covariance of a relative state, positions before velocities: a matrix, or standard deviations and correlations.
+
+    Parameters
+    ----------
+    position_sigma_m, velocity_sigma_m_s : tuple of float
+        Standard deviations of the components.
+    correlations : tuple of rows
+        Correlations of all components: the whole matrix, or its lower triangle. Without rows: zero.
+    matrix_m2 : tuple of rows
+        The covariance in place of the three others, in m^2, m^2/s and m^2/s^2: the whole matrix, or its lower triangle.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is outside its limits, or the matrix is no covariance.
+    """
+
+    position_sigma_m: Annotated[tuple[float, ...], NOT_NEGATIVE] = ()
+    velocity_sigma_m_s: Annotated[tuple[float, ...], NOT_NEGATIVE] = ()
+    correlations: Rows = ()
+    matrix_m2: Rows = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        deviations = len(self.position_sigma_m), len(self.velocity_sigma_m_s)
+        if bool(self.matrix_m2) == any(deviations) or (self.matrix_m2 and self.correlations):
+            raise ValueError("Covariance: must have matrix_m2, or position_sigma_m and velocity_sigma_m_s")
+        if deviations[0] != deviations[1]:
+            raise ValueError("Covariance: {} deviations of position and {} of velocity".format(*deviations))
+        correlation = self.correlation
+        if correlation.shape != (self.size, self.size):
+            raise ValueError(f"Covariance: correlations must have {self.size} rows: got {len(correlation)}")
+        if not np.allclose(correlation.diagonal(), 1.0, atol=ROUNDING, rtol=0.0):
+            raise ValueError("Covariance: the variances must not be negative, and correlations have the diagonal 1")
+        least = np.linalg.eigvalsh(correlation)[0]
+        if least < -ROUNDING:
+            raise ValueError(
+                f"Covariance: its correlations have a negative eigenvalue, {least:.3g}: check the signs, and that "
+                "positions stand before velocities"
+            )
+
+    @property
+    def size(self) -> int:
+        """Number n of components."""
+        return len(self.sigma)
+
+    @cached_property
+    def sigma(self) -> Floats:
+        """Standard deviations, m and m/s, shape (n,)."""
+        if not self.matrix_m2:
+            return np.array([*self.position_sigma_m, *self.velocity_sigma_m_s])
+        return np.asarray(np.sqrt(np.abs(_symmetric("matrix_m2", self.matrix_m2).diagonal())))
+
+    @cached_property
+    def correlation(self) -> Floats:
+        """Correlations, shape (n, n); those of a component that is exactly known are zero."""
+        if not self.matrix_m2:
+            return _symmetric("correlations", self.correlations) if self.correlations else np.eye(self.size)
+        inverse = np.divide(1.0, self.sigma, out=np.zeros(self.size), where=self.sigma > 0.0)
+        exact = np.diag(np.where(self.sigma > 0.0, 0.0, 1.0))
+        return np.asarray(_symmetric("matrix_m2", self.matrix_m2) * np.outer(inverse, inverse) + exact)
+
+    @property
+    def matrix(self) -> Floats:
+        """The covariance, m^2, m^2/s and m^2/s^2, shape (n, n)."""
+        return np.asarray(self.correlation * np.outer(self.sigma, self.sigma))
+
+    @cached_property
+    def root(self) -> Floats:
+        """The lower triangular matrix A with A A^T equal to the covariance, shape (n, n): Cholesky's method.
+
+        A component that follows from those before it has a column of zeros.
+        """
+        lower = np.zeros((self.size, self.size))
+        for k, column in enumerate(self.correlation.T):
+            rest = column[k:] - lower[k:, :k] @ lower[k, :k]
+            if rest[0] > ROUNDING**2:
+                lower[k:, k] = rest / np.sqrt(rest[0])
+        return self.sigma[:, None] * lower
+
+    def share_within(self, lower: Floats, upper: Floats) -> float:
+        """Return the share of the normal starts around the middle of a box that are within it, from a fixed sample."""
+        sample = np.random.default_rng(0).standard_normal((SAMPLE, self.size)) @ self.root.T
+        return float((np.abs(sample) <= 0.5 * (upper - lower)).all(axis=1).mean())
+
+
+def _symmetric(name: str, rows: Rows) -> Floats:
+    """Return a symmetric matrix from its rows, or from those of its lower triangle."""
+    size, lengths = len(rows), [len(row) for row in rows]
+    if lengths not in ([size] * size, [*range(1, size + 1)]):
+        raise ValueError(f"Covariance: {name} must be a square matrix or its lower triangle: got rows of {lengths}")
+    matrix = np.array([[*row, *(rows[k][len(row) - 1] for k in range(len(row), size))] for row in rows])
+    scale = np.sqrt(np.abs(matrix.diagonal()))
+    if (np.abs(matrix - matrix.T) > ROUNDING * np.outer(scale, scale)).any():
+        raise ValueError(f"Covariance: {name} must be symmetric")
+    return np.asarray(0.5 * (matrix + matrix.T))
