@@ -5,7 +5,6 @@ from rendezvous.pareto.encounter import Component, Craft, Encounter, Meeting
 from rendezvous.pareto.feasibility import (
     BoundCheck,
     Feasibility,
-    NotCertifiedError,
     check_bound,
     min_peak,
     peak_control,
@@ -37,7 +36,6 @@ __all__ = [
     "EncounterSolution",
     "Feasibility",
     "Meeting",
-    "NotCertifiedError",
     "NotOptimalError",
     "ParetoSet",
     "Plan",

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import minimize
 
+from infoset.geometry.polytope import nearest_difference
 from rendezvous._arrays import Floats
 from rendezvous._halton import halton
 from rendezvous.pareto.front import simplex_weights
@@ -15,8 +16,6 @@ from rendezvous.pareto.solution import EncounterSolution
 _MAX_STEPS = 200
 _TRIED, _FOLLOWED, _MAX_ROUNDS = 500, 4, 20
 _NEAREST = 1e-6
-_RELATIVE = 1e-13
-_MAX_CORRALS = 1000
 
 
 class NotOptimalError(ValueError):
@@ -132,8 +131,10 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     sizes = np.trace(matrices, axis1=1, axis2=2)
     unit = matrices / sizes[:, None, None]
     if np.allclose(unit, unit[0], rtol=1e-12, atol=1e-15):
-        root = roots[0]
-        return np.asarray(nearest_in_hull(ideals @ root.T, root @ preferred) @ ideals)
+        root, first = roots[0], ideals[0]
+        target = root @ (preferred - first)
+        nearest = target + nearest_difference((ideals - first) @ root.T, target[None])
+        return np.asarray(first + np.linalg.solve(root, nearest))
     root = np.linalg.cholesky(np.einsum("n,nab->ab", weights / weights.sum(), matrices)).T
     back = np.linalg.inv(root)
     # In coordinates of the norm, about the preferred meeting, with M of one size: shares are then of one size too.
@@ -246,50 +247,3 @@ def _bound_craft(
         step = np.linalg.lstsq(system, -residual, rcond=None)[0]
         point, shares = point + step[:free], shares + step[free : free + count]
     return np.asarray(point if excess(point).max() <= excess(best).max() * (1.0 + 1e-9) else best)
-
-
-def nearest_in_hull(points: Floats, target: Floats) -> Floats:
-    """Return the weights of `points`, shape (n, f), that give the point of their convex hull nearest to a `target`.
-
-    The weights, shape (n,), are not negative and of sum one; distances are Euclidean.
-
-    Wolfe (1976): a set of affinely independent points (corral) is extended by the point that is farthest in the
-    direction of the target, and points with negative weights in the nearest point of its affine hull are removed. The
-    method is finite; in practice it solves a few small least-squares problems.
-    """
-    offsets = points - target
-    size = float((offsets**2).sum(axis=1).max())
-    if size == 0.0:
-        return np.asarray(np.eye(len(points))[0])
-    corral = [int((offsets**2).sum(axis=1).argmin())]
-    weights = np.ones(1)
-    for _ in range(_MAX_CORRALS):
-        nearest = weights @ offsets[corral]
-        ahead = int((offsets @ nearest).argmin())
-        if ahead in corral or nearest @ (nearest - offsets[ahead]) <= _RELATIVE * size:
-            break
-        corral.append(ahead)
-        weights = np.append(weights, 0.0)
-        while True:
-            affine = _affine_nearest(offsets[corral])
-            if (affine > 0.0).all():
-                weights = affine
-                break
-            behind = affine <= 0.0
-            # A weight that stays zero is removed at once.
-            step = float(np.min(weights[behind] / np.maximum(weights[behind] - affine[behind], np.finfo(float).tiny)))
-            weights = weights + min(step, 1.0) * (affine - weights)
-            leaving = int(np.where(behind, weights, np.inf).argmin())
-            del corral[leaving]
-            weights = np.delete(weights, leaving)
-            weights /= weights.sum()
-    all_weights = np.zeros(len(points))
-    all_weights[corral] = weights
-    return all_weights
-
-
-def _affine_nearest(offsets: Floats) -> Floats:
-    """Weights of sum one of the point of minimum norm in an affine hull."""
-    edges = (offsets[1:] - offsets[0]).T
-    rest = np.linalg.lstsq(edges, -offsets[0], rcond=None)[0]
-    return np.concatenate([[1.0 - rest.sum()], rest])

@@ -100,7 +100,7 @@ def orthonormal(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
 
 
 def nearest_difference(one: Floats, two: Floats) -> Floats:
-    """Return the shortest vector p - q, with p and q in the convex hulls of points of shapes (k, n) and (m, n).
+    """Return the shortest vector p - q from the hull of the points `two`, shape (m, n), to that of `one`, shape (k, n).
 
     References
     ----------
