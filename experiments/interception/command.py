@@ -201,7 +201,8 @@ class Bound(FileOptions):
             metavar="N",
             min=0,
             max=MAX_RUNS,
-            help="Number of engagements in the search for the worst one, for each strategy; 0 skips the search.",
+            help="Number of engagements in the search for the worst one, for each strategy; 0 skips the search, and "
+            "without --strategies all simulations.",
         ),
     ] = 500
     seed: Seed = 0

@@ -65,7 +65,8 @@ class WorstOfStrategy:
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
     scenario, notes = study_scenario(options)
-    strategies = chosen_strategies(scenario, options.strategies)
+    only_bound = options.budget == 0 and options.strategies is None
+    strategies = {} if only_bound else chosen_strategies(scenario, options.strategies)
     with work_of(options, scenario, figure_files(FIGURE), notes=notes) as work:
         try:
             lower = lower_bound(scenario, progress=work.begin("lower bound"))
@@ -83,7 +84,7 @@ def run(options: Bound) -> None:
 
             worst_m = {strategy.name: strategy.worst_m for strategy in worst}
             work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))
-    parts = [*_parts(scenario, lower, nominal, worst), *value.lines(), *_notes(lower, options)]
+    parts = [*_parts(scenario, lower, nominal, worst), *value.lines(), *_notes(lower, options, worst)]
     show(parts, options.quiet, stdout_taken=work.written.stdout_taken)
 
 
@@ -130,6 +131,7 @@ def _summary(
     return {
         "disturbance_m_s2": {axis: model.axis(axis).disturbance_m_s2 for axis in model.axes},
         "lower_bound_m": lower.bound_m,
+        **({} if scenario.radius_m is None else {"hit_cannot_be_guaranteed": lower.bound_m > scenario.radius_m}),
         "reached_at": _where(lower.pair, scenario),
         "at_nominal_range": {**_where(nominal, scenario), "bound_m": nominal.bound_m},
         "by_label": [
@@ -269,6 +271,12 @@ def _parts(
         strategies.add_row(strategy.name, *map(number, values))
     bound_m = number(lower.bound_m)
     yield f"{scenario.name}, model {model.model.value}: no strategy can guarantee a miss below {bound_m} m"
+    if scenario.radius_m is not None:
+        body = f"the body of radius {scenario.radius_m:g} m"
+        if lower.bound_m > scenario.radius_m:
+            yield f"a hit of {body} cannot be guaranteed by any strategy"
+        else:
+            yield f"this does not exclude a strategy that guarantees a hit of {body}"
     yield (
         f"at the range {nominal.label_m / M_PER_KM:.1f} km and closing speed {-nominal.vx_m_s / M_PER_KM:g} km/s, the "
         f"nominal ones: {number(nominal.bound_m)} m"
@@ -276,16 +284,18 @@ def _parts(
     for axis in model.axes:
         maximum = model.axis(axis).disturbance_m_s2
         yield f"acceleration of the object along {axis} in these pairs: at most {maximum:.3g} m/s^2"
-    yield from (bounds, "", strategies, "")
+    yield from (bounds, "", *((strategies, "") if worst else ()))
     if any(strategy.results.set_emptied.any() for strategy in worst):
         hint = "" if model.is_guaranteed else "; try --model guaranteed"
         yield f"in some engagements a measurement contradicted all states of the set, which became empty{hint}"
 
 
-def _notes(lower: LowerBound, options: Bound) -> Iterator[str]:
+def _notes(lower: LowerBound, options: Bound, worst: Sequence[WorstOfStrategy]) -> Iterator[str]:
     """Return lines about the columns of the tables."""
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
+    if not worst:
+        return
     yield "pairs: maximum miss of the states that prove the bound"
     search = f"maximum misses found by `infoset adversary --objective fixed-truth --budget {options.budget}`"
     yield f"set never empty, also empty: {search if options.budget else 'not searched'}"
