@@ -111,6 +111,14 @@ class Experiment(FileOptions):
     sections: Annotated[
         int | None, typer.Option(metavar="N", help="Number of sections at t = 0. Default: that of the scenario.")
     ] = None
+    remedy: Annotated[
+        bool,
+        typer.Option(
+            "--remedy",
+            help="For each cause of misses, find the least maximum impulse or budget, the earliest cut-off and the "
+            "greatest errors of the angles without it, with the same random numbers.",
+        ),
+    ] = False
     csv: Csv = None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from rich.table import Table
 
@@ -12,6 +12,7 @@ from experiments.common.screen import Part, figure_files, number, number_table, 
 from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
 from experiments.interception.published import MANY, SINGLE, printed_single_runs
+from experiments.interception.remedy import Remedy, find_remedies
 from experiments.interception.runs.shared import (
     allowance,
     b_plane_figures,
@@ -81,6 +82,11 @@ def run(options: Experiment) -> None:
             Curve(curve, names[curve], flown.range_sensor is not None, result)
             for (curve, flown, _), result in zip(slowest_first, results, strict=True)
         ][::-1]
+        remedies: dict[int, list[Remedy]] = {curve.number: [] for curve in curves}
+        if options.remedy and scenario.body is not None:
+            for task, curve in zip(tasks[::-1], curves, strict=True):
+                found = find_remedies(task, curve.results, work.begin(f"remedies of curve {curve.number}"))
+                remedies[curve.number] = found
         work.save(
             {
                 "strategy": strategy_name(scenario, own),
@@ -92,6 +98,7 @@ def run(options: Experiment) -> None:
                         **hit_key(curve.results.hits, curve.results.missed),
                         **({"redrawn_share": share} if (share := curve.results.redrawn_share) is not None else {}),
                         **burns_key(scenario, curve.results),
+                        **({"remedies": remedies[curve.number]} if options.remedy else {}),
                         **outcome_columns(curve.results),
                     }
                     for curve in curves
@@ -104,7 +111,7 @@ def run(options: Experiment) -> None:
             from experiments.interception.figures.commands import draw_experiment
 
             work.written.draw(figures, draw_experiment(scenario, curves, courses[::-1]), work.begin("figure"))
-    show(_parts(scenario, curves), options.quiet, stdout_taken=work.written.stdout_taken)
+    show(_parts(scenario, curves, remedies), options.quiet, stdout_taken=work.written.stdout_taken)
 
 
 def _key(curve: Curve) -> dict[str, int | str | bool]:
@@ -120,7 +127,7 @@ def _csv(curves: Sequence[Curve]) -> str:
     return to_csv((*_key(curves[0]), *curves[0].results.to_dict()), rows)
 
 
-def _parts(scenario: Scenario, curves: Sequence[Curve]) -> Iterator[Part]:
+def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, Sequence[Remedy]]) -> Iterator[Part]:
     table, runs = number_table("curve", "quantity", *QUANTILES, left=2), len(curves[0].results)
     for curve in curves:
         results = curve.results
@@ -147,6 +154,7 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> Iterator[Part]:
         yield f"curve {curve.number}: {'; '.join(filter(None, lines))}"
         if causes := miss_text(results.missed, runs, scenario):
             yield f"curve {curve.number}: {causes}"
+        yield from (f"curve {curve.number}: {remedy}" for remedy in remedies[curve.number])
     if started := redrawn_text(curves[0].results.redrawn_share):
         yield started
     yield from set_warnings(scenario.information_set.model, counts)
