@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.authority import correctable_m
+from guidance.thruster import modulus
 from infoset import PredictedMiss
 from infoset.arrays import Flags, Floats, Integers
 from infoset.set_queries import MaskedFloats
@@ -90,45 +91,86 @@ class DecisionLog:
         In space the impulses of a flight reach a disc, so the modulus of M_i is compared with the authority, and the
         radius of the possible misses is that of the disc around their rectangle.
         """
-        scenario, runs = self._scenario, len(arrival_s)
-        thruster, step_s = scenario.thruster, scenario.set_model.step_s
+        thruster, step_s = self._scenario.thruster, self._scenario.set_model.step_s
         steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + thruster.delay_steps
         times_s: Floats = step_s * steps.astype(np.float64)
-        tracking = _rows([flags for _, flags, *_ in self._decisions], runs) > 0.0
-        budget = _rows([left for _, _, left, _ in self._decisions], runs)
-        lower = _rows([miss.lower_m for *_, miss in self._decisions], *lateral_miss_m.shape)
-        upper = _rows([miss.upper_m for *_, miss in self._decisions], *lateral_miss_m.shape)
-        executed = _with_end(_rows(self._executed, *lateral_miss_m.shape))
-        given = executed[np.minimum(steps, len(executed) - 1)]
-        changes = given * np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
-        miss = lateral_miss_m + _with_end(np.cumsum(changes[::-1], axis=0)[::-1])
-        # What the engine cannot correct with the errors of its impulses in its favour, it never can.
-        favour, first = 1.0 + thruster.execution_error_relative, np.arange(len(steps))[:, None]
-        limits = np.full_like(budget, thruster.max_impulse_m_s * (len(steps) + 1)), budget
-        engine, within_budget = (
-            _with_end(favour * correctable_m(times_s, thruster, limit, arrival_s, first)) for limit in limits
-        )
-        radius, off = _modulus(0.5 * (upper - lower)), _modulus(miss[:-1] - 0.5 * (upper + lower))
-        # A set that has lost the true state knows less than its width says.
-        unknown, farthest = np.maximum(radius, off), _modulus(np.maximum(upper, -lower))
-        found = iter(
-            _causes(
-                _modulus(miss)[:, missed],
-                engine[:, missed],
-                within_budget[:, missed],
-                _with_end(unknown, np.inf)[:, missed],
-                _with_end(farthest)[:, missed],
-                tracking[:, missed],
-                scenario.radius_m or 0.0,
-            )
-        )
+        executed = _with_end(_rows(self._executed, lateral_miss_m.shape))
+        changes = executed[np.minimum(steps, len(executed) - 1)]
+        changes *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
+        miss = _with_end(np.cumsum(changes[::-1], axis=0)[::-1]) + lateral_miss_m
+        tracking = _rows([flags for _, flags, *_ in self._decisions], arrival_s.shape) > 0.0
+        last = _last(tracking)
+        causes: list[MissCause | None] = [None] * len(missed)
+        if missed.any():
+            found = self._causes(miss[..., missed], times_s, arrival_s[missed], tracking[:, missed], missed)
+            for run, cause in zip(np.flatnonzero(missed).tolist(), found, strict=True):
+                causes[run] = cause
+        lower, upper = self._possible(last, np.arange(len(missed)))
         return MissReasons(
-            tuple(next(found) if flag else None for flag in missed.tolist()),
-            _modulus(miss)[0],
-            engine[0],
-            within_budget[0],
-            np.ma.MaskedArray(_with_end(radius)[_last(tracking), np.arange(runs)], mask=~tracking.any(axis=0)),
+            tuple(causes),
+            modulus(miss[0]),
+            self._corrects_m(times_s, arrival_s, 0, None),
+            self._corrects_m(times_s, arrival_s, 0, thruster.budget_m_s),
+            np.ma.MaskedArray(modulus(0.5 * (upper - lower)), mask=last < 0),
         )
+
+    def _corrects_m(
+        self, times_s: Floats, arrival_s: Floats, first: Integers | int, budget: Floats | float | None
+    ) -> Floats:
+        """Return the authority of the impulses from index `first` on, m; None is without a budget."""
+        thruster = self._scenario.thruster
+        limit = np.asarray(thruster.max_impulse_m_s * (len(times_s) + 1.0) if budget is None else budget)
+        # What the engine cannot correct with the errors of its impulses in its favour, it never can.
+        return (1.0 + thruster.execution_error_relative) * correctable_m(times_s, thruster, limit, arrival_s, first)
+
+    def _possible(self, rows: Integers, runs: Integers) -> tuple[Floats, Floats]:
+        """Return the ends of the possible misses of runs, shape (C, n), at a decision of each; zeros without one."""
+        found = [
+            (self._decisions[row][-1].lower_m[:, run], self._decisions[row][-1].upper_m[:, run])
+            if row >= 0
+            else (np.zeros(len(self._scenario.set_model.axes)),) * 2
+            for row, run in zip(rows.tolist(), runs.tolist(), strict=True)
+        ]
+        lower, upper = np.reshape(np.array(found), (len(runs), 2, -1)).transpose(1, 2, 0)
+        return lower, upper
+
+    def _causes(
+        self, miss: Floats, times_s: Floats, arrival_s: Floats, tracking: Flags, missed: Flags
+    ) -> list[MissCause]:
+        """Return the causes of misses; `miss` has the shape (K + 1, C, n), its last row is that of the flight.
+
+        The modulus of `miss` less the authority does not decrease: an impulse changes both by at most its own share.
+        """
+        runs, radius_m, at = np.flatnonzero(missed), self._scenario.radius_m or 0.0, np.arange(miss.shape[2])
+        budget = _rows([left for _, _, left, _ in self._decisions], missed.shape)[:, missed]
+        sizes = modulus(miss.swapaxes(0, 1))
+        within = self._corrects_m(times_s, arrival_s, np.arange(len(times_s))[:, None], budget)
+        possible = tracking & (sizes[:-1] - within <= radius_m)
+        critical, last, exists = _last(possible), _last(tracking), possible.any(axis=0)
+        then = np.minimum(critical + 1, len(times_s))
+        now_m, then_m, start_m = (self._corrects_m(times_s, arrival_s, each, None) for each in (critical, then, 0))
+        by_budget = exists & (critical < last) & (sizes[then, at] - then_m <= radius_m)
+
+        def unknown_m(rows: Integers) -> tuple[Floats, Floats]:
+            """Return the half-width of the possible misses, more if they exclude the true one, and the farthest."""
+            lower, upper = self._possible(rows, runs)
+            off = modulus(miss[rows, :, at].T - 0.5 * (lower + upper))
+            return np.maximum(modulus(0.5 * (upper - lower)), off), modulus(np.maximum(upper, -lower))
+
+        start_within_m = self._corrects_m(times_s, arrival_s, 0, self._scenario.thruster.budget_m_s)
+        (unknown, farthest), (unknown_at_last, _) = unknown_m(critical), unknown_m(last)
+        # What the impulse that is best for all possible misses leaves beyond the later ones.
+        beyond_m = np.maximum(unknown - np.where(critical < last, then_m, 0.0), farthest - now_m)
+        wide = ~exists | (beyond_m > radius_m)
+        conditions = (
+            sizes[0] - start_m > radius_m,
+            (sizes[0] - start_within_m > radius_m) | by_budget,
+            wide & (~exists | (unknown_at_last > radius_m)),
+            wide,
+            np.ones_like(wide),
+        )
+        order = list(MissCause)
+        return [order[index] for index in np.argmax(conditions, axis=0).tolist()]
 
 
 def count_causes(
@@ -152,54 +194,15 @@ def count_causes(
     }
 
 
-def _causes(
-    miss: Floats,
-    engine: Floats,
-    budget: Floats,
-    unknown: Floats,
-    farthest: Floats,
-    tracking: Flags,
-    radius_m: float,
-) -> list[MissCause]:
-    """Return the causes of misses; the arrays have a row for each decision, all but `tracking` one more for the end.
-
-    `miss` less `engine`, or less `budget`, does not decrease: an impulse changes the miss by at most its own share.
-    """
-    runs = np.arange(miss.shape[1])
-    reach, beyond = miss - budget <= radius_m, miss - engine > radius_m
-    possible = tracking & reach[:-1]
-    critical, last, exists = _last(possible), _last(tracking), possible.any(axis=0)
-    is_last = critical == last
-    then = np.minimum(critical + 1, len(miss) - 1)
-    later_m = np.where(is_last, 0.0, engine[then, runs])
-    by_budget = exists & ~is_last & ~beyond[then, runs]
-    # The maximum miss beyond the later impulses, after the impulse that is best for all possible misses.
-    beyond_m = np.maximum(unknown[critical, runs] - later_m, farthest[critical, runs] - engine[critical, runs])
-    wide = ~exists | (beyond_m > radius_m)
-    conditions = (
-        beyond[0],
-        ~reach[0] | by_budget,
-        wide & (~exists | (unknown[last, runs] > radius_m)),
-        wide,
-        np.ones_like(wide),
-    )
-    order = list(MissCause)
-    return [order[index] for index in np.argmax(conditions, axis=0).tolist()]
-
-
-def _rows(values: Sequence[Floats] | Sequence[Flags], *shape: int) -> Floats:
+def _rows(values: Sequence[Floats] | Sequence[Flags], shape: tuple[int, ...]) -> Floats:
     """Return recorded arrays of a shape as one array, which is empty without any."""
-    return np.reshape(np.array(values, dtype=np.float64), (len(values), *shape))
+    joined = np.concatenate([np.empty((0, *shape[1:])), *values])
+    return joined.reshape(len(values), *shape)
 
 
-def _modulus(lateral: Floats) -> Floats:
-    """Return the moduli of values along the lateral axes, the second axis of an array."""
-    return np.asarray(np.hypot.reduce(lateral, axis=1))
-
-
-def _with_end(rows: Floats, value: float = 0.0) -> Floats:
-    """Return rows with one more of a value: after the last decision."""
-    return np.append(rows, np.full((1, *rows.shape[1:]), value), axis=0)
+def _with_end(rows: Floats) -> Floats:
+    """Return rows with one more of zeros: after the last decision."""
+    return np.append(rows, np.zeros((1, *rows.shape[1:])), axis=0)
 
 
 def _last(flags: Flags) -> Integers:
