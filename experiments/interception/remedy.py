@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-
-import numpy as np
 
 from experiments.common.input_file import changed
 from experiments.common.screen import some_runs
@@ -75,7 +74,7 @@ def find_remedies(task: Task, results: Results, progress: Progress) -> list[Reme
     """Return the remedies of all causes in the results of a task, for the keys that its scenario has.
 
     A maximum impulse for the cause `engine` follows in closed form, because its authority is proportional to it. The
-    other values are found by bisection: the runs that miss for the cause are simulated again with each value.
+    other values are found by bisection: all runs are simulated again with each value.
     """
     wanted = [(cause, key) for cause in MissCause if cause in results.causes for key in KEYS[cause]]
     wanted = [(cause, key) for cause, key in wanted if _present(task.scenario, key)]
@@ -87,25 +86,26 @@ def find_remedies(task: Task, results: Results, progress: Progress) -> list[Reme
 
 
 def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
-    def simulated(value: float, runs: Sequence[int]) -> Results:
-        scenario = _with(task.scenario, key, value)
-        parts = [runs[first :: os.cpu_count() or 1] for first in range(min(len(runs), os.cpu_count() or 1))]
-        each = replace(task, scenario=scenario, guarantee=False, progress=None, observe=None)
-        return join(simulate_all([replace(each, runs=part) for part in parts]))
+    cores = os.cpu_count() or 1
+    unwatched = replace(task, guarantee=False, progress=None, observe=None)
 
-    now, missed = _present(task.scenario, key), np.array([each is cause for each in results.causes])
-    not_enough: float | None = None
+    @functools.cache
+    def simulated(value: float) -> Results:
+        scenario = _with(task.scenario, key, value)
+        parts = [task.runs[first::cores] for first in range(min(len(task.runs), cores))]
+        return join(simulate_all([replace(unwatched, scenario=scenario, runs=part) for part in parts]))
+
+    now, not_enough = _present(task.scenario, key), None
+    enough: float | None
     if (cause, key) == (MissCause.ENGINE, IMPULSE):
-        beyond_m = results.unguided_miss_m[missed] - (task.scenario.radius_m or 0.0)
-        # 1.005 rounds up.
-        enough = _rounded(1.005 * now * float(np.max(beyond_m / results.engine_corrects_m[missed])))
+        needed = (results.unguided_miss_m - (task.scenario.radius_m or 0.0)) / results.engine_corrects_m
+        enough = _rounded(1.005 * now * float(needed.max()))  # 1.005 rounds up
     else:
-        runs, sign = results.runs[missed].tolist(), 1 if key in (IMPULSE, BUDGET) else -1
-        not_enough, found = _search(lambda value: cause in simulated(value, runs).causes, now, sign)
-        if found is None:
+        sign = 1 if key in (IMPULSE, BUDGET) else -1
+        not_enough, enough = _search(lambda value: cause in simulated(value).causes, now, sign)
+        if enough is None:
             return Remedy(cause, key, now, not_enough, None)
-        enough = found
-    then = simulated(enough, task.runs)
+    then = simulated(enough)
     left = {name: count for name, count in then.missed.items() if count and not name.endswith("_m")}
     return Remedy(cause, key, now, not_enough, enough, then.hits, left)
 

@@ -107,6 +107,23 @@ def test_bound_into_a_folder(
     assert IS_VALUE not in out
 
 
+@pytest.mark.usefixtures("known")
+@pytest.mark.parametrize(
+    ("share", "words"), [(0.99, "cannot be guaranteed by any strategy"), (1.01, "does not exclude")]
+)
+def test_the_bound_alone_names_the_body(
+    share: float, words: str, infoset: Command, short_file: Path, planar: LowerBound
+) -> None:
+    radius = ("--set", f"body.radius_m={share * planar.bound_m}")
+    code, out, _ = infoset("bound", short_file, "--budget", 0, *radius, "--json", "bound.json")
+    assert code == 0
+    (line,) = [line for line in out.splitlines() if words in line]
+    assert f"the body of radius {share * planar.bound_m:g} m" in line
+    assert "symmetric-miss" not in out
+    found = json.loads(Path("bound.json").read_text())
+    assert (found["strategies"], found["hit_cannot_be_guaranteed"]) == ([], share < 1.0)
+
+
 def test_value_where_range_and_speed_are_known(infoset: Command, short: Scenario, tmp_path: Path) -> None:
     box = replace(short.set_model.bounds, x_m=(1745e3, 1745e3), vx_m_s=(-58e3, -58e3))
     free = replace(short, sun=None, dispersion=box, **of_model(replace(short.set_model, bounds=box)))
