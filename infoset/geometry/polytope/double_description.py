@@ -29,6 +29,8 @@ COLLINEAR = 1e-9
 """Distance of a ray from the plane of two others that contains it. A wrong one adds only points of the set."""
 TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
+_RADIAL = 1e-13
+"""The same up to which a vertex of more than n facets moves away from the centre: others need several steps."""
 MAX_CROSSINGS = 50_000
 """Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
 EPS = float(np.finfo(np.float64).eps)
@@ -469,6 +471,17 @@ def _along(row: Floats, step: Floats) -> tuple[float, float]:
 
 
 @_kernels.allocation_free
+def _least_factor(facets: Floats, mine: Integers, needs: Floats, step: Floats, least: float) -> float:
+    """Return the minimum factor of a step, at least `least`, that moves a point by its needs across its facets."""
+    factor = least
+    for m in range(len(mine)):
+        along, _ = _along(facets[mine[m]], step)
+        if needs[m] > factor * along:
+            factor = needs[m] / along if along > 0.0 else np.inf
+    return factor
+
+
+@_kernels.allocation_free
 def _solve(table: Floats, result: Floats) -> None:
     """Write the solution of the linear equations (a, b), a x = b, to a zero result, which stays zero if singular."""
     n = len(table)
@@ -526,29 +539,30 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                     f += 1
             if not inside:
                 break
+            radial = flat or count > n
             for j in range(n):
-                step[j] = points[i, j] - middle[j] if flat else 0.0
-            if count == n and not flat:
-                for m in range(n):
-                    table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
-                _solve(table, step)
-            for _ in range(0 if flat else 50):
-                done = True
-                for m in range(count):
-                    along, square = _along(facets[mine[m]], step)
-                    gap = needs[m] - along
-                    if gap > 0.0:
-                        part = (gap + 0.25 * abs(needs[m])) / square
-                        for j in range(n):
-                            step[j] += part * facets[mine[m], j]
-                        done = False
-                if done:
-                    break
-            factor = 0.0 if flat else 1.0
-            for m in range(count):
-                along, _ = _along(facets[mine[m]], step)
-                if needs[m] > factor * along:
-                    factor = needs[m] / along if along > 0.0 else np.inf
+                step[j] = points[i, j] - middle[j] if radial else 0.0
+            factor = _least_factor(facets, mine[:count], needs, step, 0.0)
+            if not flat and (not radial or factor * math.sqrt(_along(step, step)[0]) > _RADIAL):
+                step[:] = 0.0
+                if count == n:
+                    for m in range(n):
+                        table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
+                    _solve(table, step)
+                for _ in range(50):
+                    done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
+                    for m in range(count):
+                        along, square = _along(facets[mine[m]], step)
+                        gap = needs[m] - along
+                        if gap > rounding:
+                            part = (gap + 0.25 * abs(needs[m])) / square
+                            for j in range(n):
+                                step[j] += part * facets[mine[m], j]
+                            done = False
+                    if done:
+                        break
+                needs[:count] -= EPS * math.sqrt(_along(step, step)[0])
+                factor = _least_factor(facets, mine[:count], needs, step, 1.0)
             length = math.sqrt(_along(step, step)[0])
             if length == 0.0 or moved >= most:
                 break
