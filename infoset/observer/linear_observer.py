@@ -207,8 +207,8 @@ class LinearObserver:
     runs : int, optional
         Number B of runs. Without it there is one run, and its arrays have no axis of runs.
     max_facets : int or None, optional
-        Maximum number of facets of a polytope, at least 2n: 60 to four states, and 30 with at most 400 vertices above.
-        None keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError.
+        Maximum number of facets of a polytope after a measurement, at least 2n: 50 to four states, and 40 with at most
+        700 vertices above. None keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError.
 
     Raises
     ------
@@ -267,7 +267,7 @@ class LinearObserver:
         if runs is not None:
             COUNT.need("runs", runs)
         if max_facets == "auto":
-            max_facets = 60 if self.states <= 4 else 30
+            max_facets = 50 if self.states <= 4 else 40
         if max_facets is not None:
             Limits(minimum=2 * self.states, whole=True).need("max_facets", max_facets)
         self._single = runs is None

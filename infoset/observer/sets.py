@@ -24,7 +24,7 @@ POLYTOPE_SLACK = 1e-11
 ten tolerances of one operation, of which the tip of a sharp corner may be missing."""
 MAX_POLYTOPE_VERTICES = 5000
 """A polytope with more vertices takes minutes a step."""
-_MAX_VERTICES = 400
+_MAX_VERTICES = 700
 """The same for sets of five and six states that are reduced: such sets have many more vertices than facets."""
 _THIN = 3e-8
 """Thickness of a layer in place of a flat set, relative to the coordinates."""
@@ -205,19 +205,23 @@ class Member:
         return replace(self, polytope=operation(polytope), reduced=self.max_facets is not None)
 
     def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
-        """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w."""
+        """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w.
+
+        It is not reduced after the last sum: most of its facets go with the next measurement.
+        """
         terms = np.abs(matrix) @ self.sizes + terms
-        image = self._apply(methodcaller("affine_map", matrix, shift))
+        image = self.limited()._apply(methodcaller("affine_map", matrix, shift))
         moved = image.solid(terms)
         was_solid = moved is image
         if isinstance(disturbance, Zonotope):
-            for half in disturbance.generators:
-                moved = moved._apply(methodcaller("add_segment", half))
-                if len(shift) > 4:  # in many dimensions a sum has many facets
+            for k, half in enumerate(disturbance.generators):
+                if k > 0 and len(shift) > 4:  # in many dimensions a sum has many facets
                     moved = moved.limited()
+                moved = moved._apply(methodcaller("add_segment", half, hull=self.max_facets is None))
         else:
             moved = moved._apply(methodcaller("minkowski_sum", polytope_of(disturbance)))
-        moved = moved.limited()
+        if self.max_facets is None:
+            moved = moved.limited()
         widths = np.ptp(moved.polytope.vertices, axis=0) if not moved.polytope.is_empty else 0.0
         slack = POLYTOPE_SLACK if moved.solid(terms) is moved and was_solid else _THIN
         return moved._apply(methodcaller("enlarged", SUM_SLACK * terms + slack * widths))

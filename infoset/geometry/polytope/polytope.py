@@ -162,11 +162,12 @@ class Polytope(PolytopeArrays):
         points, centre, scale, errors = _image(np.hstack(pairs), matrix, shift[0], rounded)
         return self._hull(points, centre, scale, FLAT, errors)
 
-    def add_segment(self, half: ArrayLike) -> Polytope:
+    def add_segment(self, half: ArrayLike, *, hull: bool = True) -> Polytope:
         """Return the Minkowski sum with the segment from -half to +half, shape (n,).
 
-        Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet:
-        no hull is needed if the set has an interior.
+        Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet.
+        Where rounding decides which ridges do, the sum is a hull of points, which may take long; without `hull` it is
+        an UncertainHullError.
         """
         along = finite_values("half", half, self.space)
         if self.is_empty or not along.any():
@@ -197,6 +198,8 @@ class Polytope(PolytopeArrays):
         try:
             whole = whole._around(errors)._reduced(np.zeros(len(points), bool))
         except UncertainHullError:
+            if not hull:
+                raise
             return self._hull(points, self.centre, self.scale, FLAT, errors)
         return whole if np.abs(points).max() < 64.0 else whole.affine_map(np.eye(self.space))
 
