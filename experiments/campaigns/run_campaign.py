@@ -9,7 +9,7 @@ from experiments.common.errors import input_errors
 from experiments.common.input_file import to_toml
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import show, some_runs
-from experiments.interception.course import duration_text
+from experiments.common.units import duration_text
 from experiments.interception.strategies import own_strategy
 from experiments.interception.study import study_title
 from sim import Campaign, StoppingRule

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from experiments.common.errors import on_a_screen
+from experiments.common.units import duration_text
 from sim.statistics import level_name, shows
 
 BeginProgress = Callable[[str], Callable[[float], None]]
@@ -133,7 +134,7 @@ class _Estimate:
         if not self._is_told:
             self._is_told = True
             if now_s - first_s + left_s > LONG_S:
-                self._tell(f"estimated time: {time_text(now_s - first_s + left_s)}")
+                self._tell(f"estimated time: {duration_text(round(now_s - first_s + left_s))}")
         return left_s
 
 
@@ -145,18 +146,10 @@ def _progress_lines(name: str, estimate: _Estimate) -> Callable[[float], None]:
         left_s = estimate.update(part, done)
         if time.monotonic() - last_s >= LINE_EVERY_S:
             last_s = time.monotonic()
-            left = "" if left_s is None else f", {time_text(left_s)} left"
+            left = "" if left_s is None else f", {duration_text(round(left_s))} left"
             say(f"{name}: {100.0 * done:.0f} %{left}", quiet=False)
 
     return progress
-
-
-def time_text(seconds: float) -> str:
-    """Return a time in seconds, or from two of them on in minutes or hours."""
-    for unit_s, unit in ((3600.0, "h"), (60.0, "min")):
-        if seconds >= 2.0 * unit_s:
-            return f"{seconds / unit_s:.3g} {unit}"
-    return f"{seconds:.0f} s"
 
 
 def number(value: float | None) -> str:

@@ -80,6 +80,13 @@ def time_unit(span_s: float) -> Unit:
     return ("h", 1.0 / S_PER_HOUR) if span_s > 4.0 * S_PER_HOUR else ("s", 1.0)
 
 
+def duration_text(seconds: float) -> str:
+    """Return a time in the maximum unit of which it has exactly one or at least two: ``2.5 min``, ``100 s``."""
+    fitting = [name for name, unit in SECONDS.items() if seconds == unit or seconds >= 2.0 * unit]
+    name = fitting[-1] if fitting else "s"
+    return f"{seconds / SECONDS[name]:.3g} {name}"
+
+
 def length_unit(size_m: float) -> Unit:
     """Return the unit for lengths up to a size."""
     for name, metres, minimum in (("au", float(UNITS["au"][1]), 7.5e9), ("Mm", 1e6, 2e6), ("km", M_PER_KM, 3e3)):

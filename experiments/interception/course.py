@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.common.units import SECONDS
+from experiments.common.units import duration_text
 from guidance.thruster import modulus
 from infoset.arrays import Floats, Integers
 from sim import Outcome, Record, Scenario
@@ -97,13 +97,6 @@ def marks(scenario: Scenario) -> dict[str, float]:
     if thruster.impulses_s and thruster.last_impulse_s is None:
         times["last impulse"] = thruster.impulses_s[-1]
     return {name: time for name, time in times.items() if time is not None and time < scenario.nominal_arrival_s}
-
-
-def duration_text(seconds: float) -> str:
-    """Return a time in the maximum unit of which it has exactly one or at least two: ``2.5 min``, ``100 s``."""
-    fitting = [name for name, unit in SECONDS.items() if seconds == unit or seconds >= 2.0 * unit]
-    name = fitting[-1] if fitting else "s"
-    return f"{seconds / SECONDS[name]:.3g} {name}"
 
 
 def true_predicted_misses(record: Record) -> Floats:

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
+from experiments.common.units import duration_text
 from experiments.interception.course import (
     Clock,
     complete_steps,
-    duration_text,
     kept_steps,
     marks,
     min_to_go_s,
