@@ -100,6 +100,27 @@ def images_s(scenario: Scenario) -> tuple[float, float]:
     return before_s[0], before_s[-1]
 
 
+def number_of_images(scenario: Scenario) -> int:
+    """Return the number of images before the last decision of an impulse, at the nominal arrival."""
+    return len(_images_s(scenario))
+
+
+def last_possible_miss_m(scenario: Scenario) -> float | None:
+    """Return half the maximum width of the interval of misses that all images leave possible at the last decision, m.
+
+    It is the distance of the two motions of `worst_shift_m` at the arrival, for a known range and closing speed; in
+    space that of both axes at once. None with fewer than two images.
+    """
+    model, before_s = scenario.set_model, np.array(_images_s(scenario))
+    if before_s.size < 2:
+        return None
+    misses_m = []
+    for axis in map(model.axis, model.axes):
+        bound_m, speed_m_s = _worst_difference(axis, before_s, scenario.nominal_arrival_s)
+        misses_m.append(bound_m + 0.5 * before_s[-1] * (speed_m_s + axis.disturbance_m_s2 * before_s[-1]))
+    return math.hypot(*misses_m)
+
+
 def worst_shift_m(scenario: Scenario) -> Floats | None:
     """Return how far game noise shifts the measured position across x in each step, m, shape (C, steps).
 
@@ -123,8 +144,8 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     return np.stack(shifts_m)
 
 
-def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) -> Floats:
-    """Return `worst_shift_m` in the planar model of one axis, for images at these times before the arrival, s."""
+def _worst_difference(model: SetModel, before_s: Floats, arrival_s: float) -> tuple[float, float]:
+    """Return b0, m, and the maximum s, m/s, of `worst_shift_m` in the planar model of one axis."""
     range_m = before_s * model.closing_speed_m_s
     bound_m, last_s = model.angle_sensor.error_bound(range_m) * range_m, before_s[-1]
     earlier_s, disturbance, (minimum, maximum) = before_s[:-1] - last_s, model.disturbance_m_s2, model.bounds.vz_m_s
@@ -132,9 +153,16 @@ def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) ->
         np.min(2.0 * (bound_m[-1] + bound_m[:-1]) / earlier_s + disturbance * earlier_s),
         maximum - minimum + 2.0 * disturbance * (arrival_s - last_s),
     )
+    return bound_m[-1], speed_m_s
+
+
+def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) -> Floats:
+    """Return `worst_shift_m` in the planar model of one axis, for images at these times before the arrival, s."""
+    bound_m, speed_m_s = _worst_difference(model, before_s, arrival_s)
+    disturbance, last_s = model.disturbance_m_s2, before_s[-1]
     times_s = arrival_s - last_s - model.step_s * np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
     times_s = np.clip(times_s, 0.0, 0.5 * speed_m_s / disturbance if disturbance else None)
-    return np.asarray(bound_m[-1] - 0.5 * speed_m_s * times_s + 0.5 * disturbance * times_s**2, dtype=np.float64)
+    return np.asarray(bound_m - 0.5 * speed_m_s * times_s + 0.5 * disturbance * times_s**2, dtype=np.float64)
 
 
 def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> float:

@@ -1,0 +1,80 @@
+"""What engine, budget, images and body of a scenario allow, before anything is simulated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from guidance.authority import correctable_m
+from infoset.arrays import Floats
+from sim.closed_form import last_possible_miss_m, number_of_images
+from sim.draws import starts
+from sim.scenario import Scenario
+
+STARTS = 1000
+"""Number of starts: those of the first runs of seed 0."""
+
+
+@dataclass(frozen=True)
+class Feasibility:
+    """What a scenario allows.
+
+    Parameters
+    ----------
+    steps, images, decisions : int
+        Numbers of steps until the nominal arrival, of images before the last decision, and of steps in which an impulse
+        can be given.
+    unguided_miss_m : float
+        Maximum miss without impulses of `STARTS` starts, without gravity, m.
+    engine_corrects_m, budget_corrects_m : float
+        What all impulses of the nominal flight can correct: with any budget, and with that of the engine, m.
+    beyond_engine, beyond_budget : float
+        Shares of the starts that no impulses can bring to a hit: with any budget, and with that of the engine.
+    last_possible_miss_m : float or None
+        Half-width of the misses that the images leave possible at the last decision, with errors at their bounds, m
+        (`sim.closed_form.last_possible_miss_m`); None with fewer than two images.
+    """
+
+    steps: int
+    images: int
+    decisions: int
+    unguided_miss_m: float
+    engine_corrects_m: float
+    budget_corrects_m: float
+    beyond_engine: float
+    beyond_budget: float
+    last_possible_miss_m: float | None
+
+
+def feasibility(scenario: Scenario) -> Feasibility:
+    """Return what a scenario allows; a start is beyond an engine that corrects less than its miss minus the radius."""
+    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
+    position_m, velocity_m_s = starts(scenario, range(STARTS), 0)
+    arrivals_s = position_m[:, -1] / -velocity_m_s[:, -1]
+    unguided_m = np.hypot.reduce(position_m[:, :-1] + velocity_m_s[:, :-1] * arrivals_s[:, None], axis=1)
+    every = range(thruster.delay_steps, int(max(arrival_s, arrivals_s.max()) / model.step_s) + 1)
+    times_s = model.step_s * np.array(every if scenario.impulse_steps is None else scenario.impulse_steps, dtype=float)
+
+    def corrected_m(budget_m_s: float, to_go_s: Floats) -> Floats:
+        favour = 1.0 + thruster.execution_error_relative  # errors of all impulses that help
+        return favour * correctable_m(times_s, thruster, np.full_like(to_go_s, budget_m_s), to_go_s)
+
+    engine_m_s = thruster.max_impulse_m_s * (len(times_s) + 1)
+    radius_m = scenario.radius_m or 0.0
+    beyond = {
+        budget_m_s: float((unguided_m - corrected_m(budget_m_s, arrivals_s) > radius_m).mean())
+        for budget_m_s in (engine_m_s, thruster.budget_m_s)
+    }
+    nominal_s = np.array([arrival_s])
+    return Feasibility(
+        steps=int(arrival_s / model.step_s),
+        images=number_of_images(scenario),
+        decisions=int((times_s < arrival_s).sum()),
+        unguided_miss_m=float(unguided_m.max()),
+        engine_corrects_m=corrected_m(engine_m_s, nominal_s).item(),
+        budget_corrects_m=corrected_m(thruster.budget_m_s, nominal_s).item(),
+        beyond_engine=beyond[engine_m_s],
+        beyond_budget=beyond[thruster.budget_m_s],
+        last_possible_miss_m=last_possible_miss_m(scenario),
+    )
