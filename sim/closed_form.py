@@ -75,7 +75,7 @@ def possible_miss_m(
     return miss_m
 
 
-def _images_s(scenario: Scenario) -> list[float]:
+def image_times_s(scenario: Scenario) -> list[float]:
     """Return the times before the nominal arrival of the images until the last decision of an impulse, s."""
     model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
     steps = scenario.impulse_steps
@@ -94,15 +94,10 @@ def images_s(scenario: Scenario) -> tuple[float, float]:
 
     A ValueError is raised if there are fewer than two such images.
     """
-    before_s = _images_s(scenario)
+    before_s = image_times_s(scenario)
     if len(before_s) < 2:
         raise ValueError("a bound of the miss needs two images before the last impulse: take more images, or earlier")
     return before_s[0], before_s[-1]
-
-
-def number_of_images(scenario: Scenario) -> int:
-    """Return the number of images before the last decision of an impulse, at the nominal arrival."""
-    return len(_images_s(scenario))
 
 
 def last_possible_miss_m(scenario: Scenario) -> float | None:
@@ -111,7 +106,7 @@ def last_possible_miss_m(scenario: Scenario) -> float | None:
     It is the distance of the two motions of `worst_shift_m` at the arrival, for a known range and closing speed; in
     space that of both axes at once. None with fewer than two images.
     """
-    model, before_s = scenario.set_model, np.array(_images_s(scenario))
+    model, before_s = scenario.set_model, np.array(image_times_s(scenario))
     if before_s.size < 2:
         return None
     misses_m = []
@@ -137,7 +132,7 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     model = scenario.set_model
     if scenario.impulse_steps is None:
         return None
-    before_s = np.array(_images_s(scenario))
+    before_s = np.array(image_times_s(scenario))
     if before_s.size < 2:
         return None
     shifts_m = [_worst_shift_along_m(model.axis(name), before_s, scenario.nominal_arrival_s) for name in model.axes]

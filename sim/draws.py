@@ -63,19 +63,8 @@ class Draws:
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     """Return the random numbers of some runs; run k has the same numbers in every call with the same seed."""
-    steps = max_number_of_steps(scenario)
-    lower, upper = corners(scenario.dispersion)
-    axes, redraws = scenario.set_model.axes, None
-    if scenario.covariance is None:
-        starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
-        if "y" in axes:
-            along_y = np.stack([generator(seed, run, START + Y).uniform(size=2) for run in runs])
-            starts = np.insert(starts, [0, 2], along_y, axis=1)
-        starts = lower + (upper - lower) * starts
-    else:
-        of_run = [_normal_start(lower, upper, scenario.covariance, generator(seed, run, START)) for run in runs]
-        starts, redraws = np.stack([start for start, _ in of_run]), np.array([count for _, count in of_run])
-    position_m, velocity_m_s = np.split(starts, 2, axis=1)
+    steps, axes = max_number_of_steps(scenario), scenario.set_model.axes
+    position_m, velocity_m_s, redraws = draw_starts(scenario, runs, seed)
 
     def uniform(stream: int, size: int = steps) -> Floats:
         return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=size) for run in runs])
@@ -105,6 +94,23 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         ),
         redraws=redraws,
     )
+
+
+def draw_starts(scenario: Scenario, runs: Sequence[int], seed: int) -> tuple[Floats, Floats, Integers | None]:
+    """Return `position_m`, `velocity_m_s` and `redraws` of the `Draws` of some runs."""
+    lower, upper = corners(scenario.dispersion)
+    redraws = None
+    if scenario.covariance is None:
+        starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
+        if scenario.is_spatial:
+            along_y = np.stack([generator(seed, run, START + Y).uniform(size=2) for run in runs])
+            starts = np.insert(starts, [0, 2], along_y, axis=1)
+        starts = lower + (upper - lower) * starts
+    else:
+        of_run = [_normal_start(lower, upper, scenario.covariance, generator(seed, run, START)) for run in runs]
+        starts, redraws = np.stack([start for start, _ in of_run]), np.array([count for _, count in of_run])
+    position_m, velocity_m_s = np.split(starts, 2, axis=1)
+    return position_m, velocity_m_s, redraws
 
 
 def _normal_start(

@@ -8,11 +8,11 @@ import numpy as np
 
 from guidance.authority import correctable_m
 from infoset.arrays import Floats
-from sim.closed_form import last_possible_miss_m, number_of_images
-from sim.draws import starts
-from sim.scenario import Scenario
+from sim.closed_form import image_times_s, last_possible_miss_m
+from sim.draws import draw_starts
+from sim.scenario import MAX_STEPS, Scenario
 
-STARTS = 1000
+STARTS = 400
 """Number of starts: those of the first runs of seed 0."""
 
 
@@ -47,13 +47,18 @@ class Feasibility:
     last_possible_miss_m: float | None
 
 
-def feasibility(scenario: Scenario) -> Feasibility:
-    """Return what a scenario allows; a start is beyond an engine that corrects less than its miss minus the radius."""
+def feasibility(scenario: Scenario) -> Feasibility | None:
+    """Return what a scenario allows; None if the nominal arrival is more than `MAX_STEPS` away.
+
+    A start is beyond an engine that corrects less than its miss minus the radius of the body.
+    """
     model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
-    position_m, velocity_m_s = starts(scenario, range(STARTS), 0)
+    if arrival_s > MAX_STEPS * model.step_s:
+        return None
+    position_m, velocity_m_s, _ = draw_starts(scenario, range(STARTS), 0)
     arrivals_s = position_m[:, -1] / -velocity_m_s[:, -1]
     unguided_m = np.hypot.reduce(position_m[:, :-1] + velocity_m_s[:, :-1] * arrivals_s[:, None], axis=1)
-    every = range(thruster.delay_steps, int(max(arrival_s, arrivals_s.max()) / model.step_s) + 1)
+    every = range(thruster.delay_steps, int(arrivals_s.max() / model.step_s) + 1)
     times_s = model.step_s * np.array(every if scenario.impulse_steps is None else scenario.impulse_steps, dtype=float)
 
     def corrected_m(budget_m_s: float, to_go_s: Floats) -> Floats:
@@ -69,7 +74,7 @@ def feasibility(scenario: Scenario) -> Feasibility:
     nominal_s = np.array([arrival_s])
     return Feasibility(
         steps=int(arrival_s / model.step_s),
-        images=number_of_images(scenario),
+        images=len(image_times_s(scenario)),
         decisions=int((times_s < arrival_s).sum()),
         unguided_miss_m=float(unguided_m.max()),
         engine_corrects_m=corrected_m(engine_m_s, nominal_s).item(),

@@ -13,7 +13,7 @@ from experiments.campaigns.cluster import workers_of
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
 from experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
-from experiments.interception.scenario_file import scenario_warnings, study_scenario
+from experiments.interception.scenario_file import feasibility_warnings, scenario_warnings, study_scenario
 from experiments.interception.strategies import OwnNoise, chosen_noise
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import MANIFEST, CampaignFolder, StorageError, need_free, read_manifest
@@ -59,6 +59,9 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
     need_free(options.out, resume=options.resume)
     scenarios = campaign.cells or (campaign.scenario,)
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
+    corners = dict.fromkeys((scenarios[0], scenarios[-1]))
+    for name, scenario in zip(("first cell: ", "last cell: ") if campaign.cells else ("",), corners, strict=False):
+        warnings += [f"{name}{line}" for line in feasibility_warnings(scenario)]
     say_warnings(warnings[: MAX_WARNINGS if campaign.cells else None], options.quiet, notes)
     with (
         workers_of(options, campaign.engagements, partial(say, quiet=options.quiet)) as (executor, workers),

@@ -87,6 +87,12 @@ def duration_text(seconds: float) -> str:
     return f"{seconds / SECONDS[name]:.3g} {name}"
 
 
+def length_text(length_m: float) -> str:
+    """Return a length with four digits in the unit of its size: ``37.17 m``, ``25.1 km``."""
+    name, per_metre = length_unit(length_m)
+    return f"{length_m * per_metre:.4g} {name}"
+
+
 def length_unit(size_m: float) -> Unit:
     """Return the unit for lengths up to a size."""
     for name, metres, minimum in (("au", float(UNITS["au"][1]), 7.5e9), ("Mm", 1e6, 2e6), ("km", M_PER_KM, 3e3)):

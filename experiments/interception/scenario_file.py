@@ -10,14 +10,21 @@ from typing import Any
 from experiments.common.errors import InputError, input_errors
 from experiments.common.input_file import read_file
 from experiments.common.options import choice
+from experiments.common.units import duration_text, length_text
 from experiments.interception.strategies import is_own
+from experiments.interception.study import percent
 from guidance import TieRule, strategy_names
 from infoset.model import Model, SetModel
+from sim.feasibility import feasibility
 from sim.gravity import on_board_model
 from sim.scenario import Scenario, Target
 
 FAR = 10.0
 """Ratio of the nominal range to the possible ranges from which `scenario_warnings` reports it."""
+FEW_STEPS, MANY_STEPS, MANY_SECTIONS = 20, 20_000, 100
+"""Numbers of decisions, steps and sections that are reported as probably not intended."""
+STEP_COST_S = 1e-5
+"""Typical time of a step of a run along one axis, s."""
 SMALL_ANGLE_RAD = 0.01
 """Largest line-of-sight angle for the model `paper`, which replaces tangents by their angles."""
 
@@ -157,6 +164,66 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         lines.append(
             f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.min_impulse_m_s, "
             f"{thruster.min_impulse_m_s:g}: no impulse can be given"
+        )
+    return lines
+
+
+def flight_facts(scenario: Scenario) -> list[str]:
+    """Return lines about the flight, what its impulses correct, and what its images leave open."""
+    found = feasibility(scenario)
+    if found is None:
+        return []
+    lines = [
+        f"flight: {duration_text(scenario.nominal_arrival_s)} in {found.steps} steps, with {found.images} images and "
+        f"{found.decisions} possible impulses",
+        f"miss without impulses: up to {length_text(found.unguided_miss_m)}; all impulses correct up to "
+        f"{length_text(found.budget_corrects_m)}",
+    ]
+    if found.last_possible_miss_m is not None:
+        possible = length_text(found.last_possible_miss_m)
+        lines.append(f"miss that the images leave possible, with errors at their bounds: up to {possible}")
+    return lines
+
+
+def feasibility_warnings(scenario: Scenario) -> list[str]:
+    """Return warnings about an engine, a budget, images, steps or sections that do not fit the flight, a line each."""
+    found, lines, before = feasibility(scenario), [], 0.0
+    if found is None:  # `scenario_warnings` reports the nominal range
+        return []
+    hit = "hit" if scenario.body else "have a miss of zero"
+    for share, corrected_m, name, key in (
+        (found.beyond_engine, found.engine_corrects_m, "engine", "max_impulse_m_s"),
+        (found.beyond_budget, found.budget_corrects_m, "budget", "budget_m_s"),
+    ):
+        if share > before:
+            lines.append(
+                f"the {name} corrects at most {length_text(corrected_m)}, and the starts of [dispersion] miss by up to "
+                f"{length_text(found.unguided_miss_m)}: {percent(share)} of them cannot {hit}, whatever the guidance "
+                f"does; a greater thruster.{key}, earlier impulses or a narrower dispersion would change it"
+            )
+        before = share
+    possible_m, radius_m = found.last_possible_miss_m, scenario.radius_m
+    if possible_m is not None and radius_m is not None and possible_m > radius_m:
+        lines.append(
+            f"the images before the last decision leave misses of up to {length_text(possible_m)} possible, and "
+            f"body.radius_m is {radius_m:g}: no hit is certain before the flight; smaller errors of the images or a "
+            "later last impulse would change it"
+        )
+    if found.decisions < FEW_STEPS and not scenario.thruster.impulses_s:
+        lines.append(
+            f"step_s is {scenario.step_s:g} s: impulses can be decided in only {found.decisions} steps of the flight; "
+            f"check its unit, or write a shorter step (at most {scenario.nominal_arrival_s / 100:.3g} s for 100 steps)"
+        )
+    if found.steps > MANY_STEPS:
+        duration = duration_text(round(STEP_COST_S * found.steps * len(scenario.set_model.axes), 1))
+        lines.append(
+            f"the flight has {found.steps} steps of {scenario.step_s:g} s, and a run takes about {duration}; check the "
+            "unit of step_s, or write a longer step"
+        )
+    if scenario.information_set.sections > MANY_SECTIONS:
+        lines.append(
+            f"information_set.sections is {scenario.information_set.sections}: more than 10 to 30 take time and hardly "
+            "change a result"
         )
     return lines
 

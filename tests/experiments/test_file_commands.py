@@ -18,6 +18,12 @@ from tests.fuzzing.subjects import text_files
 FILES = built_in_files()
 MINE = {"scenarios": "own-scenario", "problems": "service-2"}
 
+FACTS = [
+    "flight",
+    "miss without impulses",
+    "miss that the images leave possible, with errors at their bounds",
+]
+
 
 @pytest.mark.parametrize("noun", MINE)
 def test_the_list_has_every_built_in_file(noun: str, infoset: Command) -> None:
@@ -40,7 +46,10 @@ def test_a_built_in_file_is_shown_copied_checked_and_written_again(name: str, in
     owner = text_files()[file.kind].owner
     value: Any = read_text(owner, file.text, name)
     assert read_text(owner, to_toml(value), "written") == value
-    assert infoset(noun, "check", "mine.toml")[:2] == (0, f"ok  {name}  {fingerprint(value)}\n")
+    code, out, _ = infoset(noun, "check", "mine.toml")
+    ok, *facts = out.splitlines()
+    assert (code, ok) == (0, f"ok  {name}  {fingerprint(value)}")
+    assert [fact.partition(":")[0] for fact in facts] == (FACTS if noun == "scenarios" else [])
     found = json.loads(infoset(noun, "check", "mine.toml", "--json")[1])
     assert (found["name"], found.get("kind", SCENARIO)) == (name, file.kind)
     assert infoset(noun, "check", name, "--quiet") == (0, "", "")

@@ -14,7 +14,7 @@ import numpy as np
 from experiments.common.built_in_files import SCENARIO, built_in_files
 from experiments.common.input_file import load_problem, read_text, to_toml
 from experiments.interception import record_file
-from experiments.interception.scenario_file import load_scenario, scenario_warnings
+from experiments.interception.scenario_file import feasibility_warnings, load_scenario, scenario_warnings
 from experiments.interception.trajectory_file import Trajectory
 from experiments.multipoint.file import MultipointProblem
 from experiments.observer.file import ObserverProblem
@@ -50,6 +50,7 @@ class TextFile:
         assert read_text(self.owner, to_toml(found), "written again") == found
         if isinstance(found, Scenario):
             scenario_warnings(found)
+            feasibility_warnings(found)
         return found
 
 

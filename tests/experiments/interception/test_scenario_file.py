@@ -10,7 +10,7 @@ import pytest
 from experiments.common.errors import InputError
 from experiments.common.input_file import read_text, to_toml
 from experiments.common.units import si_factor
-from experiments.interception.scenario_file import load_scenario, scenario_warnings, with_model
+from experiments.interception.scenario_file import feasibility_warnings, load_scenario, scenario_warnings, with_model
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.model import Model, SetModel, SetSettings, StateBox
@@ -196,3 +196,22 @@ def test_random_numbers_come_back_bit_for_bit() -> None:
         again = read_text(Scenario, to_toml(scenario), "again")
         assert repr(again) == repr(scenario)  # equality does not see the sign of a zero
         assert fingerprint(again) == fingerprint(scenario)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "part"),
+    [
+        ("dart-2022", ["thruster.impulses_s=[600, 300]"], "the engine corrects at most 56.7 m"),  # 900 s of 0.063 m/s
+        ("dart-2022", ["thruster.budget_m_s=0.02"], "the budget corrects at most 302.4 m, and the starts of [disp"),
+        ("dart-2022", ["thruster.last_impulse_s=900"], "misses of up to 197.5 m possible, and body.radius_m is 75"),
+        ("dart-2022", ["step_s=1000", "camera.period_s=1000"], "step_s is 1000 s: impulses can be decided in only 15"),
+        ("dart-2022", ["step_s=0.2"], "the flight has 72000 steps of 0.2 s, and a run takes about 1.4 s"),
+        ("asteroid-1997", ["information_set.sections=400"], "information_set.sections is 400"),
+        ("asteroid-1997", ["thruster.max_impulse_m_s=0.3"], "of them cannot have a miss of zero"),
+    ],
+)
+def test_what_does_not_fit_the_flight_is_a_warning(name: str, settings: list[str], part: str) -> None:
+    assert feasibility_warnings(load_scenario(name)) == []
+    found = feasibility_warnings(load_scenario(name, settings))
+    assert any(part in line for line in found), found
+    assert feasibility_warnings(load_scenario(name, ["nominal_range_km=1e12"])) == []
