@@ -1,18 +1,27 @@
-"""The approach of a spacecraft to an object, from the states of both: geometry, attracting body and covariance."""
+"""The approach of a spacecraft to an object from the states of both, in the axes of its B-plane.
+
+A pair of states is an array of shape (4, 3): position and velocity of the spacecraft from the attracting body, and of
+the object from the spacecraft. Without an attracting body its parameter K is zero, and both move on straight lines.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from infoset import StateBox
 from infoset.arrays import Floats
-from sim.b_plane import approach_axes, b_plane
+from sim.covariance import Covariance, covariance_of
+from sim.results import b_plane
 from sim.scenario import Sun
-from sim.two_body import closest_approach_s, propagate
 
+TOLERANCE = 1e-12
+"""Relative error of a step of the integration."""
+SEARCH = 3.0
+"""The closest approach is searched for up to this multiple of the time that straight lines take to it."""
 WIDEST = 0.1
 """Maximum miss of an approach in units of its range at the start."""
 SPEEDS = (0.05, 20.0)
@@ -21,32 +30,17 @@ SPEEDS = (0.05, 20.0)
 
 @dataclass(frozen=True)
 class Approach:
-    """An approach without impulses, in the axes of a scenario: y along T, z along R and x along S of the B-plane.
+    """An approach without impulses, with (y, z, x) along (T, R, S) of the B-plane across the velocity at its start.
 
-    The B-plane is across the relative velocity at the start.
-
-    Parameters
-    ----------
-    start_s : float
-        Time from the epoch of the states to the start, s.
-    flight_s : float
-        Time from the start to the closest approach, s.
-    state : ndarray, shape (6,)
-        (y, z, x), m, and (V_y, V_z, V_x), m/s, of the object from the spacecraft at the start.
-    covariance : ndarray, shape (6, 6)
-        Its covariance.
-    sun : Sun or None
-        The attracting body at the start.
-    miss_m : ndarray, shape (2,)
-        (B.T, B.R) of the closest approach.
-    speed_change_m_s, turn_rad : float
-        Changes of the closing speed, m/s, and of the direction of approach, rad, until the closest approach.
+    It starts `start_s` after the epoch of the states, with the relative state (y, z, x) and (V_y, V_z, V_x), its
+    covariance and the attracting body, and lasts `flight_s` until the closest approach at (B.T, B.R). Until then the
+    closing speed and the direction of approach change.
     """
 
     start_s: float
     flight_s: float
     state: Floats
-    covariance: Floats
+    covariance: Covariance
     sun: Sun | None
     miss_m: Floats
     speed_change_m_s: float
@@ -54,86 +48,142 @@ class Approach:
 
     def box(self, sigmas: float) -> StateBox:
         """Return the box of a number of standard deviations around the state."""
-        half = sigmas * np.sqrt(np.maximum(self.covariance.diagonal(), 0.0))
-        ends = [(_rounded(low), _rounded(high)) for low, high in zip(self.state - half, self.state + half, strict=True)]
+        ends = (
+            (_rounded(x - sigmas * s), _rounded(x + sigmas * s))
+            for x, s in zip(self.state, self.covariance.sigma, strict=True)
+        )
         return StateBox(**dict(zip(("y_m", "z_m", "x_m", "vy_m_s", "vz_m_s", "vx_m_s"), ends, strict=True)))
 
 
 def find_approach(
-    states: Floats,
-    parameter_m3_s2: float,
-    covariance: Floats,
-    pole: Floats,
-    flight_s: float | None,
+    states: Floats, parameter_m3_s2: float, covariance: Floats, pole: Floats, flight_s: float | None
 ) -> Approach:
-    """Return the approach of a pair of states at an epoch.
+    """Return the approach of a pair of states at an epoch, with the covariance of the relative state, shape (6, 6).
 
-    Parameters
-    ----------
-    states : ndarray, shape (4, 3)
-        See `sim.two_body`.
-    parameter_m3_s2 : float
-        Gravitational parameter of the attracting body; zero is no gravity.
-    covariance : ndarray, shape (6, 6)
-        Covariance of the relative state at the epoch.
-    pole : ndarray, shape (3,)
-        Normal of the reference plane of the B-plane.
-    flight_s : float or None
-        Time from the start to the closest approach; None starts at the epoch.
-
-    Raises
-    ------
-    ValueError
-        If there is no approach, or it does not fit a scenario.
+    `pole` is the normal of the reference plane of the B-plane. The approach starts `flight_s` before the closest one;
+    None is the epoch. A ValueError is raised if there is none, or it does not fit a scenario.
     """
-    _check_speeds(states, parameter_m3_s2)
+    speed, distance_m = np.linalg.norm(states[1]), np.linalg.norm(states[0])
+    if parameter_m3_s2:
+        ratio = float(speed * math.sqrt(distance_m / parameter_m3_s2))
+        if not SPEEDS[0] <= ratio <= SPEEDS[1]:
+            raise ValueError(
+                f"spacecraft: its speed is {ratio:.3g} times that of a circular orbit at its distance of "
+                f"{distance_m / 1e3:.6g} km: check the units of positions, velocities and the gravitational parameter"
+            )
     arrival_s = closest_approach_s(states, parameter_m3_s2)
     start_s = 0.0 if flight_s is None else arrival_s - flight_s
-    start, transition = propagate(states, parameter_m3_s2, start_s)
-    end, _ = propagate(start, parameter_m3_s2, arrival_s - start_s)
-    axes = approach_axes(start[3], pole)
-    (range_m, *_), miss_m = (axes @ start[2])[::-1], float(np.linalg.norm(end[2]))
     if arrival_s <= start_s:
         raise ValueError(
             f"the closest approach is {-arrival_s / 86400.0:.6g} d before the epoch: give earlier states, or flight_s"
         )
-    if miss_m > WIDEST * range_m:
+    start, transition = propagate(states, parameter_m3_s2, start_s)
+    end, _ = propagate(start, parameter_m3_s2, arrival_s - start_s)
+    axes = approach_axes(start[3], pole)
+    place, miss_m = axes @ start[2], float(np.linalg.norm(end[2]))
+    if miss_m > WIDEST * place[2]:
         raise ValueError(
             f"the states do not meet: the closest approach is {miss_m / 1e3:.6g} km, {arrival_s / 86400.0:.6g} d after "
-            f"the epoch, from {range_m / 1e3:.6g} km at the start; check the units, the epoch and the reference frame"
+            f"the epoch, from {place[2] / 1e3:.6g} km at the start; check the units, the epoch and the reference frame"
         )
     change = np.kron(np.eye(2), axes) @ transition
-    matrix = change @ covariance @ change.T
     speeds = np.linalg.norm([start[3], end[3]], axis=1)
-    cross = np.linalg.norm(np.cross(start[3], end[3])) / speeds.prod()
     return Approach(
         start_s=start_s,
         flight_s=arrival_s - start_s,
-        state=np.array([*map(_rounded, axes @ start[2]), 0.0, 0.0, _rounded(-speeds[0])]),
-        covariance=0.5 * (matrix + matrix.T),
+        state=np.array([*map(_rounded, place), 0.0, 0.0, _rounded(-speeds[0])]),
+        covariance=covariance_of(change @ covariance @ change.T),
         sun=_sun(axes @ start[0], axes @ start[1], parameter_m3_s2) if parameter_m3_s2 else None,
         miss_m=b_plane((axes @ end[2])[None, :2], 0.0)[0],
         speed_change_m_s=float(speeds[1] - speeds[0]),
-        turn_rad=float(np.arctan2(cross, start[3] @ end[3] / speeds.prod())),
+        turn_rad=float(np.linalg.norm(np.cross(start[3], end[3])) / speeds.prod()),
     )
 
 
-def _check_speeds(states: Floats, parameter_m3_s2: float) -> None:
-    """Refuse states that do not move, and speeds that no orbit around the attracting body has."""
-    if not states[3].any():
+def approach_axes(velocity: Floats, pole: Floats) -> Floats:
+    """Return the axes (T, R, S) of a B-plane as rows, from the velocity of the object relative to the spacecraft.
+
+    S is opposite to this velocity, T = S x N / |S x N| with the normal N of the reference plane, the `pole`, and
+    R = S x T: T is the line in which the two planes meet. A ValueError is raised if the approach is along the pole.
+
+    References
+    ----------
+    Kizner (1961), A method of describing miss distances for lunar and interplanetary trajectories, Planetary and Space
+    Science 7.
+    """
+    along = -velocity / np.linalg.norm(velocity)
+    across = np.cross(along, pole)
+    size = np.linalg.norm(across)
+    if size <= 1e-9 * np.linalg.norm(pole):  # T would be rounding
+        raise ValueError("pole: must not be along the line of approach, where T has no direction")
+    return np.stack([across / size, np.cross(along, across / size), along])
+
+
+def closest_approach_s(states: Floats, parameter_m3_s2: float) -> float:
+    """Return the time of the closest approach of a pair, s; it is negative if the two recede now.
+
+    A ValueError is raised if there is none within `SEARCH` times the time that straight lines take to theirs.
+    """
+    relative, velocity = states[2:]
+    if not velocity.any():
         raise ValueError("spacecraft and object have the same velocity")
+    horizon_s = float(-SEARCH * (relative @ velocity) / (velocity @ velocity))
+
+    def radial(_time: float, state: Floats) -> float:
+        return float(state[6:9] @ state[9:12])
+
+    radial.terminal, radial.direction = True, np.sign(horizon_s)  # type: ignore[attr-defined]  # from falling to rising
+    times_s = _integrate(states, parameter_m3_s2, horizon_s, radial).t_events[0] if horizon_s else np.zeros(1)
+    if not len(times_s):
+        raise ValueError(f"the states have no closest approach within {abs(horizon_s) / 86400.0:.4g} d of their epoch")
+    (_, _, relative, velocity), _ = propagate(states, parameter_m3_s2, times_s[0])
+    return float(times_s[0] - relative @ velocity / (velocity @ velocity))  # the event has the error of interpolation
+
+
+def propagate(states: Floats, parameter_m3_s2: float, duration_s: float) -> tuple[Floats, Floats]:
+    """Return the pair of states after a time, and the transition matrix of the relative state, shape (6, 6).
+
+    The matrix is that of small changes of the object's orbit. A ValueError is raised if the integration fails.
+    """
+    end = _integrate(states, parameter_m3_s2, duration_s).y[:, -1]
+    return end[:12].reshape(4, 3), end[12:].reshape(6, 6)
+
+
+def _integrate(states: Floats, parameter_m3_s2: float, duration_s: float, event: Any = None) -> Any:
+    """Integrate a pair of states with the transition matrix of the relative state."""
+    from scipy.integrate import solve_ivp  # takes long to load
+
+    def rates(_time: float, state: Floats) -> Floats:
+        own, own_velocity, relative, velocity = state[:12].reshape(4, 3)
+        transition = state[12:].reshape(6, 6)
+        own_acceleration, acceleration, gradient = _gravity(own, relative, parameter_m3_s2)
+        changes = transition[3:].ravel(), (gradient @ transition[:3]).ravel()
+        return np.concatenate([own_velocity, own_acceleration, velocity, acceleration, *changes])
+
+    # Each vector has the error of its modulus; the transition matrix that of a change of the relative position.
+    sizes = np.linalg.norm(states, axis=1)
+    scale = np.concatenate([np.repeat(np.where(sizes > 0.0, sizes, 1.0), 3), np.ones(36)])
+    start = np.concatenate([states.ravel(), np.eye(6).ravel()])
+    span_s, accuracy = (0.0, duration_s), {"rtol": TOLERANCE, "atol": TOLERANCE * scale}
+    result = solve_ivp(rates, span_s, start, method="DOP853", events=event, **accuracy)
+    if not result.success or not np.isfinite(result.y[:, -1]).all():
+        raise ValueError("the motion cannot be integrated: it comes too near the attracting body")
+    return result
+
+
+def _gravity(own: Floats, relative: Floats, parameter_m3_s2: float) -> tuple[Floats, Floats, Floats]:
+    """Return the accelerations of the spacecraft and of the relative motion, and the gradient of gravity at the object.
+
+    The difference of the two accelerations has no cancellation: with q = r . (r + 2 R) / R^2, the ratio of the cubes
+    of both distances is (1 + q)^(3/2) (Battin's form of Encke's method).
+    """
     if not parameter_m3_s2:
-        return
-    own, velocity, relative, relative_velocity = states
-    for name, place, speed in (("spacecraft", own, velocity), ("object", own + relative, velocity + relative_velocity)):
-        distance_m = float(np.linalg.norm(place))
-        circular_m_s = math.sqrt(parameter_m3_s2 / distance_m) if distance_m else math.inf
-        ratio = float(np.linalg.norm(speed)) / circular_m_s
-        if not SPEEDS[0] <= ratio <= SPEEDS[1]:
-            raise ValueError(
-                f"{name}: its speed is {ratio:.3g} times that of a circular orbit at its distance of "
-                f"{distance_m / 1e3:.6g} km: check the units of positions, velocities and the gravitational parameter"
-            )
+        return np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    body, squared = own + relative, own @ own
+    pull = -parameter_m3_s2 / squared**1.5
+    share = np.expm1(-1.5 * np.log1p(relative @ (own + body) / squared))
+    gradient = pull * (1.0 + share) * (np.eye(3) - 3.0 * np.outer(body, body) / (body @ body))
+    return pull * own, pull * (relative + share * body), gradient
 
 
 def _sun(place_m: Floats, velocity_m_s: Floats, parameter_m3_s2: float) -> Sun:

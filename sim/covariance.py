@@ -14,6 +14,8 @@ from infoset.limits import NOT_NEGATIVE, check_fields
 Rows = tuple[tuple[float, ...], ...]
 ROUNDING = 1e-6
 """Differences of correlations that are rounding: files have about seven digits."""
+DIGITS = 12
+"""Digits of the correlations of `covariance_of`."""
 SAMPLE = 2000
 """Starts that estimate the share within a box."""
 
@@ -21,6 +23,8 @@ SAMPLE = 2000
 @dataclass(frozen=True)
 class Covariance:
     """Covariance of a relative state, positions before velocities: a matrix, or standard deviations and correlations.
+
+    A ValueError is raised if it is no covariance.
 
     Parameters
     ----------
@@ -30,11 +34,6 @@ class Covariance:
         Correlations of all components: the whole matrix, or its lower triangle. Without rows: zero.
     matrix_m2 : tuple of rows
         The covariance in place of the three others, in m^2, m^2/s and m^2/s^2: the whole matrix, or its lower triangle.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is outside its limits, or the matrix is no covariance.
     """
 
     position_sigma_m: Annotated[tuple[float, ...], NOT_NEGATIVE] = ()
@@ -49,12 +48,11 @@ class Covariance:
             raise ValueError("Covariance: must have matrix_m2, or position_sigma_m and velocity_sigma_m_s")
         if deviations[0] != deviations[1]:
             raise ValueError("Covariance: {} deviations of position and {} of velocity".format(*deviations))
-        correlation = self.correlation
-        if correlation.shape != (self.size, self.size):
-            raise ValueError(f"Covariance: correlations must have {self.size} rows: got {len(correlation)}")
-        if not np.allclose(correlation.diagonal(), 1.0, atol=ROUNDING, rtol=0.0):
+        if len(self.correlation) != self.size:
+            raise ValueError(f"Covariance: correlations must have {self.size} rows: got {len(self.correlation)}")
+        if not np.allclose(self.correlation.diagonal(), 1.0, atol=ROUNDING, rtol=0.0):
             raise ValueError("Covariance: the variances must not be negative, and correlations have the diagonal 1")
-        least = np.linalg.eigvalsh(correlation)[0]
+        least = np.linalg.eigvalsh(self.correlation)[0]
         if least < -ROUNDING:
             raise ValueError(
                 f"Covariance: its correlations have a negative eigenvalue, {least:.3g}: check the signs, and that "
@@ -104,6 +102,14 @@ class Covariance:
         """Return the share of the normal starts around the middle of a box that are within it, from a fixed sample."""
         sample = np.random.default_rng(0).standard_normal((SAMPLE, self.size)) @ self.root.T
         return float((np.abs(sample) <= 0.5 * (upper - lower)).all(axis=1).mean())
+
+
+def covariance_of(matrix: Floats) -> Covariance:
+    """Return a covariance matrix as standard deviations and the lower triangle of the correlations, rounded."""
+    given = Covariance(matrix_m2=tuple(map(tuple, (0.5 * (matrix + matrix.T)).tolist())))
+    rows = enumerate(np.round(given.correlation, DIGITS).tolist())
+    sigma = given.sigma.tolist()
+    return Covariance(tuple(sigma[:3]), tuple(sigma[3:]), tuple(tuple(row[: index + 1]) for index, row in rows))
 
 
 def _symmetric(name: str, rows: Rows) -> Floats:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.set_queries import MaskedFloats
-from sim.b_plane import b_plane
 from sim.columns import Column, columns, columns_with_values, documented, values_of
 from sim.miss_cause import MissCause, count_causes
 from sim.statistics import HitEstimate, estimate_hits
@@ -185,6 +184,17 @@ class Results:
 def ending(outcome: str, hit: bool | None, cause: str | None) -> str:
     """Return how an engagement ended as text: the outcome, and if the body has a size `hit`, or `missed` and why."""
     return outcome if hit is None else f"{outcome}, {'hit' if hit else f'missed ({cause})'}"
+
+
+def b_plane(lateral_m: Floats, t_rad: float | None) -> Floats:
+    """Return (B.T, B.R) of positions (y, z) of the object across the approach, shape (B, 2); (B, 0) without axes.
+
+    B points from the object to the spacecraft, opposite to (y, z). `t_rad` is the direction of T from y toward z.
+    """
+    if t_rad is None:
+        return np.empty((len(lateral_m), 0))
+    cosine, sine = np.cos(t_rad), np.sin(t_rad)
+    return np.asarray(-lateral_m @ np.array([[cosine, -sine], [sine, cosine]]))
 
 
 _INPUTS = [declared.name for declared in fields(Results) if declared.init]

@@ -14,12 +14,10 @@ from experiments.common.input_file import read_file, to_toml
 from infoset.arrays import Floats
 from infoset.limits import NUMBER, Description, Name, Positive, check_fields
 from sim.approach import Approach, find_approach
-from sim.covariance import Covariance, Rows
+from sim.covariance import Covariance
 from sim.gravity import on_board_model
 from sim.scenario import Scenario
 
-DIGITS = 12
-"""Digits of the correlations in a scenario file."""
 EXTRA = "trajectory"
 ROTATING = ("ITRF", "GRC", "TDR", "EFG")
 """Beginnings of the names of rotating frames in OEM files."""
@@ -27,16 +25,9 @@ ROTATING = ("ITRF", "GRC", "TDR", "EFG")
 
 @dataclass(frozen=True)
 class Craft:
-    """The state of a spacecraft or an object: two vectors, an OEM file, or a body of SPICE kernels.
+    """The state of a spacecraft or an object from the attracting body.
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : tuple of float, or None
-        From the attracting body.
-    oem : str or None
-        A CCSDS orbit ephemeris message, a path relative to the trajectory file.
-    spice : str or None
-        Name or number of a body in the kernels.
+    It is two vectors, or the path of an orbit ephemeris message (`oem`), or a body of SPICE kernels (`spice`).
     """
 
     position_m: Annotated[tuple[float, ...], NUMBER] | None = None
@@ -95,28 +86,15 @@ class Trajectory:
             raise ValueError("pole must have three components, not all zero")
         if self.covariance.size != 6:
             raise ValueError(f"covariance must have 6 components: got {self.covariance.size}")
-        if self.epoch is None and (
-            self.spacecraft.oem or self.object.oem or self.spacecraft.spice or self.object.spice
-        ):
+        if self.epoch is None and any(craft.position_m is None for craft in (self.spacecraft, self.object)):
             raise ValueError("epoch is missing: the time of the states in OEM files and kernels")
 
 
 def scenario_of(file: str | os.PathLike[str], like: Scenario, sigmas: float) -> tuple[Scenario, str]:
-    """Return the scenario of a trajectory file, and its file with comments.
+    """Return the scenario of a trajectory file or of a built-in one, and its file with comments.
 
-    Parameters
-    ----------
-    file : str or path
-        A trajectory file, or a built-in one by name.
-    like : Scenario
-        The scenario in space whose sensors, engine, body and settings it takes.
-    sigmas : float
-        Standard deviations that uncertainty and dispersion contain.
-
-    Raises
-    ------
-    InputError
-        If a file is invalid, or the states do not meet.
+    It takes the sensors, the engine, the body and the settings of the scenario `like`. Uncertainty and dispersion
+    contain a number of standard deviations, `sigmas`. `InputError` if a file is invalid, or the states do not meet.
     """
     trajectory, source = read_file(Trajectory, file), os.fspath(file)
     if not like.is_spatial:
@@ -143,20 +121,10 @@ def scenario_of(file: str | os.PathLike[str], like: Scenario, sigmas: float) -> 
             sun=found.sun,
             uncertainty=box,
             dispersion=box,
-            covariance=_start_covariance(found.covariance),
+            covariance=found.covariance,
         )
         on_board_model(scenario)
     return scenario, _text(scenario, found, like.name, sigmas, source)
-
-
-def _start_covariance(matrix: Floats) -> Covariance:
-    """Return a covariance as standard deviations and the lower triangle of the correlations."""
-    given = Covariance(matrix_m2=tuple(map(tuple, matrix.tolist())))
-    rows: Rows = tuple(
-        tuple(round(value, DIGITS) for value in row[: index + 1])
-        for index, row in enumerate(given.correlation.tolist())
-    )
-    return Covariance(tuple(given.sigma[:3].tolist()), tuple(given.sigma[3:].tolist()), rows)
 
 
 def _text(scenario: Scenario, found: Approach, like: str, sigmas: float, source: str) -> str:

@@ -8,10 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from infoset.arrays import Floats
-from sim.approach import find_approach
-from sim.b_plane import approach_axes, b_plane
+from sim.approach import approach_axes, closest_approach_s, find_approach, propagate
 from sim.kepler import KeplerMotion
-from sim.two_body import closest_approach_s, propagate
+from sim.results import b_plane
 
 SUN, AU, DAY = 1.32712440018e20, 1.495978707e11, 86400.0
 ECLIPTIC = np.array([0.0, 0.0, 1.0])
@@ -117,8 +116,8 @@ def test_without_gravity_b_is_the_part_of_the_position_across_the_velocity() -> 
         np.testing.assert_allclose(found.miss_m, axes[:2] @ offset, rtol=1e-8)
         # x and its rate have no correlation at the epoch; that at the start follows from the time between.
         late = found.start_s
-        assert found.covariance[2, 5] == pytest.approx(1e-4 * late, rel=1e-9)
-        np.testing.assert_allclose(found.covariance[:3, :3], (1e6 + 1e-4 * late**2) * np.eye(3), atol=1e-3)
+        assert found.covariance.matrix[2, 5] == pytest.approx(1e-4 * late, rel=1e-9)
+        np.testing.assert_allclose(found.covariance.matrix[:3, :3], (1e6 + 1e-4 * late**2) * np.eye(3), atol=1e-3)
 
 
 def test_the_simulated_motion_has_the_miss_of_the_states() -> None:

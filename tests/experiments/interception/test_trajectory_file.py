@@ -13,9 +13,9 @@ from experiments import load_scenario
 from experiments.common.input_file import read_text
 from experiments.interception.trajectory_file import scenario_of
 from infoset.arrays import Floats
+from sim.approach import propagate
 from sim.kepler import KeplerMotion
 from sim.scenario import Scenario, corners
-from sim.two_body import propagate
 from tests.experiments.command_line import Command
 
 DATA = Path(__file__).parents[2] / "data" / "oem"
