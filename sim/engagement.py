@@ -367,7 +367,6 @@ class Engagements:
         not_given = self._not_given + sum(map(modulus, self._queue))
         hit = np.ma.MaskedArray(miss <= (radius_m or 0.0), mask=radius_m is None)
         lateral = np.where(passed, self._lateral_miss, present)
-        reasons = self._decisions.reasons(lateral, arrivals_s, ~hit.filled(True))
         return Results(
             runs=runs,
             miss_m=miss,
@@ -378,11 +377,7 @@ class Engagements:
             ),
             set_emptied=lost,
             hit=hit,
-            causes=reasons.causes,
-            unguided_miss_m=reasons.unguided_m,
-            engine_corrects_m=reasons.engine_m,
-            budget_corrects_m=reasons.budget_m,
-            last_possible_m=reasons.last_possible_m,
+            **self._decisions.columns(lateral, arrivals_s, ~hit.filled(True)),
             truth_margin_m=margin,
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
@@ -14,7 +13,6 @@ from guidance.authority import correctable_m
 from guidance.thruster import modulus
 from infoset import PredictedMiss
 from infoset.arrays import Flags, Floats, Integers
-from infoset.set_queries import MaskedFloats
 from sim.scenario import Scenario
 
 
@@ -37,29 +35,6 @@ class MissCause(Enum):
     miss was known too late."""
     GUIDANCE = "guidance"
     """An impulse at the critical decision would have kept a hit possible for all possible misses."""
-
-
-@dataclass(frozen=True)
-class MissReasons:
-    """Causes of the misses of B engagements, and the quantities that decide them, in metres, shape (B,).
-
-    Parameters
-    ----------
-    causes : tuple of MissCause or None
-        None for hits, and without a body.
-    unguided_m : ndarray
-        Miss without impulses.
-    engine_m, budget_m : ndarray
-        Maximum change of the miss by all impulses of the flight, without a limit of their sum and within the budget.
-    last_possible_m : masked array
-        Radius of the possible misses at the last decision; masked without a decision.
-    """
-
-    causes: tuple[MissCause | None, ...]
-    unguided_m: Floats
-    engine_m: Floats
-    budget_m: Floats
-    last_possible_m: MaskedFloats
 
 
 class DecisionLog:
@@ -85,37 +60,33 @@ class DecisionLog:
         """Record the executed impulses of a step, shape (C, B)."""
         self._executed.append(impulse_m_s)
 
-    def reasons(self, lateral_miss_m: Floats, arrival_s: Floats, missed: Flags) -> MissReasons:
-        """Return the reasons of all misses, from the lateral misses (C, B) and the arrivals (B,) of the true motions.
+    def columns(self, lateral_miss_m: Floats, arrival_s: Floats, missed: Flags) -> dict[str, Any]:
+        """Return the fields of `Results` with the causes, from lateral misses (C, B) and arrivals (B,) of the motions.
 
         In space the impulses of a flight reach a disc, so the modulus of M_i is compared with the authority, and the
         radius of the possible misses is that of the disc around their rectangle.
         """
-        thruster, step_s = self._scenario.thruster, self._scenario.set_model.step_s
-        steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + thruster.delay_steps
-        times_s: Floats = step_s * steps.astype(np.float64)
+        steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + self._scenario.thruster.delay_steps
+        times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
         executed = _with_end(_rows(self._executed, lateral_miss_m.shape))
         changes = executed[np.minimum(steps, len(executed) - 1)]
         changes *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
         miss = _with_end(np.cumsum(changes[::-1], axis=0)[::-1]) + lateral_miss_m
         tracking = _rows([flags for _, flags, *_ in self._decisions], arrival_s.shape) > 0.0
-        last = _last(tracking)
-        causes: list[MissCause | None] = [None] * len(missed)
+        causes, last = np.full(len(missed), None, dtype=object), _last(tracking)
         if missed.any():
-            found = self._causes(miss[..., missed], times_s, arrival_s[missed], tracking[:, missed], missed)
-            for run, cause in zip(np.flatnonzero(missed).tolist(), found, strict=True):
-                causes[run] = cause
+            causes[missed] = self._causes(miss[..., missed], times_s, arrival_s[missed], tracking[:, missed], missed)
         lower, upper = self._possible(last, np.arange(len(missed)))
-        return MissReasons(
-            tuple(causes),
-            modulus(miss[0]),
-            self._corrects_m(times_s, arrival_s, 0, None),
-            self._corrects_m(times_s, arrival_s, 0, thruster.budget_m_s),
-            np.ma.MaskedArray(modulus(0.5 * (upper - lower)), mask=last < 0),
-        )
+        return {
+            "causes": tuple(causes),
+            "unguided_miss_m": modulus(miss[0]),
+            "engine_corrects_m": self._corrects_m(times_s, arrival_s),
+            "budget_corrects_m": self._corrects_m(times_s, arrival_s, 0, self._scenario.thruster.budget_m_s),
+            "last_possible_m": np.ma.MaskedArray(modulus(0.5 * (upper - lower)), mask=last < 0),
+        }
 
     def _corrects_m(
-        self, times_s: Floats, arrival_s: Floats, first: Integers | int, budget: Floats | float | None
+        self, times_s: Floats, arrival_s: Floats, first: Integers | int = 0, budget: Floats | float | None = None
     ) -> Floats:
         """Return the authority of the impulses from index `first` on, m; None is without a budget."""
         thruster = self._scenario.thruster
@@ -125,14 +96,12 @@ class DecisionLog:
 
     def _possible(self, rows: Integers, runs: Integers) -> tuple[Floats, Floats]:
         """Return the ends of the possible misses of runs, shape (C, n), at a decision of each; zeros without one."""
-        found = [
-            (self._decisions[row][-1].lower_m[:, run], self._decisions[row][-1].upper_m[:, run])
-            if row >= 0
-            else (np.zeros(len(self._scenario.set_model.axes)),) * 2
-            for row, run in zip(rows.tolist(), runs.tolist(), strict=True)
-        ]
-        lower, upper = np.reshape(np.array(found), (len(runs), 2, -1)).transpose(1, 2, 0)
-        return lower, upper
+        ends = np.zeros((2, len(self._scenario.set_model.axes), len(runs)))
+        for index, (row, run) in enumerate(zip(rows.tolist(), runs.tolist(), strict=True)):
+            if row >= 0:
+                miss = self._decisions[row][-1]
+                ends[:, :, index] = miss.lower_m[:, run], miss.upper_m[:, run]
+        return ends[0], ends[1]
 
     def _causes(
         self, miss: Floats, times_s: Floats, arrival_s: Floats, tracking: Flags, missed: Flags
@@ -143,34 +112,31 @@ class DecisionLog:
         """
         runs, radius_m, at = np.flatnonzero(missed), self._scenario.radius_m or 0.0, np.arange(miss.shape[2])
         budget = _rows([left for _, _, left, _ in self._decisions], missed.shape)[:, missed]
-        sizes = modulus(miss.swapaxes(0, 1))
-        within = self._corrects_m(times_s, arrival_s, np.arange(len(times_s))[:, None], budget)
-        possible = tracking & (sizes[:-1] - within <= radius_m)
+        sizes, decisions = modulus(miss.swapaxes(0, 1)), np.arange(len(times_s))[:, None]
+        possible = tracking & (sizes[:-1] - self._corrects_m(times_s, arrival_s, decisions, budget) <= radius_m)
         critical, last, exists = _last(possible), _last(tracking), possible.any(axis=0)
         then = np.minimum(critical + 1, len(times_s))
-        now_m, then_m, start_m = (self._corrects_m(times_s, arrival_s, each, None) for each in (critical, then, 0))
-        by_budget = exists & (critical < last) & (sizes[then, at] - then_m <= radius_m)
-
-        def unknown_m(rows: Integers) -> tuple[Floats, Floats]:
-            """Return the half-width of the possible misses, more if they exclude the true one, and the farthest."""
-            lower, upper = self._possible(rows, runs)
-            off = modulus(miss[rows, :, at].T - 0.5 * (lower + upper))
-            return np.maximum(modulus(0.5 * (upper - lower)), off), modulus(np.maximum(upper, -lower))
-
-        start_within_m = self._corrects_m(times_s, arrival_s, 0, self._scenario.thruster.budget_m_s)
-        (unknown, farthest), (unknown_at_last, _) = unknown_m(critical), unknown_m(last)
+        now_m, then_m = (self._corrects_m(times_s, arrival_s, first) for first in (critical, then))
+        ends = [self._possible(rows, runs) for rows in (critical, last)]
+        farthest_m = modulus(np.maximum(ends[0][1], -ends[0][0]))
+        # More than the half-width of the possible misses if they exclude the true one.
+        unknown_m, unknown_at_last_m = (
+            np.maximum(modulus(0.5 * (upper - lower)), modulus(miss[rows, :, at].T - 0.5 * (lower + upper)))
+            for rows, (lower, upper) in zip((critical, last), ends, strict=True)
+        )
         # What the impulse that is best for all possible misses leaves beyond the later ones.
-        beyond_m = np.maximum(unknown - np.where(critical < last, then_m, 0.0), farthest - now_m)
+        beyond_m = np.maximum(unknown_m - np.where(critical < last, then_m, 0.0), farthest_m - now_m)
+        by_budget = exists & (critical < last) & (sizes[then, at] - then_m <= radius_m)
+        within_m = self._corrects_m(times_s, arrival_s, 0, self._scenario.thruster.budget_m_s)
         wide = ~exists | (beyond_m > radius_m)
         conditions = (
-            sizes[0] - start_m > radius_m,
-            (sizes[0] - start_within_m > radius_m) | by_budget,
-            wide & (~exists | (unknown_at_last > radius_m)),
+            sizes[0] - self._corrects_m(times_s, arrival_s) > radius_m,
+            by_budget | (sizes[0] - within_m > radius_m),
+            wide & (~exists | (unknown_at_last_m > radius_m)),
             wide,
             np.ones_like(wide),
         )
-        order = list(MissCause)
-        return [order[index] for index in np.argmax(conditions, axis=0).tolist()]
+        return [list(MissCause)[index] for index in np.argmax(conditions, axis=0).tolist()]
 
 
 def count_causes(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from experiments.common.input_file import changed
@@ -43,9 +43,9 @@ class Remedy:
     enough : float or None
         Value nearest to `now`, of three digits, at which it does not; None if no value up to `not_enough` is enough.
     hits : HitEstimate or None
-        All runs with `enough`.
+        Of all runs with `enough`.
     missed : mapping of str to int
-        Number of misses of all runs with `enough`, by cause.
+        Their misses by cause.
     """
 
     cause: MissCause
@@ -57,17 +57,15 @@ class Remedy:
     missed: Mapping[str, int] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        head = f"remedy for {self.cause.value}:"
-        if self.enough is None:
-            return f"{head} no {self.key} from {self.now:g} to {self.not_enough:g}"
+        if self.enough is None or self.hits is None:
+            return f"remedy for {self.cause.value}: no {self.key} from {self.now:g} to {self.not_enough:g}"
         limit = "in closed form" if self.not_enough is None else f"{self.not_enough:g} is not enough"
-        then = ""
-        if self.hits is not None:
-            interval = f"95 % CI {percent(self.hits.lower)} to {percent(self.hits.upper)}"
-            then = f"; then {self.hits.hits} of {some_runs(self.hits.runs)} hit ({interval})"
-        if self.missed:
-            then += f", missed by {', '.join(f'{name} {count}' for name, count in self.missed.items())}"
-        return f"{head} {self.key} = {self.enough:g} instead of {self.now:g} ({limit}){then}"
+        others = ", ".join(f"{name} {count}" for name, count in self.missed.items())
+        return (
+            f"remedy for {self.cause.value}: {self.key} = {self.enough:g} instead of {self.now:g} ({limit}); then "
+            f"{self.hits.hits} of {some_runs(self.hits.runs)} hit (95 % CI {percent(self.hits.lower)} to "
+            f"{percent(self.hits.upper)}){f', missed by {others}' if others else ''}"
+        )
 
 
 def find_remedies(task: Task, results: Results, progress: Progress) -> list[Remedy]:
@@ -77,32 +75,34 @@ def find_remedies(task: Task, results: Results, progress: Progress) -> list[Reme
     other values are found by bisection: all runs are simulated again with each value.
     """
     wanted = [(cause, key) for cause in MissCause if cause in results.causes for key in KEYS[cause]]
-    wanted = [(cause, key) for cause, key in wanted if _present(task.scenario, key)]
+    wanted = [(cause, key) for cause, key in wanted if _values(task.scenario, key)]
     remedies = []
-    for index, (cause, key) in enumerate(wanted):
+    for cause, key in wanted:
         remedies.append(_remedy(task, results, cause, key))
-        progress((index + 1) / len(wanted))
+        progress(len(remedies) / len(wanted))
     return remedies
 
 
 def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
-    cores = os.cpu_count() or 1
-    unwatched = replace(task, guarantee=False, progress=None, observe=None)
+    scenario, cores = task.scenario, os.cpu_count() or 1
+    values = _values(scenario, key)
+    now, not_enough = 1.0 if key == SCALE else values[key], None
 
     @functools.cache
     def simulated(value: float) -> Results:
-        scenario = _with(task.scenario, key, value)
+        changes = {name: old * value / now for name, old in values.items()}
+        flown = changed(scenario, changes, f"{scenario.name} with {key} = {value:g}")
+        flight = replace(task, scenario=flown, guarantee=False, progress=None, observe=None)
         parts = [task.runs[first::cores] for first in range(min(len(task.runs), cores))]
-        return join(simulate_all([replace(unwatched, scenario=scenario, runs=part) for part in parts]))
+        return join(simulate_all([replace(flight, runs=part) for part in parts]))
 
-    now, not_enough = _present(task.scenario, key), None
     enough: float | None
     if (cause, key) == (MissCause.ENGINE, IMPULSE):
-        needed = (results.unguided_miss_m - (task.scenario.radius_m or 0.0)) / results.engine_corrects_m
+        needed = (results.unguided_miss_m - (scenario.radius_m or 0.0)) / results.engine_corrects_m
         enough = _rounded(1.005 * now * float(needed.max()))  # 1.005 rounds up
     else:
-        sign = 1 if key in (IMPULSE, BUDGET) else -1
-        not_enough, enough = _search(lambda value: cause in simulated(value).causes, now, sign)
+        factor = 2.0 if key in (IMPULSE, BUDGET) else 0.5
+        not_enough, enough = _search(lambda value: cause in simulated(value).causes, now, factor)
         if enough is None:
             return Remedy(cause, key, now, not_enough, None)
     then = simulated(enough)
@@ -110,11 +110,19 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
     return Remedy(cause, key, now, not_enough, enough, then.hits, left)
 
 
-def _search(occurs: Callable[[float], bool], now: float, sign: int) -> tuple[float, float | None]:
-    """Return the nearest values found at which something occurs and does not, above or below `now`."""
+def _values(scenario: Scenario, key: str) -> dict[str, float]:
+    """Return the values that a key changes in proportion, by their keys; none if the scenario does not have it."""
+    table, name = key.split(".")
+    owner = {} if getattr(scenario, table) is None else vars(getattr(scenario, table))
+    names = [each for each in owner if "error" in each] if key == SCALE else [name]
+    return {f"{table}.{each}": owner[each] for each in names if owner.get(each)}
+
+
+def _search(occurs: Callable[[float], bool], now: float, factor: float) -> tuple[float, float | None]:
+    """Return the nearest values found at which something occurs and does not, from `now` on."""
     not_enough = now
     for _ in range(MAX_DOUBLINGS):
-        enough = _rounded(not_enough * 2.0**sign)
+        enough = _rounded(not_enough * factor)
         if not occurs(enough):
             break
         not_enough = enough
@@ -131,23 +139,3 @@ def _search(occurs: Callable[[float], bool], now: float, sign: int) -> tuple[flo
 
 def _rounded(value: float) -> float:
     return float(f"{value:.3g}")
-
-
-def _errors(scenario: Scenario) -> Iterator[tuple[str, float]]:
-    """Yield the keys and values of the error bounds of an angle sensor that is not a camera."""
-    for name, value in vars(scenario.angle_sensor).items() if scenario.angle_sensor is not None else ():
-        if "error" in name and isinstance(value, float):
-            yield f"angle_sensor.{name}", value
-
-
-def _present(scenario: Scenario, key: str) -> float:
-    """Return the value of a key; zero if the scenario does not have it."""
-    if key == SCALE:
-        return 1.0 if any(_errors(scenario)) else 0.0
-    table, name = key.split(".")
-    return getattr(getattr(scenario, table), name, None) or 0.0
-
-
-def _with(scenario: Scenario, key: str, value: float) -> Scenario:
-    changes = {name: value * error for name, error in _errors(scenario)} if key == SCALE else {key: value}
-    return changed(scenario, changes, f"{scenario.name} with {key} = {value:g}")
