@@ -137,32 +137,37 @@ def report_json(report: Report) -> dict[str, object]:
             "controls": "parts of acceleration_m_s2, along x, y, z",
             "acceleration_m_s2": rendezvous.acceleration_m_s2,
         },
-        "route": solution.route,
-        "route_reason": solution.reason,
-        "optimal_miss": solution.optimal.miss,
-        "optimal_dimension": solution.optimal.dimension,
-        "min_periods": report.min_periods,
+        **solution_json(solution, report.min_periods, (report.forward, report.tube), report.ranges),
         "min_periods_searched": report.searched_periods,
-        "sets": [
-            {
-                "period": t,
-                "forward": _set_json(solution, SetKind.FORWARD, t, report.forward[t]),
-                "tube": _set_json(solution, SetKind.TUBE, t, report.tube[t]),
-            }
-            for t in range(1, solution.problem.periods + 1)
-        ],
         "controls": [_member_json(rendezvous, member) for member in report.members],
-        "control_ranges": report.ranges,
         "replan": report.flight and _flight_json(rendezvous, report.flight),
         "replan_noisy": [_flight_json(rendezvous, flight) for flight in report.noisy],
         "robust": report.robustness and _robust_json(report.robustness),
     }
 
 
-def _set_json(solution: Solution, kind: SetKind, time: int, bounds: Floats) -> dict[str, object]:
-    counts = solution.sets.counts(kind, time)
-    keys = ("vertices", "facets", "dimension")
-    return {"min": bounds[:, 0], "max": bounds[:, 1]} | {key: counts and getattr(counts, key) for key in keys}
+def solution_json(
+    solution: Solution, min_periods: int | None, sets: tuple[Floats, Floats], ranges: Floats
+) -> dict[str, object]:
+    """Return the keys of a solution; `sets` are the bounds of the forward sets and of the tube."""
+
+    def set_json(kind: SetKind, time: int, bounds: Floats) -> dict[str, object]:
+        counts = solution.sets.counts(kind, time)
+        keys = ("vertices", "facets", "dimension")
+        return {"min": bounds[:, 0], "max": bounds[:, 1]} | {key: counts and getattr(counts, key) for key in keys}
+
+    return {
+        "route": solution.route,
+        "route_reason": solution.reason,
+        "optimal_miss": solution.optimal.miss,
+        "optimal_dimension": solution.optimal.dimension,
+        "min_periods": min_periods,
+        "sets": [
+            {"period": t, **{kind.value: set_json(kind, t, of[t]) for kind, of in zip(SetKind, sets, strict=True)}}
+            for t in range(1, solution.problem.periods + 1)
+        ],
+        "control_ranges": ranges,
+    }
 
 
 def _member_json(rendezvous: Rendezvous, member: Member) -> dict[str, object]:
@@ -190,10 +195,8 @@ def report_lines(report: Report) -> Iterator[Part]:
     reached = f"norm 0 not reached in {report.searched_periods} periods"
     if minimum is not None:
         reached = f"norm 0 needs at least {minimum} period{'s' if minimum > 1 else ''}"
-    dimension = solution.optimal.dimension
     yield f"{rendezvous.name}: minimum terminal norm {solution.optimal.miss:.9g} {NORM}; {reached}"
-    yield f"route: {solution.route.value} ({solution.reason})"
-    yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
+    yield from solution_lines(solution)
     yield f"axes: {AXES}"
     yield f"units: {NORM} is the norm of a state in m and m/s; u is in units of {rendezvous.acceleration_m_s2:g} m/s^2"
     table = number_table("period", *(f"{axis} of the tube\nm" for axis in "xyz"))
@@ -217,6 +220,13 @@ def report_lines(report: Report) -> Iterator[Part]:
         yield f"\nwith disturbances, without feedback: {conflict or 'controls that keep the constraints exist'}"
         bound = report.robustness.refusal if plan is None else f"terminal norm at most {number(plan.worst_miss)} {NORM}"
         yield f"with disturbances, with feedback: {bound}"
+
+
+def solution_lines(solution: Solution) -> Iterator[str]:
+    """Yield the route and the size of the set of optimal controls."""
+    dimension = solution.optimal.dimension
+    yield f"route: {solution.route.value} ({solution.reason})"
+    yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
 
 
 def _members_table(report: Report) -> Table:

@@ -12,6 +12,7 @@ from experiments.common.output import Cell, to_csv
 from experiments.common.problem_command import ProblemCommand
 from experiments.common.screen import BeginProgress, Part, number, number_table
 from experiments.reachability.command import Reach
+from experiments.reachability.report import solution_json, solution_lines
 from experiments.reachability.selection import select_controls, selection
 from experiments.reachability.system_file import ReachableSystem
 from infoset.arrays import Floats
@@ -55,36 +56,14 @@ def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) 
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
-    solution = report.solution
-    sets = [
-        {
-            "period": t,
-            **{
-                kind.value: {"min": bounds[t, :, 0], "max": bounds[t, :, 1], **_counts(solution, kind, t)}
-                for kind, bounds in ((SetKind.FORWARD, report.forward), (SetKind.TUBE, report.tube))
-            },
-        }
-        for t in range(1, solution.problem.periods + 1)
-    ]
     return {
         "states": report.system.names,
-        "route": solution.route,
-        "route_reason": solution.reason,
-        "optimal_miss": solution.optimal.miss,
-        "optimal_dimension": solution.optimal.dimension,
-        "min_periods": report.min_periods,
-        "sets": sets,
+        **solution_json(report.solution, report.min_periods, (report.forward, report.tube), report.ranges),
         "controls": [
             {"name": name, "controls": control, "states": report.states[name]}
             for name, control in report.controls.items()
         ],
-        "control_ranges": report.ranges,
     }
-
-
-def _counts(solution: Solution, kind: SetKind, time: int) -> dict[str, object]:
-    counts = solution.sets.counts(kind, time)
-    return {key: counts and getattr(counts, key) for key in ("vertices", "facets", "dimension")}
 
 
 def motions_csv(report: Report) -> str:
@@ -105,9 +84,7 @@ def report_lines(report: Report) -> Iterator[Part]:
     solution, minimum = report.solution, report.min_periods
     least = "" if minimum is None else f"; to reach it takes at least {minimum} period{'s' if minimum > 1 else ''}"
     yield f"{report.system.name}: minimum distance from the target {solution.optimal.miss:.9g}{least}"
-    yield f"route: {solution.route.value} ({solution.reason})"
-    dimension = solution.optimal.dimension
-    yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
+    yield from solution_lines(solution)
     table = number_table("period", *(f"{name}\nof the tube" for name in report.system.names))
     for t, row in enumerate(report.tube):
         shown = np.where(np.abs(row) < _ZERO * np.array(report.system.bounds.states)[:, None], 0.0, row)

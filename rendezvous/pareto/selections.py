@@ -132,8 +132,8 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     unit = matrices / sizes[:, None, None]
     if np.allclose(unit, unit[0], rtol=1e-12, atol=1e-15):
         root, first = roots[0], ideals[0]
-        points, target = (ideals - first) @ root.T, root @ (preferred - first)
-        nearest = target + nearest_difference(points, target[None]) if points.any() else points[0]
+        known, target = (ideals - first) @ root.T, root @ (preferred - first)
+        nearest = target + nearest_difference(known, target[None]) if known.any() else known[0]
         return np.asarray(first + np.linalg.solve(root, nearest))
     root = np.linalg.cholesky(np.einsum("n,nab->ab", weights / weights.sum(), matrices)).T
     back = np.linalg.inv(root)

@@ -66,8 +66,8 @@ class ReachabilityProblem:
     Raises
     ------
     ValueError
-        If a shape does not fit, a number is not finite, a bound is not positive, there are no periods or more than 256,
-        or A(T-1)...A(0) multiplies deviations by over 1e10, relative to the bounds.
+        If bounds on thrust in a ball differ, or A(T-1)...A(0) multiplies deviations by over 1e10, relative to the
+        bounds.
     InadmissibleStartError
         If x(0) breaks a constraint.
     """
@@ -85,22 +85,6 @@ class ReachabilityProblem:
     state_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        periods, n = self.transition.shape[:2]
-        m = self.control.shape[2]
-        if not 1 <= periods <= MAX_PERIODS:
-            raise ValueError(f"there must be 1 to {MAX_PERIODS} periods, found {periods}")
-        arrays = {
-            "A(t)": (self.transition, (periods, n, n)),
-            "B(t)": (self.control, (periods, n, m)),
-            "the initial state": (self.initial, (n,)),
-            "the bounds on states": (self.state_bounds, (n,)),
-            "the bounds on controls": (self.control_bounds, (m,)),
-        }
-        for name, (array, shape) in arrays.items():
-            if array.shape != shape or not np.isfinite(array).all():
-                raise ValueError(f"{name} must be finite, of shape {shape}")
-        if (self.state_bounds <= 0.0).any() or (self.control_bounds <= 0.0).any():
-            raise ValueError("all bounds on states and controls must be positive")
         if self.thrust is ThrustShape.BALL and np.ptp(self.control_bounds) > 0.0:
             raise ValueError("for thrust in a ball the bounds on controls must be equal")
         self._check_growth()
