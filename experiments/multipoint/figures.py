@@ -79,7 +79,7 @@ def draw_path(scene: Scene) -> Figure:
 
 
 def _centre(scene: Scene) -> str:
-    parameter = getattr(scene.tour.targets, "gravitational_parameter_m3_s2", 0.0)
+    parameter = getattr(scene.tour, "gravitational_parameter_m3_s2", 0.0)
     return "Sun" if abs(parameter / _SUN_M3_S2 - 1.0) < 0.01 else "centre of gravity"
 
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from experiments.common.orbit_checks import check_angle, check_orbit, check_rate
 from infoset.arrays import Floats
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
-from rendezvous.multipoint import DriftingTargets, KeplerTargets, KeplerTour, Meet, Target, TimeLimits, Tour
+from rendezvous.multipoint import KeplerTour, Meet, Target, TimeLimits, Tour
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 from rendezvous.two_body import OrbitalElements, coast
 
@@ -133,9 +133,9 @@ class MultipointProblem:
         states, start = np.array([each.state(mu) for each in self.target]), self.chaser.state(mu)
         if mu is not None:
             epochs_s = np.array([each.epoch_s for each in self.target])
-            return KeplerTour(KeplerTargets(targets, states, epochs_s, mu), coast(start, -self.chaser.epoch_s, mu))
+            return KeplerTour(targets, states, epochs_s, mu, coast(start, -self.chaser.epoch_s, mu))
         assert self.orbit_rate_rad_s is not None
         motion: LinearMotion = ClohessyWiltshire(self.orbit_rate_rad_s)
         if self.eccentricity > 0.0:
             motion = TschaunerHempel(EllipticOrbit(self.orbit_rate_rad_s, self.eccentricity, self.true_anomaly_rad))
-        return Tour(motion, DriftingTargets(targets, motion, states), start)
+        return Tour(motion, targets, states, start)

@@ -32,7 +32,7 @@ class Scene:
     @property
     def names(self) -> list[str]:
         """Return the names of the targets in the order of the visits."""
-        return [self.tour.targets.targets[target].name for target in self.order]
+        return [self.tour.targets[target].name for target in self.order]
 
     @property
     def axis_titles(self) -> tuple[str, str, str]:
@@ -65,7 +65,7 @@ class Scene:
     def target_path(self, visit: int, times_s: Floats) -> Floats:
         """Return the positions of the target of a visit, shape (n, 3)."""
         targets = np.full(len(times_s), self.order[visit])
-        return np.asarray(self.tour.targets.states(targets, times_s)[:, :3])
+        return np.asarray(self.tour.target_states(targets, times_s)[:, :3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +135,8 @@ def trajectories(report: Report) -> str:
     tracks: list[tuple[list[str], list[Floats]]] = [
         (["chaser"], [times, scene.path.state(times), scene.path.control(times)])
     ]
-    for index, target in enumerate(scene.tour.targets.targets):
-        states = scene.tour.targets.states(np.full(len(times), index), times)
+    for index, target in enumerate(scene.tour.targets):
+        states = scene.tour.target_states(np.full(len(times), index), times)
         tracks.append(([target.name], [times, states, none]))
     return trajectories_csv(["craft"], tracks)
 

@@ -1,21 +1,18 @@
 """Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their order."""
 
-from rendezvous.multipoint.kepler import KeplerTargets, KeplerTour
+from rendezvous.multipoint.kepler import KeplerTour
 from rendezvous.multipoint.order import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
 from rendezvous.multipoint.segments import Nodes, NotSettledError, Path, solve_segments
 from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times
-from rendezvous.multipoint.tour import DriftingTargets, Meet, MovingTargets, Target, Tour, Visits, nodes_of
+from rendezvous.multipoint.tour import Meet, Target, Tour, Visits
 
 __all__ = [
     "MAX_TARGETS",
     "BestOrder",
     "BestTimes",
-    "DriftingTargets",
     "Effort",
-    "KeplerTargets",
     "KeplerTour",
     "Meet",
-    "MovingTargets",
     "Nodes",
     "NotSettledError",
     "Path",
@@ -26,7 +23,6 @@ __all__ = [
     "best_order",
     "best_order_of_slots",
     "best_times",
-    "nodes_of",
     "optimise_times",
     "solve_segments",
 ]

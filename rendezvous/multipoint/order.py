@@ -226,7 +226,7 @@ class _Search:
 
 
 def _checked_count(tour: Visits) -> int:
-    count = len(tour.targets.targets)
+    count = len(tour.targets)
     if count > MAX_TARGETS:
         raise ValueError(
             f"{count} targets have {factorial(count)} orders; a search takes at most {MAX_TARGETS}, with "

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats, Integers
-from rendezvous.multipoint.segments import LinearPath, Nodes, Path, solve_segments
+from rendezvous.multipoint.segments import Nodes, Path, solve_segments
 from rendezvous.relative_motion import LinearMotion
 
 SMOOTH = 4.0 / 3.0
@@ -46,8 +46,8 @@ class Target:
             raise ValueError(f"target {self.name!r}: a flyby cannot dwell; make it a rendezvous")
 
 
-class MovingTargets(ABC):
-    """Targets whose motion is known, with their states at an epoch. They coast in the same dynamics as the chaser.
+class Visits(ABC):
+    """Moving targets and the start (`start_s`, `start_state`) of a chaser that visits them; all move in one dynamics.
 
     Raises
     ------
@@ -56,7 +56,10 @@ class MovingTargets(ABC):
     """
 
     targets: tuple[Target, ...]
-    initial: Floats
+    start_state: Floats
+    start_s: float = 0.0
+    ruggedness: ClassVar[float]
+    """Ratio up to which local minima of one order may differ; used to compare orders."""
 
     def __post_init__(self) -> None:
         if len({target.name for target in self.targets}) < len(self.targets):
@@ -68,88 +71,62 @@ class MovingTargets(ABC):
         return np.array([target.dwell_s for target in self.targets])
 
     @abstractmethod
-    def states(self, which: Integers, time_s: Floats) -> Floats:
+    def target_states(self, which: Integers, time_s: Floats) -> Floats:
         """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
-
-
-@dataclass(frozen=True, eq=False)
-class DriftingTargets(MovingTargets):
-    """Targets that coast in a linear motion; `initial`, shape (n, 6), are their states at t = 0, m and m/s."""
-
-    targets: tuple[Target, ...]
-    motion: LinearMotion
-    initial: Floats
-
-    def states(self, which: Integers, time_s: Floats) -> Floats:
-        """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
-        coasted = self.motion.transition(np.zeros(time_s.shape), time_s) @ self.initial[which][:, :, None]
-        return np.asarray(coasted[:, :, 0])
-
-
-class Visits(ABC):
-    """A chaser's start (`start_s`, `start_state`) and its targets."""
-
-    targets: MovingTargets
-    start_state: Floats
-    start_s: float = 0.0
-    ruggedness: ClassVar[float]
-    """Ratio up to which local minima of one order may differ; used to compare orders."""
-
-    @property
-    def dwell_s(self) -> Floats:
-        """Duration of the stay with each target, shape (n,)."""
-        return self.targets.dwell_s
-
-    @abstractmethod
-    def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
-        """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""
 
     @abstractmethod
     def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
-        """Return a function of N times that finds paths of one `order`, each near one before if that helps."""
+        """Return `fly` for one `order` as a function of N times, which remembers what helps it to find paths."""
+
+    def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
+        """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times.
+
+        `ValueError` is raised if times do not increase; other errors are those of `flyer`.
+        """
+        return self.flyer(order)(np.asarray(time_s, dtype=np.float64))
+
+    def nodes(self, order: Sequence[int], time_s: Floats) -> Nodes:
+        """Return the nodes of a path that reaches targets in an `order`, first to last, at N times.
+
+        Raises
+        ------
+        ValueError
+            If a target is visited twice, or the number of times is not that of visits.
+        """
+        which = np.asarray(order)
+        if time_s.shape != which.shape:
+            raise ValueError(f"{len(which)} visits need {len(which)} times, found {time_s.size}")
+        if len(set(order)) < len(which):
+            raise ValueError("a target is visited twice")
+        rendezvous = np.array([self.targets[index].meet is Meet.RENDEZVOUS for index in order])
+        leave_s = time_s + self.dwell_s[which]
+        arrive = self.target_states(which, time_s)
+        leave = arrive if (leave_s == time_s).all() else self.target_states(which, leave_s)
+        return Nodes(time_s, leave_s, arrive, leave, rendezvous)
 
 
 @dataclass(frozen=True, eq=False)
 class Tour(Visits):
     """A chaser and the targets it visits, in the same linear motion.
 
-    `start_state`, shape (6,), is the chaser's at the start, m and m/s.
+    `initial`, shape (n, 6), are the states of the targets at t = 0, and `start_state`, shape (6,), is the chaser's at
+    the start, m and m/s.
     """
 
     motion: LinearMotion
-    targets: MovingTargets
+    targets: tuple[Target, ...]
+    initial: Floats
     start_state: Floats
     start_s: float = 0.0
 
     ruggedness = SMOOTH
     """Small: the path of given times is unique, and the costs of an order's few local minima are close."""
 
-    def fly(self, order: Sequence[int], time_s: ArrayLike) -> LinearPath:
-        """Return the path of minimum energy that reaches targets in an `order`, some or all, each once, at N times."""
-        return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
+    def target_states(self, which: Integers, time_s: Floats) -> Floats:
+        """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
+        coasted = self.motion.transition(np.zeros(time_s.shape), time_s) @ self.initial[which][:, :, None]
+        return np.asarray(coasted[:, :, 0])
 
     def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
         """Return `fly` for one `order`; the path is unique."""
-        return lambda time_s: self.fly(order, time_s)
-
-
-def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) -> Nodes:
-    """Return the nodes of a path that reaches `targets` in an `order`, first to last, at N times.
-
-    Raises
-    ------
-    ValueError
-        If a target is visited twice, or the number of times is not that of visits.
-    """
-    which, times = np.asarray(order), np.asarray(time_s, dtype=np.float64)
-    if times.shape != which.shape:
-        raise ValueError(f"{len(which)} visits need {len(which)} times, found {times.size}")
-    if len(set(order)) < len(which):
-        raise ValueError("a target is visited twice")
-    rendezvous = np.array([targets.targets[index].meet is Meet.RENDEZVOUS for index in order])
-    leave_s = times + targets.dwell_s[which]
-    if (leave_s == times).all():
-        arrive = targets.states(which, times)
-        return Nodes(times, times, arrive, arrive, rendezvous)
-    states = targets.states(np.concatenate([which, which]), np.concatenate([times, leave_s]))
-    return Nodes(times, leave_s, states[: len(times)], states[len(times) :], rendezvous)
+        return lambda time_s: solve_segments(self.motion, self.start_s, self.start_state, self.nodes(order, time_s))

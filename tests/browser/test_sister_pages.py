@@ -88,8 +88,8 @@ def test_html_in_names_is_text(open_page: Open, reports: dict[str, Any], name: s
         worse = replace(worse, solution=replace(report.solution, costs=costs))
     if name == "multipoint":
         tour = report.scene.tour
-        first, *others = tour.targets.targets
-        targets = replace(tour.targets, targets=(replace(first, name=f"{HOSTILE}{CLOSING}"), *others))
+        first, *others = tour.targets
+        targets = (replace(first, name=f"{HOSTILE}{CLOSING}"), *others)
         worse = replace(worse, scene=replace(report.scene, tour=replace(tour, targets=targets)))
     html = OPTIONS[name][0].to_html(worse)
     assert HOSTILE not in html

@@ -110,7 +110,7 @@ def test_the_asteroid_tour(infoset: Command, mine: Callable[[str], Path]) -> Non
     assert "inertial" in results["units"]
     problem = load_problem("asteroid-tour")
     assert problem.times_s is not None
-    where = problem.tour.targets.states(np.arange(3), problem.times_s)
+    where = problem.tour.target_states(np.arange(3), problem.times_s)
     for node, state in zip(results["nodes"], where, strict=True):
         np.testing.assert_allclose(node["position_m"], state[:3], rtol=1e-9)
         assert 0.9 < np.linalg.norm(state[:3]) / 1.495978707e11 < 1.7

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rendezvous.multipoint import DriftingTargets, Meet, Target, Tour
+from rendezvous.multipoint import Meet, Target, Tour
 from rendezvous.relative_motion import ClohessyWiltshire, LinearMotion
 
 Floats = NDArray[np.float64]
@@ -44,7 +44,7 @@ class Tours:
             for number, (meet, dwell) in enumerate(zip(meets, dwell_s, strict=True), 1)
         )
         states = TARGETS[:count] if initial is None else initial
-        return Tour(motion, DriftingTargets(targets, motion, states), np.zeros(6))
+        return Tour(motion, targets, states, np.zeros(6))
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 from rendezvous.multipoint import (
-    DriftingTargets,
     Meet,
     Nodes,
     Target,
@@ -136,7 +135,7 @@ def test_free_space_is_a_cubic_spline() -> None:
 def test_out_and_back() -> None:
     # Out to 1 and back to 0 within T = 1: best t1 = 2 - sqrt 2, I = 1.5 (1 + sqrt 2)^4.
     motion, nodes = double_integrator([1.0, 0.0], [0.5, 1.0])
-    tour = Tour(motion, DriftingTargets((Target("out"), Target("back")), motion, nodes.arrive), np.zeros(6))
+    tour = Tour(motion, (Target("out"), Target("back")), nodes.arrive, np.zeros(6))
     found = best_times(tour, (0, 1), TimeLimits(latest_s=1.0))
     assert found.time_s[0] == pytest.approx(2.0 - np.sqrt(2.0), rel=1e-9)
     assert found.path.cost == pytest.approx(1.5 * (1.0 + np.sqrt(2.0)) ** 4, rel=1e-11)
@@ -149,7 +148,7 @@ def test_where_the_papers_elimination_is_singular(tours: Make, angle: float) -> 
     times = np.array([first, first + 1700.0])
     tour = tours(2)
     path = tour.fly((0, 1), times)
-    motion = path.motion
+    motion = tour.motion
     reach = motion.gramian(0.0, first) @ motion.transition(first, 0.0).T
     singular = np.linalg.svd(reach[:3, :3], compute_uv=False)
     assert singular[-1] < 1e-6 * singular[0]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from rendezvous.multipoint import (
-    DriftingTargets,
     Meet,
     Target,
     TimeLimits,
@@ -62,7 +61,7 @@ def some_tour(
         states[1] = states[0]
     start = states[0] if random.random() < 0.1 else random.normal(size=6) * scale
     start_s = float(random.choice([0.0, random.uniform(-1.0, 1.0) / rate]))
-    tour = Tour(motion, DriftingTargets(targets, motion, states), start, start_s)
+    tour = Tour(motion, targets, states, start, start_s)
     return tour, start_s + np.cumsum(gaps) + np.concatenate([[0.0], np.cumsum(stays[:-1])])
 
 

@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import NDArray
 
 from rendezvous.multipoint import (
-    DriftingTargets,
     Meet,
     NotSettledError,
     Target,
@@ -25,7 +24,7 @@ Make = Callable[..., Tour]
 
 
 def by_brute_force(tour: Tour, limits: TimeLimits) -> float:
-    count = len(tour.targets.targets)
+    count = len(tour.targets)
     return min(best_times(tour, order, limits).objective for order in itertools.permutations(range(count)))
 
 
@@ -36,7 +35,7 @@ def random_tour(seed: int, count: int, share: float) -> Tour:
     )
     states = random.normal(size=(count, 6)) * np.array([300.0, 3000.0, 150.0, 0.1, 0.3, 0.1])
     states[:, 4] = -2.0 * 1.1e-3 * states[:, 0]
-    return Tour(motion, DriftingTargets(targets, motion, states), np.zeros(6))
+    return Tour(motion, targets, states, np.zeros(6))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -83,7 +82,7 @@ def with_a_stay(meet_all: Meet) -> Tour:
         Target(name, meet, stay)
         for name, meet, stay in zip(["alpha", "charlie", "bravo", "delta", "echo"], meets, stays, strict=True)
     )
-    return Tour(motion, DriftingTargets(targets, motion, states), np.array([0.0, -400.0, 0.0, 0.0, 0.0, 0.0]))
+    return Tour(motion, targets, states, np.array([0.0, -400.0, 0.0, 0.0, 0.0, 0.0]))
 
 
 @pytest.mark.parametrize("meet", list(Meet))
@@ -109,7 +108,7 @@ def test_visits_that_just_fit_are_not_refused_for_rounding(seed: int) -> None:
     stays, gap = random.uniform(10.0, 900.0, size=3), float(random.uniform(10.0, 900.0))
     start_s = float(random.uniform(-1e5, 0.0))
     targets = tuple(Target(str(at), Meet.RENDEZVOUS, float(stay)) for at, stay in enumerate(stays))
-    tour = Tour(motion, DriftingTargets(targets, motion, random.normal(size=(3, 6))), random.normal(size=6), start_s)
+    tour = Tour(motion, targets, random.normal(size=(3, 6)), random.normal(size=6), start_s)
     order = tuple(int(each) for each in np.argsort(stays))  # the longest stay last: the only ones that fit
     times = start_s + np.cumsum(np.full(3, gap)) + np.append(0.0, np.cumsum(stays[list(order)])[:2])
     found = best_order(tour, TimeLimits(float(times[-1]), gap))
@@ -123,8 +122,8 @@ def test_visits_that_just_fit_are_not_refused_for_rounding(seed: int) -> None:
 def test_a_price_counts_from_the_start() -> None:
     # A start before t = 0 made the objective negative, whose logarithm was minimised.
     motion, start_s = ClohessyWiltshire(1e-3), -5000.0
-    targets = DriftingTargets((Target("T"),), motion, np.array([[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]]))
-    tour, limits = Tour(motion, targets, np.zeros(6), start_s), TimeLimits(0.0, price_per_s=1e-8)
+    state = np.array([[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    tour, limits = Tour(motion, (Target("T"),), state, np.zeros(6), start_s), TimeLimits(0.0, price_per_s=1e-8)
     found = best_times(tour, (0,), limits)
     times = np.linspace(start_s + 10.0, 0.0, 2000)
     values = [tour.fly((0,), [each]).cost + 1e-8 * (each - start_s) for each in times]
@@ -146,7 +145,7 @@ def test_times_are_best_where_gaps_differ_by_orders_of_magnitude() -> None:
         ]
     )
     start, price = np.array([-73820.0, 82590.0, -16610.0, 0.8657, 1.785, 9.601]), 3.024e12
-    tour = Tour(motion, DriftingTargets(targets, motion, states), start)
+    tour = Tour(motion, targets, states, start)
     guess = np.array([17230.0, 31560.0, 31560.1489, 45030.0])
     found = best_times(tour, range(4), TimeLimits(price_per_s=price), [guess])
     gaps = np.diff(np.concatenate([[0.0], found.time_s])) - np.array([0.0, *stays[:3]])
