@@ -86,7 +86,8 @@ def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
         found = found[[shows(count, level) for count in counts]]
         if len(found):
             axes.plot([], [], color=INK, linestyle=dashes, label=level_name(level))
-        axes.plot(found.index, found["value"], color=colour, linestyle=dashes, zorder=3.0)
+        point: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(found) == 1 else {}
+        axes.plot(found.index, found["value"], color=colour, linestyle=dashes, zorder=3.0, **point)
         axes.fill_between(found.index, found["lower"], found["upper"], color=colour, alpha=0.18, linewidth=0.0)
     axes.set(xlim=(0.9 * counts[0], 1.1 * counts[-1]), xscale="log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if sample.size < _DECADES_FROM else (1.0,)))
@@ -127,7 +128,8 @@ def _draw_cloud(axes: Axes, name: str, runs: pd.DataFrame, colour: str) -> None:
     limit = 1.04 * axis_limit([miss_m]) or 1.0
     axes.set_ylim(0.0, limit)
     if beyond := int((miss_m > limit).sum()):
-        axes.annotate(f"{beyond} runs above", (0.97, 0.95), xycoords="axes fraction", ha="right", path_effects=HALO)
+        place: dict[str, Any] = {"xycoords": "axes fraction", "ha": "right", "va": "top", "path_effects": HALO}
+        axes.annotate(f"{beyond} runs above", (0.97, 0.97), fontsize="small", **place)
     step = -(-miss_m.size // MAX_POINTS)
     size = min(2.2, (MAX_POINTS / miss_m.size) ** 0.25) if step == 1 else 1.0
     look: dict[str, Any] = {"color": colour, "alpha": 0.4 * size, "markersize": 2.5 * size, "markeredgewidth": 0.0}

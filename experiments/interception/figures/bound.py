@@ -69,8 +69,11 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
         axes.plot(labels_m / 1e3, bounds_m, label=f"{-speed / 1e3:g} km/s", linestyle="none", **look)
     pair = lower.pair
     axes.plot(pair.label_m / 1e3, pair.bound_m, marker="*", markersize=9.0, color=INK, linestyle="none", zorder=5)
-    place: dict[str, Any] = {"xytext": (7.0, 3.0), "textcoords": "offset points"}
-    axes.annotate(f"{pair.bound_m:.1f} m", (pair.label_m / 1e3, pair.bound_m), color=INK, **place)
+    right = 2e-3 * pair.label_m > sum(axes.get_xlim())  # in the right half
+    place: dict[str, Any] = {"xytext": (-7.0 if right else 7.0, 3.0), "ha": "right" if right else "left"}
+    axes.annotate(
+        f"{pair.bound_m:.1f} m", (pair.label_m / 1e3, pair.bound_m), color=INK, textcoords="offset points", **place
+    )
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.6 * (high - low))  # space for the legend
     axes.set(xlabel="label: range at $t = 0$, km", ylabel="bound of the miss, m")
@@ -96,7 +99,7 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     for sign, look, name in ((1.0, _FIRST, without), (-1.0, _SECOND, "second state"))[: 1 if pair.is_single else 2]:
         axes.plot(to_go, sign * half, label=name, **look, **mark)
         axes.plot(to_go[after], sign * corrected[after], color=look["color"], **_CORRECTED)
-    axes.plot([], [], color=INK, label=f"after the largest correction, {pair.correction_m:.1f} m", **_CORRECTED)
+    axes.plot([], [], color=INK, label=f"corrected by at most {pair.correction_m:.1f} m", **_CORRECTED)
     axes.set_xlim(shown, 0.0)
     axes.set_ylim(0.0 if pair.is_single else -1.12 * top, 2.2 * top)  # space for the legend
     axes.set_xlabel("time to go, s")
