@@ -72,6 +72,8 @@ nitpick_ignore = [
         "infoset.set_queries": ("SetQueries",),
         "infoset.engine.set_state": ("SetState",),
         "rendezvous.multipoint._shooting": ("ShotPath",),
+        "rendezvous.multipoint.segments": ("LinearPath",),
+        "sim.covariance": ("Covariance",),
         "sim.engagement": ("Step",),
         "sim.target": ("GivenTarget", "TargetMotion"),
         "rendezvous.pursuit_evasion._pair": ("Node",),
