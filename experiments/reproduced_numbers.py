@@ -56,7 +56,7 @@ def run(options: Reproduce) -> None:
         compared = [reproduce_paper(paper, begin(paper.name)) for paper in papers]
         summary = [_summary(paper, numbers) for paper, numbers in zip(papers, compared, strict=True)]
         written.deliver("--json", to_json({"versions": versions(), "papers": summary}))
-    show(_lines(papers, compared), options.quiet, stdout_taken=written.stdout_taken)
+    show(_lines(papers, compared), options.quiet or written.stdout_taken)
     wrong = [each for numbers in compared for each in numbers if each.verdict is Verdict.DISAGREED]
     for each in wrong:
         number = each.number

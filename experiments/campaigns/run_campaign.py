@@ -57,4 +57,4 @@ def run(options: Options) -> None:
         written.save(SUMMARY, to_json(results), "--json")
         written.deliver("--csv", table.drop(columns="cell").to_csv(index=False))
     parts.append(f"to see the results: infoset report {stored.path}")
-    show(parts, options.quiet, stdout_taken=written.stdout_taken)
+    show(parts, options.quiet or written.stdout_taken)

@@ -47,7 +47,7 @@ def run(options: Report) -> None:
         with output_of(options, [*figures, "report.json", SCENARIO_FILE]) as written:
             parts = (_report_sweep if swept else _report_campaign)(folder, options, written)
             written.save(SCENARIO_FILE, to_toml(folder.manifest.scenario))
-            show(parts, options.quiet, stdout_taken=written.stdout_taken)
+            show(parts, options.quiet or written.stdout_taken)
 
 
 def _figures(folder: CampaignFolder) -> Sequence[str]:

@@ -76,7 +76,7 @@ class ProblemCommand(Generic[Problem, Report]):
             if options.out is not None:
                 drawn = import_module(self.figures).draw_all(report)
                 written.draw(self.figure_names, drawn, begin("figures"))
-        show(self.lines(report), options.quiet, stdout_taken=written.stdout_taken)
+        show(self.lines(report), options.quiet or written.stdout_taken)
 
     def report(self, options: Any) -> Report:
         """Return the report for options, without progress and files."""

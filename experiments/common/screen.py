@@ -49,9 +49,9 @@ def say_warnings(warnings: Iterable[str], quiet: bool, notes: Iterable[str] = ()
         say(f"warning: {warning}", quiet)
 
 
-def show(parts: Iterable[Part], quiet: bool, *, stdout_taken: bool = False) -> None:
-    """Print lines, which the terminal wraps, and tables on stdout; nothing if a file is printed there."""
-    if not (quiet or stdout_taken):
+def show(parts: Iterable[Part], quiet: bool) -> None:
+    """Print lines, which the terminal wraps, and tables on stdout, unless `quiet`."""
+    if not quiet:
         console = Console(highlight=False, markup=False, emoji=False)
         for part in parts:
             if isinstance(part, Table):

@@ -93,19 +93,19 @@ def max_guarantee(bounds_m: Sequence[float]) -> float | None:
     return maximum if np.isfinite(maximum) else None
 
 
-def ellipse(across_m: Floats, level: float) -> tuple[Floats, Floats] | None:
-    """Return the ellipse that contains a share of the points; None if the points are on a line.
+def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats | None:
+    """Return the outline, m, shape (2, 181), of the ellipse that contains a share of the points.
 
-    It has the centre (y, z), m, and the axes of the covariance of the points; its size is the quantile of their
-    Mahalanobis radii. The result is the centre and the matrix, shape (2, 2), that maps the unit circle to the ellipse
-    around it.
+    It has the centre (y, z) and the axes of the covariance of the points; its size is the quantile of their Mahalanobis
+    radii. None if the points are on a line, or a part of it is beyond a distance that no point has.
     """
-    centre = across_m.mean(axis=0)
     variances, axes = np.linalg.eigh(np.cov(across_m.T)) if len(across_m) > 2 else (np.zeros(2), np.eye(2))
     if variances[0] <= 1e-12 * variances[1]:
         return None
-    radii = np.sqrt(np.sum(((across_m - centre) @ axes) ** 2 / variances, axis=1))
-    return centre, float(np.quantile(radii, level)) * axes * np.sqrt(variances)
+    centre, scaled = across_m.mean(axis=0), axes * np.sqrt(variances)
+    radii = np.linalg.norm(np.linalg.solve(scaled, (across_m - centre).T), axis=0)
+    outline = np.asarray(centre[:, None] + scaled @ ring(float(np.quantile(radii, level))))
+    return None if np.hypot(*outline).max() > within_m else outline
 
 
 @style()
@@ -157,8 +157,9 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
             quantile = float(np.quantile(each.miss_m, level))
             axes.plot(*ring(quantile), label=name, color=GAME, linestyle=dashes, linewidth=0.9, **line)
             known.append(f"{'median' if level == 0.5 else f'{100 * level:g} %'} {number(quantile)} m")
+    within_m = np.inf if each.guaranteed_m is None else each.guaranteed_m
     for level, name, dashes in _ELLIPSES:
-        if shows(count, level) and (outline := _ellipse_within(each, level)) is not None:
+        if shows(count, level) and (outline := ellipse(each.across_m, level, within_m)) is not None:
             axes.plot(*outline, label=name, color=TRUTH, linestyle=dashes, **line)
     draw_body(axes, half, each.guaranteed_m, radius_m)
     if each.has_axes:
@@ -171,16 +172,3 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     lines += [] if each.guaranteed_m is None else [f"maximum Φ {number(each.guaranteed_m)} m"]
     lines += [] if radius_m is None else [f"hits: {int((each.miss_m <= radius_m).sum())} of {some_runs(count)}"]
     return lines
-
-
-def _ellipse_within(each: Cloud, level: float) -> Floats | None:
-    """Return the outline of the ellipse of a share of the runs; None if a part of it is beyond the guaranteed miss.
-
-    No miss is there, so the ellipse would not describe the runs.
-    """
-    shape = ellipse(each.across_m, level)
-    if shape is None:
-        return None
-    outline = shape[0][:, None] + shape[1] @ ring(1.0)
-    beyond = each.guaranteed_m is not None and np.hypot(*outline).max() > each.guaranteed_m
-    return None if beyond else outline

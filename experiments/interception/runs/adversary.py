@@ -56,7 +56,7 @@ def run(options: Adversary) -> None:
             work.written.save("steps.csv", steps_csv([record]))
             save_records({RECORD: record}, [options.record], work.written, options.overwrite)
             draw_engagements([record], times_s, work.written, work.begin)
-    show(_parts(scenario, worst, options, elapsed_s), options.quiet, stdout_taken=work.written.stdout_taken)
+    show(_parts(scenario, worst, options, elapsed_s), options.quiet or work.written.stdout_taken)
 
 
 def _summary(worst: WorstMisses, chosen: WorstEngagement, options: Adversary) -> dict[str, object]:

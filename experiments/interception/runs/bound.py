@@ -85,7 +85,7 @@ def run(options: Bound) -> None:
             worst_m = {strategy.name: strategy.worst_m for strategy in worst}
             work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))
     parts = [*_parts(scenario, lower, nominal, worst), *value.lines(), *_notes(lower, options, worst)]
-    show(parts, options.quiet, stdout_taken=work.written.stdout_taken)
+    show(parts, options.quiet or work.written.stdout_taken)
 
 
 def _simulate(

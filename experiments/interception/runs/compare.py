@@ -71,7 +71,7 @@ def run(options: Compare) -> None:
             from experiments.interception.figures.commands import draw_compared
 
             work.written.draw(figures, draw_compared(scenario, compared), work.begin("figure"))
-    show(_parts(scenario, compared), options.quiet, stdout_taken=work.written.stdout_taken)
+    show(_parts(scenario, compared), options.quiet or work.written.stdout_taken)
 
 
 def _progress(flights: Iterable[Compared], reports: Mapping[str, Progress]) -> Callable[[Compared], Progress]:

@@ -67,7 +67,7 @@ def run(options: Engage) -> None:
         named = dict(zip(folder_records, records, strict=True))
         save_records(named, [record_files.get(noise) for noise in noises], work.written, options.overwrite)
         draw_engagements(records, times_s, work.written, work.begin)
-    show(engagement_parts(records), options.quiet, stdout_taken=work.written.stdout_taken)
+    show(engagement_parts(records), options.quiet or work.written.stdout_taken)
 
 
 def _summary(record: Record, elapsed_s: float) -> dict[str, object]:

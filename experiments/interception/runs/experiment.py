@@ -111,7 +111,7 @@ def run(options: Experiment) -> None:
             from experiments.interception.figures.commands import draw_experiment
 
             work.written.draw(figures, draw_experiment(scenario, curves, courses[::-1]), work.begin("figure"))
-    show(_parts(scenario, curves, remedies), options.quiet, stdout_taken=work.written.stdout_taken)
+    show(_parts(scenario, curves, remedies), options.quiet or work.written.stdout_taken)
 
 
 def _key(curve: Curve) -> dict[str, int | str | bool]:
