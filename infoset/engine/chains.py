@@ -482,26 +482,19 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
 
 
 @allocation_free
-def cut_misses(
-    section: SectionView, tau: float, tilt: float, lower: float, upper: float, points: Floats
-) -> tuple[bool, float]:
-    """Intersect a section with the band lower <= m + V tilt <= upper; returns are those of `cut`.
+def cut_misses(section: SectionView, tau: float, lower: float, upper: float, points: Floats) -> tuple[bool, float]:
+    """Intersect a section with the band of predicted misses lower <= m <= upper; returns are those of `cut`.
 
     This band is not parallel to the level, so that it may cut any edge: the chains are computed anew. O(vertices).
-    If the extreme misses and the bound of |V| show that it cuts none, the section is unchanged, and the overlap is a
-    lower bound. `points` is a working array of CAPACITY + 2 vertices.
+    `points` is a working array of CAPACITY + 2 vertices.
     """
     right, left, rings, _ = section
-    upper_miss, lower_miss = max_and_min_miss(section, tau)
-    reach = abs(tilt) * right.reach
-    if lower <= lower_miss - reach and upper_miss + reach <= upper:
-        return True, min(upper_miss - reach - lower, upper - (lower_miss + reach))
     count = ZERO
     for chain in (right, left):
         for i in range(chain.begin, chain.end):
             v, m = vertex(chain, rings, i)
             count = polygon.append(points, count, v, m)
-    count, overlap = polygon.clip_to_band(points, count, tilt, 1.0, lower, upper)
+    count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower, upper)
     if count == 0:
         return False, overlap
     bottom, top = polygon.extremes(points, count, -tau, 1.0)

@@ -18,7 +18,7 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.concave_bounds import bound_between
 from infoset.engine.history import IMPULSE, PREDICTION, EventLog, History
-from infoset.engine.location import FIRST, LABEL_RESOLUTION, LAST, Living, locate_end, search_window
+from infoset.engine.location import FIRST, LABEL_RESOLUTION, LAST, MIDDLE, Living, locate_end, search_bracket
 from infoset.engine.replays import (
     LOWER,
     PROBE,
@@ -26,6 +26,7 @@ from infoset.engine.replays import (
     Past,
     Records,
     keep_section,
+    middle_label,
     past_of,
     probe,
     replayed_section,
@@ -120,8 +121,9 @@ def write_outline(outlines: Outlines, i: int, label: float, row: int, past: Past
     """Write the sections in a row of the workspace as those of label number `i`."""
     outlines.labels[i] = label
     for channel in range(past.laws.shape[0]):
-        tau = time_to_go(label, past.log.elapsed, law_of(past.laws, channel))
-        section = replayed_section(past, channel, row, label)
+        middle = middle_label(label, past)
+        tau = time_to_go(middle, past.log.elapsed, law_of(past.laws, channel))
+        section = replayed_section(past, channel, row, middle)
         outlines.counts[channel, i] = chains.outline(section, tau, outlines.points[channel, i])
 
 
@@ -156,28 +158,32 @@ def later_impulses(near: float, far: float, side: float, past: Past, law: Sectio
 def miss_at(outlines: Outlines, i: int, past: Past) -> float:
     """Return the maximum miss (10) of the section of one label, without the error of the speed, m."""
     label, miss = outlines.labels[i], 0.0
+    middle = middle_label(label, past)
     for channel in range(past.laws.shape[0]):
         law = law_of(past.laws, channel)
         points, count = outlines.points[channel, i], outlines.counts[channel, i]
-        tau = time_to_go(label, past.log.elapsed, law)
-        upper = support(points, count, tau, 1.0) - later_impulses(label, label, 1.0, past, law)[0]
-        lower = support(points, count, -tau, -1.0) - later_impulses(label, label, -1.0, past, law)[0]
-        miss = math.hypot(miss, max(upper, lower) + 0.5 * law.disturbance * tau**2)
+        tau, room = time_to_go(middle, past.log.elapsed, law), past.room.drifts[channel, 1]
+        turn = past.room.drifts[channel, 0] * ((label - middle) / law.closing_speed)
+        upper = support(points, count, tau, 1.0) - turn - later_impulses(label, label, 1.0, past, law)[0]
+        lower = support(points, count, -tau, -1.0) + turn - later_impulses(label, label, -1.0, past, law)[0]
+        drift = 0.5 * law.disturbance * time_to_go(label, past.log.elapsed, law) ** 2
+        miss = math.hypot(miss, max(upper, lower) + room + drift)
     return miss
 
 
 @allocation_free
-def max_exact_miss(replayed: Replayed, past: Past, outlines: Outlines) -> float:
+def max_exact_miss(replayed: Replayed, reached: float, past: Past, outlines: Outlines) -> float:
     """Return the maximum miss of the exact sections of replayed labels, m; with rates, that of one of them.
 
-    The bands of rates that are convex on a window are wider than those of its labels.
+    With rates, the sections of a window contain those of its labels. They need not be exact if they reach less than
+    `reached`.
     """
     worst, miss = ZERO, 0.0
     for i in range(replayed.inner, replayed.number - replayed.outer):
         miss_here = miss_at(outlines, i, past)
         if miss_here > miss:
             worst, miss = i, miss_here
-    if past.errors is not None:
+    if past.errors is not None and miss > reached:
         label, alone = outlines.labels[worst], with_window(past, np.inf, -np.inf)
         if run(label, alone)[0] != ALIVE:
             return 0.0
@@ -206,7 +212,7 @@ def living_part(known: float, past: Past) -> Living:
         living = known if near <= known <= far else 0.5 * (near + far)
         if past.errors is not None:
             # A label that lives by itself may be dead with the bands of the window, and others may live.
-            if not search_window(near, far, living, past):
+            if not (probe(limits, MIDDLE, living, past) or search_bracket(past)):
                 return Living(False, below, lower, upper, above)
             living = limits[1].label
         elif living != known:
@@ -289,26 +295,33 @@ def bound_piece(near: float, far: float, number: int, first: int, past: Past, ou
 
     The support of the sections in a fixed direction is a concave function of the label, but the direction of z + V x/e
     turns with the label. With the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first term has
-    a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- rho. Of the `number` replayed
-    labels, `first` are below the piece.
+    a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- rho. With rates the direction
+    of (13) is that of the middle of the window. Of the `number` replayed labels, `first` are below the piece.
     """
     labels, supports, total = outlines.labels[:number], outlines.supports[:, :number], 0.0
+    centre = 0.5 * (near + far)
+    middle = centre if past.errors is None else middle_label(centre, past)
     for channel in range(past.laws.shape[0]):
-        law = law_of(past.laws, channel)
-        e, tau = law.closing_speed, time_to_go(0.5 * (near + far), past.log.elapsed, law)
+        law, drifts = law_of(past.laws, channel), past.room.drifts[channel]
+        e, tau = law.closing_speed, time_to_go(middle, past.log.elapsed, law)
         for k in range(max(first - 2, 0), min(first + 2, number)):
             points, count = outlines.points[channel, k], outlines.counts[channel, k]
             supports[0, k], supports[1, k] = support(points, count, 1.0, 0.0), support(points, count, -1.0, 0.0)
             supports[2, k], supports[3, k] = support(points, count, tau, 1.0), support(points, count, -tau, -1.0)
-        v_max = bound_between(labels, supports[0], first, near, far, 0.0)
-        v_min = -bound_between(labels, supports[1], first, near, far, 0.0)
-        v_middle, rho = 0.5 * (v_max + v_min), 0.5 * (v_max - v_min)
+        if past.errors is None:
+            v_max = bound_between(labels, supports[0], first, near, far, 0.0)
+            v_min = -bound_between(labels, supports[1], first, near, far, 0.0)
+            slope, offset = 0.5 * (v_max + v_min) / e, 0.0
+            room = 0.5 * (v_max - v_min) * ((far - near) / (2.0 * e))
+        else:
+            slope, room = -drifts[0] / e, drifts[1]
+            offset = slope * (centre - middle)
         moved, turn = later_impulses(near, far, 1.0, past, law)
-        upper = bound_between(labels, supports[2], first, near, far, v_middle / e - turn) - moved
+        upper = bound_between(labels, supports[2], first, near, far, slope - turn) + offset - moved
         moved, turn = later_impulses(near, far, -1.0, past, law)
-        lower = bound_between(labels, supports[3], first, near, far, -v_middle / e - turn) - moved
+        lower = bound_between(labels, supports[3], first, near, far, -slope - turn) - offset - moved
         drift = 0.5 * law.disturbance * time_to_go(far, past.log.elapsed, law) ** 2
-        total = math.hypot(total, max(upper, lower) + rho * ((far - near) / (2.0 * e)) + drift)
+        total = math.hypot(total, max(upper, lower) + room + drift)
     return total
 
 
@@ -362,7 +375,7 @@ def bound_all(leaving: Leaving, past: Past, outlines: Outlines, pieces: Records,
                 before, count = count, bound_pieces(living, replayed, window, outlines, pieces, count)
                 for i in range(before, count):
                     pieces[i].step = step
-                reached = max(reached, max_exact_miss(replayed, window, outlines))
+                reached = max(reached, max_exact_miss(replayed, reached, window, outlines))
 
 
 class GuaranteedMiss:

@@ -37,7 +37,7 @@ class EventLog(NamedTuple):
 
 
 class LastSight(NamedTuple):
-    """The last angle measurement of a history, and the impulses since.
+    """The last angle measurement of a history, and the impulses so far.
 
     Parameters
     ----------
@@ -47,8 +47,6 @@ class LastSight(NamedTuple):
         The measured angles of this axis and of the other one, rad.
     steps : int
         Steps since the measurement.
-    moved, doubt : float
-        Sum of the later impulses, each times its time since the measurement, and the error bound of that sum, m.
     fired : float
         Sum of the magnitudes of all impulses, m/s.
     """
@@ -57,12 +55,10 @@ class LastSight(NamedTuple):
     alpha: float
     across: float
     steps: int
-    moved: float
-    doubt: float
     fired: float
 
 
-NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
+NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0)
 
 
 class History:

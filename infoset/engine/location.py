@@ -155,6 +155,13 @@ def search_window(
         if probe(known, i, label, past):
             known[1] = known[i]
             return True
+    return search_bracket(past)
+
+
+@allocation_free
+def search_bracket(past: Past) -> bool:
+    """Return whether a label lives between the first three known ones, which are dead; it is then the second one."""
+    known = past.room.known
     for end in (0, 2):
         if outlives(known[end], known[1]):
             known[2 - end] = known[1]

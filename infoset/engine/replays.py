@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from infoset._compile import ZERO, allocation_free, constants, entry, pasted
+from infoset._compile import ZERO, allocation_free, constants, entry, inlined, pasted
 from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.chain_storage import Chains, copy_section, empty_sections, view_of, working_room
@@ -15,9 +15,7 @@ from infoset.engine.history import ANGLE, IMPULSE, NO_SIGHT, PREDICTION, WIDENIN
 from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
     ALIVE,
-    Rate,
     across_of,
-    measure_rate_section,
     measure_section,
     predict_section,
     shift_section,
@@ -25,6 +23,15 @@ from infoset.engine.section_life import (
     start_section,
     time_to_go,
     widen_section,
+)
+from infoset.engine.section_window import (
+    Rate,
+    half_time,
+    measure_in_window,
+    measure_rate_section,
+    middle_of,
+    new_window,
+    window_after,
 )
 
 MAX_HALVED_WINDOWS = 1000
@@ -61,6 +68,8 @@ class Workspace(NamedTuple):
         The sections `PROBE`, which is the last replay, `LOWER` and `UPPER` along each axis.
     overlaps, living_overlaps : ndarray, shape (C, E)
         Overlap of section and band at each measurement, m, in the last replay and in that of a living label.
+    drifts : ndarray, shape (C, 2)
+        With rates: `turned` and the room of (13), m/s and m, of the window of the last replay that lived.
     points : ndarray, shape (n, 2)
         Vertices of a section.
     known : recarray of PROBED, shape (K,)
@@ -78,6 +87,7 @@ class Workspace(NamedTuple):
     chains: Chains
     overlaps: Floats
     living_overlaps: Floats
+    drifts: Floats
     points: Floats
     known: Records
     four: Records
@@ -99,8 +109,8 @@ class Past(NamedTuple):
     room : Workspace
         Working arrays, with the events of the engagement that `select` has chosen.
     nearest, farthest : float
-        Window of labels, m, over which the bands of measured rates are convex. The empty window, from infinity to
-        minus infinity, makes the window of each label the label itself.
+        With rates, the window of labels, m, on which sections are convex. The empty window, from infinity to minus
+        infinity, makes the window of each label the label itself.
     """
 
     log: EventLog
@@ -120,6 +130,7 @@ def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
         empty_sections(ROWS * channels),
         overlaps=np.empty((channels, events)),
         living_overlaps=np.empty((channels, events)),
+        drifts=np.zeros((channels, 2)),
         points=working_room(),
         known=np.recarray(slots + 2, PROBED),
         four=np.recarray(4, PROBED),
@@ -143,6 +154,14 @@ def select(past: Past, b: int) -> None:
 def with_window(past: Past, nearest: float, farthest: float) -> Past:
     """Return a history with another window of labels."""
     return Past(past.log, past.errors, past.laws, past.room, nearest, farthest)
+
+
+@inlined
+def middle_label(label: float, past: Past) -> float:
+    """Return the label in whose coordinates a replayed section is: with rates, the middle of its window."""
+    if past.errors is None:
+        return label
+    return 0.5 * (min(label, past.nearest) + max(label, past.farthest))
 
 
 @pasted
@@ -178,33 +197,46 @@ def replay(
     kinds, applies, points = past.log.kinds, past.room.applies, past.room.points
     values, overlaps = past.room.values, past.room.overlaps[law.channel]
     own = values[law.channel]
-    section = replayed_section(past, law.channel, PROBE, label)
     first, elapsed, sight = done
+    middle, room = label, 0.0
+    if errors is not None:
+        window = new_window(min(label, past.nearest), max(label, past.farthest), law)
+        middle, room = middle_of(window), window.fastest * half_time(window, law)
+    section = replayed_section(past, law.channel, PROBE, middle)
     if first == 0:
-        start_section(section, law)
+        start_section(section, room, law)
     for event in range(first, until):
+        across = across_of(values, event, law)
         if kinds[event] == PREDICTION:
             if chains.is_crowded(section):
-                chains.reduce_outward(section, time_to_go(label, elapsed, law), points)
+                chains.reduce_outward(section, time_to_go(middle, elapsed, law), points)
             elapsed += 1
             predict_section(section, elapsed, law)
         elif not applies[event]:
             continue
         elif kinds[event] == ANGLE:
-            living, overlaps[event] = measure_section(section, elapsed, own[event], across_of(values, event, law), law)
+            if errors is None:
+                living, overlaps[event] = measure_section(section, elapsed, own[event], across, law)
+            else:
+                angles = own[event], across
+                living, overlaps[event] = measure_in_window(section, label, elapsed, angles, window, law)
             if not living:
                 return event, done
         elif kinds[event] == IMPULSE:
-            shift_section(section, elapsed, own[event], across_of(values, event, law), law)
+            shift_section(section, elapsed, own[event], across, law)
         elif kinds[event] == WIDENING:
             widen_section(section, elapsed, law)
         elif errors is not None:
-            rate = Rate(own[event], errors[event], sight, past.nearest, past.farthest)
-            living, overlaps[event] = measure_rate_section(section, elapsed, rate, law, points)
+            rate = Rate(own[event], errors[event], sight)
+            living, overlaps[event] = measure_rate_section(section, label, elapsed, rate, window, law, points)
             if not living:
                 return event, done
         if errors is not None:
-            sight = sight_after(sight, kinds[event], own[event], across_of(values, event, law), applies[event], law)
+            sight = sight_after(sight, kinds[event], own[event], across, applies[event], law)
+            window = window_after(window, kinds[event], own[event], across, errors[event], elapsed, law)
+    if errors is not None:
+        past.room.drifts[law.channel, 0] = window.turned
+        past.room.drifts[law.channel, 1] = window.loose * half_time(window, law)
     return ALIVE, Replayed(until, elapsed, sight)
 
 

@@ -11,7 +11,6 @@ paper.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -51,9 +50,10 @@ def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
 
 
 @allocation_free
-def start_section(section: SectionView, law: SectionLaw) -> None:
+def start_section(section: SectionView, room: float, law: SectionLaw) -> None:
     """Write the section at t = 0: the box of part 1 of Lemma 1, or the rectangle, with half a disturbance of Lemma 3.
 
+    Both are enlarged by `room` along z, m: zero, or what the labels of a window need in the section of its middle.
     The rectangle is that of the paper (section 4), but with V_x at the end of its interval that makes the rectangle
     larger. The printed formula always takes the lower end; both agree if z can have either sign.
     """
@@ -66,7 +66,7 @@ def start_section(section: SectionView, law: SectionLaw) -> None:
         highest -= min(law.vx_min * z_max, law.vx_max * z_max) / x
         shift_at_min, shift_at_max = -e * math.atan(z_min / x), -e * math.atan(z_max / x)
         z_min, z_max = math.atan(z_min / x) * x, math.atan(z_max / x) * x
-    tau = time_to_go(x, ZERO, law)
+    z_min, z_max, tau = z_min - room, z_max + room, time_to_go(x, ZERO, law)
     chains.start(
         section,
         tau,
@@ -190,17 +190,14 @@ def sight_after(
     sight: LastSight, kind: int, value: float, other_value: float, applies: bool, law: SectionLaw
 ) -> LastSight:
     """Return the last sight after one more event of the history."""
-    known, alpha, across, steps, moved, doubt, fired = sight
+    known, alpha, across, steps, fired = sight
     if kind == PREDICTION:
         steps += 1
     elif applies and kind == ANGLE:
-        known, alpha, across, steps, moved, doubt = True, value, other_value, 0, 0.0, 0.0
+        known, alpha, across, steps = True, value, other_value, 0
     elif applies and kind == IMPULSE:
-        lever = law.step * steps
-        moved += value * lever
-        doubt += impulse_doubt(value, other_value, law) * lever
         fired += abs(value) + pointing_doubt(value, other_value, law)
-    return LastSight(known, alpha, across, steps, moved, doubt, fired)
+    return LastSight(known, alpha, across, steps, fired)
 
 
 @inlined
@@ -224,113 +221,6 @@ def impulse_doubt(impulse: float, across: float, law: SectionLaw) -> float:
 def across_of(values: Floats, i: int, law: SectionLaw) -> float:
     """Return the value with number `i` along the other axis, of values of shape (C, N); zero in a plane."""
     return values[law.other, i] if law.other >= 0 else 0.0
-
-
-class Rate(NamedTuple):
-    """A measured rate of the line of sight along one axis.
-
-    Parameters
-    ----------
-    omega, error : float
-        The rate and its error bound, rad/s.
-    sight : LastSight
-        The last angle before it.
-    nearest, farthest : float
-        Window of labels, m, over which the band is convex. The empty window, from infinity to minus infinity, makes the
-        window of each label the label itself.
-    """
-
-    omega: float
-    error: float
-    sight: LastSight
-    nearest: float
-    farthest: float
-
-
-@allocation_free
-def rate_band(label: float, elapsed: int, rate: Rate, law: SectionLaw) -> tuple[float, float]:
-    """Return the bounds of z + V x_c/e, m, that agree with a measured rate; x_c is the middle of a window of labels.
-
-    On the window the lower bound is a convex function of the label and the upper one is concave. Sets that are cut by
-    this band are convex in (z, V, label) on the window; sets that are cut by the exact bands of the labels are not.
-
-    The measured rate is (V_z x - V_x z)/(x^2 + z^2): the model's V/x + e z/x^2 times the square of cos(alpha). With
-    z_j = alpha_j x_j at the last measured angle and the impulses since, the predicted miss m = z + V x/e gives
-    V = (e/x_j)(m - alpha_j x_j - moved), so that
-
-        z + V x_c/e = m x_jc/x_j + (x - x_c) (alpha_j + moved/x_j).
-
-    m x_jc/x_j lies between (omega -+ error) times x^2 x_jc/(e x_j), a convex function of x. Its chord replaces it in
-    the bound that needs a concave function. The band of alpha_j bounds the second term: (9), (13), Lemma 9.
-    """
-    e, omega, error, sight = law.closing_speed, rate.omega, rate.error, rate.sight
-    travelled = label - range_of(label, elapsed, law)
-    x, near, far = label - travelled, min(label, rate.nearest) - travelled, max(label, rate.farthest) - travelled
-    ago = law.step * sight.steps
-    then = e * ago
-    near_then, far_then = near + then, far + then
-    if sight.known:
-        min_near, max_near = slope_band(sight.alpha, sight.across, travelled - then, near_then, law)
-        min_far, max_far = slope_band(sight.alpha, sight.across, travelled - then, far_then, law)
-    else:
-        min_near, max_near = law.z_min / near_then, law.z_max / near_then
-        min_far, max_far = law.z_min / far_then, law.z_max / far_then
-    minimum, maximum = min(min_near, min_far), max(max_near, max_far)
-    if not (minimum > -np.inf and maximum < np.inf):
-        return -np.inf, np.inf
-    steepest = max(abs(minimum), abs(maximum))
-    if sight.steps > 0:
-        fastest = max(abs(law.vz_min), abs(law.vz_max)) + sight.fired * (1.0 + law.impulse_error)
-        fastest += law.disturbance * (law.step * elapsed)
-        if near <= 0.0:
-            return -np.inf, np.inf
-        steepest = (steepest * far_then + fastest * ago) / near
-        doubt = sight.doubt + 0.5 * law.disturbance * ago * ago
-        minimum += min((sight.moved - doubt) / near_then, (sight.moved - doubt) / far_then)
-        maximum += max((sight.moved + doubt) / near_then, (sight.moved + doubt) / far_then)
-    widest = 1.0 + steepest * steepest if law.exact_angles else 1.0
-    lower, upper = omega - error, omega + error
-    lower *= widest if lower < 0.0 else 1.0
-    upper *= widest if upper > 0.0 else 1.0
-    middle = 0.5 * (near + far)
-    curve = scaled_square(x, middle, then) / e
-    chord = curve
-    if far > near:
-        at_near, at_far = scaled_square(near, middle, then) / e, scaled_square(far, middle, then) / e
-        chord = at_near + (at_far - at_near) * ((x - near) / (far - near))
-    turn = 0.5 * (minimum + maximum) * (x - middle)
-    room = 0.5 * (maximum - minimum) * (0.5 * (far - near))
-    return (
-        lower * (chord if lower < 0.0 else curve) + turn - room,
-        upper * (chord if upper > 0.0 else curve) + turn + room,
-    )
-
-
-@inlined
-def scaled_square(x: float, middle: float, then: float) -> float:
-    """Return x^2 x_jc/x_j, where x_j = x + `then` and x_jc = `middle` + `then`."""
-    return x * (middle + then) * (x / (x + then) if then > 0.0 else 1.0)
-
-
-@allocation_free
-def measure_rate_section(
-    section: SectionView, elapsed: int, rate: Rate, law: SectionLaw, points: Floats
-) -> tuple[bool, float]:
-    """Cut a section by a line-of-sight rate: by (9), a band of the predicted miss omega x^2 / e.
-
-    Return what `chains.cut` does, with the overlap in metres of predicted miss.
-    """
-    label = section.label
-    near, far = min(label, rate.nearest), max(label, rate.farthest)
-    lower, upper = rate_band(label, elapsed, rate, law)
-    # The band bounds z + V x_c/e = m + V tilt.
-    tau, tilt = time_to_go(label, elapsed, law), (0.5 * (near + far) - label) / law.closing_speed
-    if chains.is_crowded(section):
-        chains.reduce_outward(section, tau, points)
-    slack = CUT_SLACK * (label * (abs(rate.omega) + rate.error) + section.right.reach) * (label / law.closing_speed)
-    # The section already contains the first half of the next step's disturbance, which does not commute with the cut.
-    slack += (tau + tilt) * law.half_v_at_start
-    return chains.cut_misses(section, tau, tilt, lower - slack, upper + slack, points)
 
 
 @inlined

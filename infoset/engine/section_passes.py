@@ -22,10 +22,8 @@ from infoset.engine.section_life import (
     UPPER_MISS,
     Z_MAX,
     Z_MIN,
-    Rate,
     across_of,
     impulse_doubt,
-    measure_rate_section,
     measure_section,
     predict_section,
     range_of,
@@ -36,6 +34,7 @@ from infoset.engine.section_life import (
     summarise_section,
     time_to_go,
 )
+from infoset.engine.section_window import Rate, measure_rate_section, new_window
 
 TIE_TOLERANCE = 1e-9
 """Misses of two vertices that differ by less than this part of the interval of misses count as equal, those of one
@@ -135,7 +134,7 @@ def start_all(sections: Sections, laws: Laws) -> None:
         law = law_of(laws, channel)
         for b in range(len(sections.used)):
             for s in range(sections.used[b]):
-                start_section(section_of(sections, channel, b, s), law)
+                start_section(section_of(sections, channel, b, s), 0.0, law)
                 sections.slots[b, s].living = True
 
 
@@ -233,16 +232,14 @@ def follow_sight(log: EventLog, done: int, b: int, sights: Floats, law: SectionL
         sights[c, b, 2],
         int(sights[c, b, 3]),
         sights[c, b, 4],
-        sights[c, b, 5],
-        sights[c, b, 6],
     )
     for event in range(done, log.number):
         values = log.values[event]
         across, applies = across_of(values, b, law), log.applies[event, b]
         sight = sight_after(sight, log.kinds[event], values[c, b], across, applies, law)
     sights[c, b, 0] = 1.0 if sight.known else 0.0
-    sights[c, b, 1], sights[c, b, 2], sights[c, b, 3] = sight.alpha, sight.across, sight.steps
-    sights[c, b, 4], sights[c, b, 5], sights[c, b, 6] = sight.moved, sight.doubt, sight.fired
+    sights[c, b, 1], sights[c, b, 2] = sight.alpha, sight.across
+    sights[c, b, 3], sights[c, b, 4] = sight.steps, sight.fired
     return sight
 
 
@@ -262,12 +259,13 @@ def measure_rate_all(
         for channel in range(laws.shape[0]):
             law = law_of(laws, channel)
             sight = follow_sight(log, done, b, sights, law)
-            rate = Rate(omega[channel, b], error, sight, np.inf, -np.inf)
+            rate = Rate(omega[channel, b], error, sight)
             for s in range(used[b]):
                 if not (active[b] and is_cut(sections, channel, event, b, s)):
                     continue
-                section = section_of(sections, channel, b, s)
-                survives, overlap = measure_rate_section(section, log.elapsed, rate, law, points)
+                section, label = section_of(sections, channel, b, s), slots[b, s].label
+                alone = new_window(label, label, law)
+                survives, overlap = measure_rate_section(section, label, log.elapsed, rate, alone, law, points)
                 if not survives:
                     deaths += mark_empty(slots[b, s], channel, event, overlap)
                 if slots[b, s].living:

@@ -16,10 +16,9 @@ from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, RandomNoise, Thruster, TieRule
 from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
-from infoset.engine import section_life
+from infoset.engine import section_window as windows
 from infoset.engine.history import LastSight
 from infoset.engine.section_law import BOUND_SLACK, SectionLaw, section_laws
-from infoset.engine.section_life import Rate
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
@@ -28,7 +27,7 @@ from tests.kernels import callable_kernels
 from tests.sensors import linear
 
 CASES = Path(__file__).parent / "cases"
-rate_band = callable_kernels(section_life).rate_band
+kernels = callable_kernels(windows)
 HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
 
 
@@ -130,7 +129,7 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     slope: float, v: float, ago: int, angle_draw: float, rate_draw: float,
     log_error: float, place: float, width: float, impulse: float, push: float, rising: bool, measured: bool,
 ) -> None:  # fmt: skip
-    """The measured rate of a motion in closed form admits z + V x_c/e for every window of labels.
+    """The measured rate of a motion in closed form admits its predicted miss, displaced by (13), for every window.
 
     The last angle was measured `ago` steps before the rate, or never: then the initial box stands for it.
     """
@@ -153,24 +152,29 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     rate_error = 1e-9 * (1.0 + BOUND_SLACK)
     omega = omega_true + rate_draw * 1e-9
     size = abs(impulse) if ago else 0.0
-    sight = LastSight(
-        measured, alpha, 0.0, ago, impulse * fired_after if ago else 0.0, size * law.impulse_error * fired_after, size
-    )
+    sight = LastSight(measured, alpha, 0.0, ago, size)
     if abs(v) + size + law.disturbance * time > 300.0 or abs(z_then) > 1e4:
         return
-    middle = 0.5 * (near + far) - e * step * elapsed
-    rate = Rate(omega, rate_error, sight, near, far)
-    lower, upper = rate_band(label, elapsed, rate, law)
-    value = z + v_now * middle / e
+    window = windows.Window(near, far, impulse, abs(push), 0.0, 0.0)
+    rate = windows.Rate(omega, rate_error, sight)
+    steepest = kernels.max_slope(elapsed, sight, window, law)
+    assert abs(z / x) <= steepest * (1.0 + 1e-12)
+
+    def rate_band(label: float, window: windows.Window) -> tuple[float, float]:
+        lower, upper = kernels.rate_band(label, elapsed, rate, 1.0 + steepest**2, window, law)
+        return lower, upper
+
+    lower, upper = rate_band(label, window)
+    value = z + v_now * x / e + impulse * (label - 0.5 * (near + far)) / e + push * 0.5 * (far - near) / e
     rounding = 1e-9 * (abs(value) + abs(lower) + abs(upper) + 1.0)
     assert lower - rounding <= value <= upper + rounding
-    bounds = np.array([rate_band(each, elapsed, rate, law) for each in np.linspace(near, far, 9)])
+    bounds = np.array([rate_band(each, window) for each in np.linspace(near, far, 9)])
     bend = np.diff(bounds, n=2, axis=0)
     assert (bend[:, 0] >= -rounding).all()
     assert (bend[:, 1] <= rounding).all()
     if ago == 0:
         # A window of one label has nothing but the rate itself: its band is as wide as the sensor's error.
-        alone = rate_band(label, elapsed, rate._replace(nearest=label, farthest=label), law)
+        alone = rate_band(label, window._replace(near=label, far=label))
         assert alone[1] - alone[0] <= 1.01 * 2.0 * (abs(omega) * 0.01 + rate_error) * x**2 / e
 
 

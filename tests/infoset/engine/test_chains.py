@@ -126,7 +126,7 @@ class Section:
         return chains.cut(self.view, self.tau, lower, upper)
 
     def cut_misses(self, lower: float, upper: float) -> Any:
-        return chains.cut_misses(self.view, self.tau, 0.0, lower, upper, chain_storage.working_room())
+        return chains.cut_misses(self.view, self.tau, lower, upper, chain_storage.working_room())
 
     def reduce(self) -> None:
         chains.reduce_outward(self.view, self.tau, chain_storage.working_room())
