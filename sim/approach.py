@@ -149,41 +149,37 @@ def propagate(states: Floats, parameter_m3_s2: float, duration_s: float) -> tupl
     return end[:12].reshape(4, 3), end[12:].reshape(6, 6)
 
 
+def pair_rates(state: Floats, parameter_m3_s2: float) -> Floats:
+    """Return the derivative of a pair of states and the transition matrix of the relative state, shape (48,).
+
+    The difference of gravity has no cancellation: with q = r . (r + 2 R) / R^2, the ratio of the cubes of both
+    distances is (1 + q)^(3/2) (Battin's form of Encke's method).
+    """
+    own, own_velocity, relative, velocity = state[:12].reshape(4, 3)
+    transition = state[12:].reshape(6, 6)
+    own_pull, pull, gradient = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    if parameter_m3_s2:
+        body, squared = own + relative, own @ own
+        scale, ratio = -parameter_m3_s2 / squared**1.5, np.log1p(relative @ (own + body) / squared)
+        own_pull, pull = scale * own, scale * (relative + np.expm1(-1.5 * ratio) * body)
+        gradient = scale * np.exp(-1.5 * ratio) * (np.eye(3) - 3.0 * np.outer(body, body) / (body @ body))
+    changes = transition[3:].ravel(), (gradient @ transition[:3]).ravel()
+    return np.concatenate([own_velocity, own_pull, velocity, pull, *changes])
+
+
 def _integrate(states: Floats, parameter_m3_s2: float, duration_s: float, event: Any = None) -> Any:
     """Integrate a pair of states with the transition matrix of the relative state."""
     from scipy.integrate import solve_ivp  # takes long to load
-
-    def rates(_time: float, state: Floats) -> Floats:
-        own, own_velocity, relative, velocity = state[:12].reshape(4, 3)
-        transition = state[12:].reshape(6, 6)
-        own_acceleration, acceleration, gradient = _gravity(own, relative, parameter_m3_s2)
-        changes = transition[3:].ravel(), (gradient @ transition[:3]).ravel()
-        return np.concatenate([own_velocity, own_acceleration, velocity, acceleration, *changes])
 
     # Each vector has the error of its modulus; the transition matrix that of a change of the relative position.
     sizes = np.linalg.norm(states, axis=1)
     scale = np.concatenate([np.repeat(np.where(sizes > 0.0, sizes, 1.0), 3), np.ones(36)])
     start = np.concatenate([states.ravel(), np.eye(6).ravel()])
-    span_s, accuracy = (0.0, duration_s), {"rtol": TOLERANCE, "atol": TOLERANCE * scale}
-    result = solve_ivp(rates, span_s, start, method="DOP853", events=event, **accuracy)
+    options = {"method": "DOP853", "rtol": TOLERANCE, "atol": TOLERANCE * scale, "events": event}
+    result = solve_ivp(lambda _, state: pair_rates(state, parameter_m3_s2), (0.0, duration_s), start, **options)
     if not result.success or not np.isfinite(result.y[:, -1]).all():
         raise ValueError("the motion cannot be integrated: it comes too near the attracting body")
     return result
-
-
-def _gravity(own: Floats, relative: Floats, parameter_m3_s2: float) -> tuple[Floats, Floats, Floats]:
-    """Return the accelerations of the spacecraft and of the relative motion, and the gradient of gravity at the object.
-
-    The difference of the two accelerations has no cancellation: with q = r . (r + 2 R) / R^2, the ratio of the cubes
-    of both distances is (1 + q)^(3/2) (Battin's form of Encke's method).
-    """
-    if not parameter_m3_s2:
-        return np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    body, squared = own + relative, own @ own
-    pull = -parameter_m3_s2 / squared**1.5
-    share = np.expm1(-1.5 * np.log1p(relative @ (own + body) / squared))
-    gradient = pull * (1.0 + share) * (np.eye(3) - 3.0 * np.outer(body, body) / (body @ body))
-    return pull * own, pull * (relative + share * body), gradient
 
 
 def _sun(place_m: Floats, velocity_m_s: Floats, parameter_m3_s2: float) -> Sun:

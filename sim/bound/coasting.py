@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from infoset.arrays import Floats
+from sim.approach import pair_rates
 from sim.kepler import sun_and_orbit
 from sim.scenario import Sun
 
@@ -154,19 +155,10 @@ def _kepler(position_m: Floats, velocity_m_s: Floats, sun: Sun, step_s: float) -
     start = np.concatenate([craft.ravel(), relative.ravel(), np.eye(6).ravel(), np.zeros(12)])
 
     def rates(_time: float, state: Floats) -> Floats:
-        own, own_speed, apart, speed = state[:12].reshape(4, 3)
         transition = state[12:48].reshape(6, 6)
-        body = own + apart
-        own_share, share = (-parameter / (at @ at) ** 1.5 for at in (own, body))
-        gradient = share * (np.eye(3) - 3.0 * np.outer(body, body) / (body @ body))
         # Phi^-1 (0, unit acceleration): columns of the inverse, which is symplectic.
         pushed = np.vstack([-transition[:3, 3:].T, transition[:3, :3].T])[:, :2]
-        return np.concatenate(
-            [
-                *(own_speed, own_share * own, speed, share * body - own_share * own),
-                *(transition[3:].ravel(), (gradient @ transition[:3]).ravel(), pushed.ravel()),
-            ]
-        )
+        return np.concatenate([pair_rates(state[:48], parameter), pushed.ravel()])
 
     def along_x(_time: float, state: Floats) -> float:
         return float(state[8])
