@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.common.screen import number, some_runs
-from experiments.common.units import M_PER_KM
+from experiments.common.screen import some_runs
+from experiments.common.units import length_text
 from guidance import NoiseKind, NoiseSource, Strategy, TieRule
 from guidance.gaussian_noise import share_cut
 from infoset import Model
@@ -249,20 +249,12 @@ def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
         MissCause.SATURATED: f"saturated (known too late for impulses of {thruster.max_impulse_m_s:g} m/s)",
         MissCause.GUIDANCE: "by the guidance (to compare strategies: infoset compare)",
     }
-    lengths = {name: _length(value) for name, value in missed.items() if name.endswith("_m")}
+    lengths = {name: length_text(value) for name, value in missed.items() if name.endswith("_m") and value is not None}
     parts = [
         f"{missed[cause.value]} {text.format(**lengths)}" for cause, text in reasons.items() if missed[cause.value]
     ]
     count = sum(missed[cause.value] for cause in MissCause)
     return f"missed {count} of {some_runs(runs)}: {', '.join(parts)}" if parts else ""
-
-
-def _length(length_m: float | None) -> str:
-    return (
-        f"{number(length_m / M_PER_KM)} km"
-        if length_m is not None and length_m >= M_PER_KM
-        else f"{number(length_m)} m"
-    )
 
 
 def redrawn_text(share: float | None) -> str:
