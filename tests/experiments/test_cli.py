@@ -32,7 +32,8 @@ pytestmark = pytest.mark.usefixtures("unrendered")
 
 CURVE_KEYS = [
     *("published_curve", "noise", "range_sensor", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome"),
-    *("set_emptied", "truth_kept", "truth_margin_m", "phi_held", "miss_z_m"),
+    *("set_emptied", "cause", "unguided_miss_m", "engine_corrects_m", "budget_corrects_m", "last_possible_m"),
+    *("truth_kept", "truth_margin_m", "phi_held", "miss_z_m"),
 ]
 OUTCOMES = {"arrived", "set-empty", "budget-spent", "diverged"}
 
