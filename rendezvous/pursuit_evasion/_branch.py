@@ -115,22 +115,8 @@ def first_crossing(before: Node, after: Node, radius: float) -> float | None:
     rise = (after.distance - before.distance) / step
     a, b = -before.closing, -after.closing
     cubic = np.array([(a + b - 2.0 * rise) / step**2, (3.0 * rise - 2.0 * a - b) / step, a, before.distance - radius])
-    turns = np.roots(np.trim_zeros(cubic[:3] * np.array([3.0, 2.0, 1.0]), "f"))
-    ends = sorted(float(t.real) for t in turns if abs(t.imag) < 1e-12 and 0.0 < t.real < step)
-    low = 0.0
-    for high in (*ends, step):
-        if np.polyval(cubic, high) <= 0.0:
-            return before.duration + _first_below(cubic, low, high)
-        low = high
-    return None
-
-
-def _first_below(cubic: Floats, low: float, high: float) -> float:
-    """Bisect for where a cubic falls below zero."""
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if np.polyval(cubic, middle) <= 0.0 else (middle, high)
-    return high
+    times = [float(root.real) for root in np.roots(cubic) if abs(root.imag) < 1e-9 and 0.0 < root.real < step]
+    return before.duration + min([*times, step]) if times or after.distance <= radius else None
 
 
 def _predicted(nodes: list[Node], duration: float) -> Floats:

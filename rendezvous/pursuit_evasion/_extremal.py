@@ -27,32 +27,14 @@ _Parameters = tuple[Floats, Floats, Floats]
 
 
 @allocation_free
-def acceleration(r: Floats, mu: float, oblateness: float, g: Floats) -> None:
-    """Put the acceleration at `r` into `g`; `oblateness` is mu J2 R^2 / 2, the axis z.
-
-    The potential is mu/r + oblateness (1/r^3 - 3 z^2/r^5).
-    """
-    q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
-    cube = 1.0 / (q * np.sqrt(q))
-    radial = -mu * cube
-    axial = 0.0
-    if oblateness != 0.0:
-        fifth = cube / q
-        radial += oblateness * fifth * (-3.0 + 15.0 * r[2] * r[2] / q)
-        axial = -6.0 * oblateness * fifth * r[2]
-    g[0] = radial * r[0]
-    g[1] = radial * r[1]
-    g[2] = radial * r[2] + axial
-
-
-@allocation_free
 def derivatives(
     r: Floats, p: Floats, mu: float, oblateness: float, g: Floats, first: Floats, second: Floats, with_second: bool
 ) -> None:
     """Put the acceleration, its gradient (3, 3) and, if wanted, the gradient of gradient times `p` (3, 3) into arrays.
 
-    For a function f of q = r . r: the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f' I, and along p 8 f''' s r r^T
-    + 4 f'' (r p^T + p r^T + s I) with s = r . p. The oblate part is a power of q, less z^2 times one.
+    `oblateness` is mu J2 R^2 / 2, the axis z: the potential is mu/r + oblateness (1/r^3 - 3 z^2/r^5). For a function f
+    of q = r . r the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f' I, and along p 8 f''' s r r^T + 4 f'' (r p^T +
+    p r^T + s I) with s = r . p. The oblate part is a power of q, less z^2 times one.
     """
     q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     s = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
@@ -240,8 +222,8 @@ def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
 
     `push` is the acceleration of the thrust.
     """
-    out = np.empty(6)
-    acceleration(y[:3], mu, oblateness, out[3:])
+    out, gradient, unused = np.empty(6), np.empty((3, 3)), np.zeros((3, 3))
+    derivatives(y[:3], y[9:], mu, oblateness, out[3:], gradient, unused, False)
     size = np.sqrt(y[9] * y[9] + y[10] * y[10] + y[11] * y[11])
     for i in range(3):
         out[i] = y[3 + i]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._extremal import acceleration, end_of, flow_back, rate, shoot_back
+from rendezvous.pursuit_evasion._extremal import end_of, flow_back, rate, shoot_back
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""
@@ -99,10 +99,8 @@ class Craft:
 
     def ballistic(self, duration: float, nu: Floats) -> Floats:
         """Return a guess of the end state after a short time, shape (6,): gravity and thrust are those at the start."""
-        gravity = np.empty(3)
-        acceleration(self.start[:3], self.mu, self.oblateness, gravity)
-        rate = gravity + self.thrust / self.mass * nu
-        velocity = self.start[3:] + duration * rate
+        y = np.concatenate([self.start, nu, nu])
+        velocity = self.start[3:] + duration * rate(y, self.mu, self.oblateness, self.thrust / self.mass)[3:]
         return np.concatenate([self.start[:3] + 0.5 * duration * (self.start[3:] + velocity), velocity])
 
 
