@@ -34,7 +34,7 @@ from sim.statistics import shows
 _MAX_COLUMNS = 3
 _OWN_LIMITS_FROM = 3.0
 """Ratio of the maximum and the minimum median above which each panel has its own limits."""
-RADIUS_SHOWN = 5.0
+RADIUS_SHOWN = 2.0
 """The axes extend to the radius of the body if it is at most this multiple of the maximum miss shown."""
 _AT_BODY_SCALE = "at the scale of the body"
 _BODY_FROM, _BODY_SCALE = 4.0, 2.0

@@ -46,8 +46,9 @@ def draw_end(axes: Axes, time_s: float, miss_m: float, scenario: Scenario) -> No
 
 def draw_body(axes: Axes, half_m: float, guaranteed_m: float | None, radius_m: float | None) -> None:
     """Draw the B-plane of axes that extend by `half_m` around the centre of the body: disc, guaranteed miss, labels."""
-    if radius_m is not None and _MIN_DISC * half_m <= radius_m <= half_m:
-        fill = axes.fill(*ring(radius_m), facecolor=BODY_FILL, zorder=0.6, label=f"body radius, {radius_m:g} m")
+    if radius_m is not None and radius_m >= _MIN_DISC * half_m:
+        label = f"body radius, {radius_m:g} m{': beyond the axes' if radius_m > half_m else ''}"
+        fill = axes.fill(*ring(radius_m), facecolor=BODY_FILL, zorder=0.6, label=label)
         fill[0].set(edgecolor=INK, linestyle=RADIUS["linestyle"])
     if guaranteed_m is not None and guaranteed_m <= half_m:
         axes.plot(*ring(guaranteed_m), label="guaranteed miss Φ", zorder=3.1, **GUARANTEE)
