@@ -153,14 +153,6 @@ def test_misprints_follow_from_the_other_numbers(
     assert found.number.corrected != found.number.printed
 
 
-def test_no_norm_is_explained(numbers: dict[tuple[int, str], Comparison]) -> None:
-    for number, norm in ((1, 73.78), (2, 75.59), (3, 75.23)):
-        found = numbers[number, "nonlinear, norm of x(4)"]
-        assert float(np.linalg.norm(TABLES[number - 1].nonlinear[-1][:5])) == pytest.approx(norm, abs=0.005)
-        assert found.verdict is Verdict.NOT_EXPLAINED
-        assert abs(found.number.value - norm) > 0.2
-
-
 def test_the_fit_of_the_radius(capsys: pytest.CaptureFixture[str]) -> None:
     published_radius.main()
     found = re.match(r"radius (\S+) \+- (\S+) km from (\d+) differences", capsys.readouterr().out)

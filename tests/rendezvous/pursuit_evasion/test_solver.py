@@ -67,15 +67,6 @@ def test_the_slides_cases(case: Case, slides: MakeGame) -> None:
     assert capture.residual < 1e-10
 
 
-@pytest.mark.parametrize(("radius_m", "capture_s"), [(1e3, 45340.161530), (100e3, 44998.078864)])
-def test_capture_radii(radius_m: float, capture_s: float, slides: MakeGame) -> None:
-    solution = solve(slides(capture_radius_m=radius_m))
-    capture = captured(solution)
-    assert capture.time_s == pytest.approx(capture_s, abs=1e-6)
-    apart = capture.evader.position_m - capture.pursuer.position_m
-    np.testing.assert_allclose(apart, radius_m * capture.direction, atol=1e-3)
-
-
 def test_a_capture_within_seconds_is_found(slides: MakeGame) -> None:
     game = slides()
     x, y, z = game.pursuer.position_m

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.common.hill_axes import from_paper, to_paper
+from experiments.common.hill_axes import to_paper
 from rendezvous.reachability import (
     MotionModel,
     NonlinearMotion,
@@ -54,22 +54,6 @@ TUBE = {
         [-156.79688534098548, 675.9982696338809], [-7.5, 1.7290529781477963], [-1.8941071581676385, 7.5],
         [-7.5, 1.7396148672012095]],
 }  # fmt: skip
-
-TABLE_1 = [
-    [-0.1206, 0.0555, -0.2164], [-0.0337, 0.0042, -0.0883], [0.0358, -0.0690, 0.0414], [0.0821, -0.1623, 0.1703]
-]  # fmt: skip
-TABLE_3 = [
-    [-0.0879, 0.0559, -0.1314], [-0.0899, 0.0115, -0.2357], [0.0519, -0.0732, 0.0846], [0.0895, -0.1655, 0.1913]
-]  # fmt: skip
-"""u(0) y in table 3 without the minus sign that is printed, which is a misprint."""
-
-TABLE_1_LINEAR = [
-    [1884.2, -2014.2, 2114.6, -5.42, 3.98, -3.06],
-    [937.24, -1202.0, 1332.6, -5.05, 5.07, -5.62],
-    [234.85, -375.2, 413.2, -2.80, 4.06, -4.58],
-    [0, 0, 0, 0, 0, 0],
-]
-"""x6(1) and x5(3) corrected: -3.05 and -4.06 are printed."""
 
 
 @pytest.fixture(scope="module")
@@ -133,29 +117,6 @@ def test_min_energy_l1_and_peak(exact: Solution) -> None:
     assert effort(minimum_peak(exact.optimal)).peak == pytest.approx(0.17263864653, abs=1e-11)
     # With both ends only, the sum of norms has the same minimiser.
     np.testing.assert_allclose(minimum_norms(exact.optimal), sparse, atol=1e-6)
-
-
-def test_table_1_is_the_control_of_min_energy(exact: Solution) -> None:
-    control = minimum_energy(exact.optimal)
-    assert np.abs(to_paper(control) - TABLE_1).max() <= 0.5e-4 + 1e-12
-    states = to_paper(exact.problem.run(control)[1:])
-    printed = np.array(TABLE_1_LINEAR, dtype=float)
-    rounding = np.where(np.arange(6) < 3, 0.06, 0.006)
-    assert (np.abs(states - printed) <= rounding).all()
-
-
-def rounding_at_the_end(problem: ReachabilityProblem) -> Floats:
-    """How far controls rounded to 4 decimals move the terminal state at most."""
-    allowed = np.zeros(problem.states)
-    for power in range(problem.periods):
-        allowed += np.abs(np.linalg.matrix_power(problem.transition[0], power) @ problem.control[0]).sum(axis=1)
-    return np.asarray(0.5e-4 * allowed)
-
-
-def test_table_3_is_optimal_to_its_rounding(exact: Solution) -> None:
-    problem = exact.problem
-    assert (np.abs(problem.run(from_paper(TABLE_3))[-1]) <= rounding_at_the_end(problem)).all()
-    assert float(problem.excess(from_paper(TABLE_3))) <= 0.0
 
 
 @pytest.mark.parametrize(
