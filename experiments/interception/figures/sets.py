@@ -27,7 +27,7 @@ _SQUARE: dict[str, Any] = {"marker": "s", "color": INK, "markerfacecolor": "whit
 _SECTIONS = 5
 _SMALL_MRAD = 0.1
 """Angle below which the axes of angles are in µrad."""
-_VISIBLE = 0.15
+_VISIBLE = 0.3
 """Share of common limits below which a set is too small to see; the planes of a row then have their own limits."""
 _FAR = 1.5
 """Distance of a measured angle from its set, in heights of the set, from which it is outside the limits."""
