@@ -9,6 +9,7 @@ import pytest
 from experiments.common.errors import InputError
 from experiments.common.input_file import load_problem, read_text
 from experiments.reachability.command import Reach
+from experiments.reachability.figures import draw_controls
 from experiments.reachability.file import Rendezvous
 from experiments.reachability.run import COMMAND
 from tests.built_in import problem_text
@@ -54,6 +55,14 @@ def test_samples_follow_the_seed() -> None:
     one, same, other = (COMMAND.report(Reach(select="samples:2", seed=seed)).members for seed in (1, 1, 2))
     np.testing.assert_array_equal(one[1].controls, same[1].controls)
     assert (one[1].controls != other[1].controls).any()
+
+
+@pytest.mark.parametrize(
+    ("selected", "hidden"), [("energy,l1,norms,analytic", "minimum norms"), ("samples:20", "15 of 20")]
+)
+def test_figures_name_the_controls_that_they_do_not_draw(selected: str, hidden: str) -> None:
+    (legend,) = draw_controls(COMMAND.report(Reach(select=selected))).legends
+    assert legend.get_title().get_text() == f"not drawn, as equal to others or beyond the first 5: {hidden}"
 
 
 def test_constraints_between_the_periods_bind() -> None:
