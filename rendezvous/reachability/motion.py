@@ -41,7 +41,7 @@ def discretised(
 
     Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
     """
-    starts = period_s * np.arange(periods if isinstance(motion, TschaunerHempel) else 1)
+    starts = _starts(motion, periods, period_s)
     transition = motion.transition(starts, starts + period_s)
     control = acceleration_m_s2 * motion.held_input(starts, starts + period_s)
     return _repeated(transition, periods), _repeated(control, periods)
@@ -55,18 +55,15 @@ def between_periods(
     `motion`, `periods`, `period_s` and `acceleration_m_s2` are those of `discretised`; `instants` are evenly spaced
     within a period.
     """
-    if isinstance(motion, ConstantMotion):
-        step_s = period_s / (instants + 1)
-        step = motion.transition(0.0, step_s)
-        inner = [np.hstack([step, acceleration_m_s2 * motion.held_input(0.0, step_s)])]
-        for _ in range(instants - 1):
-            inner.append(step @ inner[-1])
-            inner[-1][:, 6:] += inner[0][:, 6:]
-        return _repeated(np.array(inner)[None], periods)
-    starts = period_s * np.arange(periods)[:, None]
+    starts = _starts(motion, periods, period_s)[:, None]
     ends = starts + period_s * np.arange(1, instants + 1) / (instants + 1)
     moved, held = motion.transition(starts, ends), motion.held_input(starts, ends)
-    return np.concatenate([moved, acceleration_m_s2 * held], axis=-1)
+    return _repeated(np.concatenate([moved, acceleration_m_s2 * held], axis=-1), periods)
+
+
+def _starts(motion: ConstantMotion | TschaunerHempel, periods: int, period_s: float) -> Floats:
+    """Return the starts of all periods, or of the first one if A is constant."""
+    return period_s * np.arange(1.0 if isinstance(motion, ConstantMotion) else periods)
 
 
 def _repeated(matrices: Floats, periods: int) -> Floats:

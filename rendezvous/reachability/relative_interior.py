@@ -22,7 +22,7 @@ ROUNDING = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class RelativeInterior:
-    """The set {point + basis z: rows z <= limits}, with the centre and radius of a largest ball inside.
+    """The set {point + basis z: rows z <= limits}, with the centre of a largest ball inside.
 
     `point`, shape (n,), is the origin of the coordinates z, `basis`, shape (n, d), has orthonormal columns, and `rows`,
     shape (k, d), have unit length. `kept`, shape (k,), is the index of each row's half-space; the others are always
@@ -35,12 +35,6 @@ class RelativeInterior:
     limits: Floats
     kept: Integers
     centre: Floats
-    radius: float
-
-    @property
-    def dimension(self) -> int:
-        """Dimension d of the affine hull."""
-        return int(self.basis.shape[1])
 
 
 def relative_interior(
@@ -68,14 +62,14 @@ def relative_interior(
         lengths = np.linalg.norm(rows, axis=1)
         kept = np.flatnonzero(lengths > FLAT)
         if not basis.shape[1]:
-            return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0), 0.0)
+            return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0))
         rows, limits = rows[kept] / lengths[kept, None], limits[kept] / lengths[kept]
         centre, radius = _largest_ball(rows, limits)
         width = max(float(np.abs(limits - rows @ centre).max()), float(np.abs(centre).max()))
         flat = max(FLAT * width, ROUNDING * size, 1e-300)
         tight = np.zeros(0, dtype=np.int64) if radius > flat else _always_tight(rows, limits, flat)
         if not len(tight):
-            return RelativeInterior(point, basis, rows, limits, used[kept], centre, radius)
+            return RelativeInterior(point, basis, rows, limits, used[kept], centre)
         across = np.vstack([across, rows[tight] @ basis.T])
         levels = across @ member
     raise UncertainHullError("the affine hull was not found")  # pragma: no cover - each pass lowers the dimension
