@@ -373,21 +373,38 @@ def transposed(bits: Bits, count: int) -> Bits:
     return packed(np.ascontiguousarray(unpacked(bits, count).T))
 
 
+@_kernels.allocation_free
+def _members(bits: Bits, result: Integers) -> int:
+    """Write the numbers of the bits that are set, and return how many they are."""
+    count = 0
+    for word in range(len(bits)):
+        left = bits[word]
+        while left:
+            result[count] = 64 * word + int(_ones((left & (~left + _1)) - _1))  # the zeros below the lowest one
+            left &= left - _1
+            count += 1
+    return count
+
+
 @_kernels.compiled
 def maximal(bits: Bits, least: int) -> Flags:
     """Return which sets of bits have at least `least` bits and are in no other set; the first of equal ones is kept."""
-    k = len(bits)
-    counts, kept = np.empty(k, np.int64), np.zeros(k, np.bool_)
+    k, words = bits.shape
+    mine, counts, kept = np.empty(64 * words, np.int64), np.empty(k, np.int64), np.zeros(k, np.bool_)
+    columns, holders = np.zeros((64 * words, (k + 63) // 64), np.uint64), np.empty(k, np.int64)
     for i in range(k):
-        counts[i] = _common(bits[i], bits[i])
+        counts[i] = _members(bits[i], mine)
+        for bit in mine[: counts[i]]:
+            columns[bit, i // 64] |= _1 << np.uint64(i % 64)
     for i in range(k):
         if counts[i] < least:
             continue
+        common = columns[mine[0]].copy() if _members(bits[i], mine) else ~columns[0]
+        for bit in mine[1 : counts[i]]:
+            common &= columns[bit]
         kept[i] = True
-        for j in range(k):
-            if (counts[j] > counts[i] or (counts[j] == counts[i] and j < i)) and _within(bits[i], bits[i], bits[j]):
-                kept[i] = False
-                break
+        for j in holders[: _members(common, holders)]:
+            kept[i] &= j == i or (counts[j] == counts[i] and j > i)
     return kept
 
 
@@ -521,22 +538,17 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
             middle[j] += points[i, j] / v
     mine, needs, table = np.empty(len(facets), np.int64), np.empty(len(facets)), np.empty((n, n + 1))
     for i in range(v):
-        moved = 0.0
+        moved, count = 0.0, _members(bits[i], mine)
         for attempt in range(3 if chosen[i] else 0):
-            count, inside = 0, False
-            for word in range(bits.shape[1]):
-                left, f = bits[i, word], 64 * word
-                while left:
-                    if left & _1:
-                        high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
-                        inside |= high < 0.0 or (high == 0.0 and low < 0.0)
-                        terms = 0.0
-                        for j in range(n):
-                            terms += abs(facets[f, j] * points[i, j])
-                        mine[count], needs[count] = f, 0.4 * attempt * EPS * terms - high  # rounding of coordinates
-                        count += 1
-                    left >>= _1
-                    f += 1
+            inside = False
+            for m in range(count):
+                f = mine[m]
+                high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
+                inside |= high < 0.0 or (high == 0.0 and low < 0.0)
+                terms = 0.0
+                for j in range(n):
+                    terms += abs(facets[f, j] * points[i, j])
+                needs[m] = 0.4 * attempt * EPS * terms - high  # rounding of coordinates
             if not inside:
                 break
             radial = flat or count > n
