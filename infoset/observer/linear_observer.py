@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -207,8 +206,8 @@ class LinearObserver:
     runs : int, optional
         Number B of runs. Without it there is one run, and its arrays have no axis of runs.
     max_facets : int or None, optional
-        Maximum number of facets of a polytope after a measurement, at least 2n: 50 to four states, and 40 with at most
-        700 vertices above. None keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError.
+        Maximum number of facets of a polytope after a measurement, at least 2n; it then has at most 700 vertices. None
+        keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError.
 
     Raises
     ------
@@ -242,7 +241,7 @@ class LinearObserver:
         input_matrix: ArrayLike | None = None,
         offset: ArrayLike | None = None,
         runs: int | None = None,
-        max_facets: int | Literal["auto"] | None = "auto",
+        max_facets: int | None = 45,
     ) -> None:
         self._a = _matrices("state_matrix", state_matrix)
         self.states = self._a.shape[-1]
@@ -266,8 +265,6 @@ class LinearObserver:
             )
         if runs is not None:
             COUNT.need("runs", runs)
-        if max_facets == "auto":
-            max_facets = 50 if self.states <= 4 else 40
         if max_facets is not None:
             Limits(minimum=2 * self.states, whole=True).need("max_facets", max_facets)
         self._single = runs is None

@@ -25,7 +25,7 @@ ten tolerances of one operation, of which the tip of a sharp corner may be missi
 MAX_POLYTOPE_VERTICES = 5000
 """A polytope with more vertices takes minutes a step."""
 _MAX_VERTICES = 700
-"""The same for sets of five and six states that are reduced: such sets have many more vertices than facets."""
+"""The same for sets that are reduced: those of five and six states have many more vertices than facets."""
 _THIN = 3e-8
 """Thickness of a layer in place of a flat set, relative to the coordinates."""
 _MIN_DEPTH = 1e-9
@@ -178,7 +178,7 @@ class Member:
         ArithmeticError
             If there is no limit and the set has too many vertices.
         """
-        space, vertices = self.polytope.space, len(self.polytope.vertices)
+        vertices = len(self.polytope.vertices)
         if self.max_facets is None:
             if vertices > MAX_POLYTOPE_VERTICES:
                 raise ArithmeticError(
@@ -186,7 +186,7 @@ class Member:
                     "max_facets for a larger set with fewer facets"
                 )
             return self
-        smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES if space > 4 else None)
+        smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES)
         return self if smaller is self.polytope else replace(self, polytope=smaller, reduced=True)
 
     def _apply(self, operation: Callable[[Polytope], Polytope]) -> Member:
