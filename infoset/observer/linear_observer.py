@@ -17,7 +17,8 @@ from infoset.geometry.polytope import Polytope
 from infoset.geometry.zonotope import Zonotope
 from infoset.limits import COUNT, Limits, real_values, shown
 from infoset.observer.programs import exact_hull
-from infoset.observer.sets import Motion, Polygons, Polytopes, Set, Sets, Strips, polytope_of, sizes_of
+from infoset.observer.sets import Motion, Polygons, Polytopes, Set, Sets, polytope_of, sizes_of
+from infoset.observer.steps import Strips
 
 MAX_STATES = 6
 MAX_RECORD = 20_000

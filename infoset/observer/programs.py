@@ -11,7 +11,8 @@ from scipy.optimize import linprog
 from infoset.arrays import Floats
 from infoset.geometry.polytope import HIGHS
 from infoset.geometry.zonotope import Zonotope
-from infoset.observer.sets import Motion, Set, Strips, polytope_of
+from infoset.observer.sets import Motion, Set, polytope_of
+from infoset.observer.steps import Strips
 
 
 def exact_hull(initial: Set, record: Sequence[Motion | Strips], run: int, step: int, sizes: Floats) -> Floats:

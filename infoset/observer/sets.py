@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from operator import methodcaller
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from infoset.arrays import Flags, Floats, Integers
-from infoset.engine.section_life import CUT_SLACK, SUM_SLACK
+from infoset.arrays import Flags, Floats
+from infoset.engine.section_life import SUM_SLACK
 from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.geometry.polytope import Polytope, UnboundedPolytopeError, UncertainHullError
 from infoset.geometry.zonotope import Zonotope
-from infoset.observer import steps as observer_steps
+from infoset.observer.steps import Batch, Move, Strips, cut_to_preimage, predict_all, support_all, update_all
 
 Set = ConvexPolygons | Polytope | Zonotope
+Views = TypeVar("Views", Move, Strips)
 
 POLYTOPE_SLACK = 1e-11
 """Enlargement of polytopes, relative to the terms of normal . x of a measurement, or to the widths of a prediction:
@@ -31,21 +31,6 @@ _THIN = 3e-8
 _MIN_DEPTH = 1e-9
 """Thickness of a set, in coordinates in which it is about one wide, below which rounding decides about its facets."""
 _TINY = float(np.finfo(np.float64).tiny)
-
-
-@dataclass(frozen=True, eq=False)
-class Strips:
-    """The sets {x: lower <= normal . x <= upper} of a batch of runs.
-
-    `normals`, shape (r, n), have any length; a zero one bounds nothing. `lower` and `upper`, shape (B, r), are infinite
-    for a strip that does not exist in this run. `terms`, shape (B, r), are the sums of the sizes of the terms of the
-    bounds, which determine rounding errors.
-    """
-
-    normals: Floats
-    lower: Floats
-    upper: Floats
-    terms: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,20 +52,16 @@ class Motion:
         return Motion(np.eye(len(self.matrix)), -self.shifts, self.terms, _negative(self.disturbance))
 
 
-@dataclass(frozen=True, eq=False)
-class Polygons:
+class Polygons(Batch):
     """Sets of two states: exact polygons, compiled."""
-
-    vertices: Floats
-    counts: Integers
 
     @classmethod
     def of(cls, start: Set, runs: int) -> Polygons:
         """Return the same set for all runs, or the members of a batch of `runs` polygons."""
         polygons = polygon_of(start)
         room = polygons.vertices.shape[-2]
-        vertices = np.broadcast_to(polygons.vertices, (runs, room, 2))
-        exact = cls(np.ascontiguousarray(vertices), np.broadcast_to(polygons.counts, (runs,)).copy())
+        vertices = np.array(np.broadcast_to(polygons.vertices, (runs, room, 2)))  # writable, as all sets: one kernel
+        exact = cls(vertices, np.array(np.broadcast_to(polygons.counts, (runs,))))
         still = np.zeros((1, 2))
         # Sums of generators are rounded, as a true state on the boundary is.
         return exact.predicted(Motion(np.eye(2), still, still, Zonotope(np.zeros(2), [])))
@@ -97,43 +78,40 @@ class Polygons:
 
     def predicted(self, motion: Motion) -> Polygons:
         """Return the sets after a step."""
-        none = np.zeros((0, 2))
-        if isinstance(motion.disturbance, Zonotope):
-            generators, other, centre = motion.disturbance.generators, none, motion.disturbance.centre
+        w, none = motion.disturbance, np.zeros((0, 2))
+        if isinstance(w, Zonotope):
+            generators, other, centre = w.generators, none, w.centre
         else:
-            generators, other, centre = none, polygon_of(motion.disturbance).polygon(), np.zeros(2)
-        more = 2 * len(generators) + len(other) + 4
-        shifts, terms = motion.shifts + centre, motion.terms + np.abs(centre)
-        arrays = motion.matrix, shifts, terms, generators, other
-        return self._apply(observer_steps.predict_all, more, *arrays, slack=SUM_SLACK)
+            generators, other, centre = none, polygon_of(w).polygon(), np.zeros(2)
+        move = Move(motion.matrix, motion.shifts + centre, motion.terms + np.abs(centre), generators, other)
+        return self._apply(predict_all, 2 * len(generators) + len(other) + 4, _contiguous(move))
 
     def cut(self, strips: Strips, excess: Floats) -> Polygons:
         """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
-        arrays = strips.normals, strips.lower, strips.upper, strips.terms, excess
-        return self._apply(observer_steps.update_all, 2 * len(strips.normals), *arrays, slack=CUT_SLACK)
+        return self._apply(update_all, 2 * len(strips.normals), _contiguous(strips), excess)
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Polygons:
         """Return the states that lead to a state of the later set for some disturbance."""
         assert isinstance(later, Polygons)
         backward = later.predicted(motion.reversed_sum)
         more = int(backward.counts.max(initial=0)) + 4
-        arrays = backward.vertices, backward.counts, motion.matrix
-        return self._apply(observer_steps.cut_to_preimage, more, *arrays, slack=CUT_SLACK)
+        return self._apply(cut_to_preimage, more, backward, np.ascontiguousarray(motion.matrix))
 
     def support(self, direction: Floats) -> Floats:
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
-        return observer_steps.support_all(self.vertices, self.counts, direction)
+        return support_all(self, direction)
 
     def chebyshev_centres(self, states: int) -> Floats:
         """Return the centres of largest discs, shape (B, 2); NaN for the empty set."""
         centres, _ = ConvexPolygons.unchecked(self.vertices, self.counts).chebyshev_centre()
         return np.ma.filled(centres, np.nan)
 
-    def _apply(self, kernel: Callable[..., None], more: int, *arrays: NDArray[Any], slack: float) -> Polygons:
+    def _apply(self, kernel: Callable[..., None], more: int, *arguments: Any) -> Polygons:
         """Return the polygons that a kernel writes, with at most `more` vertices more."""
-        result = np.empty((len(self.counts), int(self.counts.max(initial=0)) + more, 2)), np.empty_like(self.counts)
-        kernel(self.vertices, self.counts, *map(np.ascontiguousarray, arrays), slack, *result)
-        return Polygons(*result)
+        room = int(self.counts.max(initial=0)) + more
+        result = Polygons(np.empty((len(self.counts), room, 2)), np.empty_like(self.counts))
+        kernel(self, *arguments, result)
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,6 +292,11 @@ class Polytopes:
 
 Sets = Polygons | Polytopes
 """The sets of B runs; both classes have the same methods, which return new sets."""
+
+
+def _contiguous(arrays: Views) -> Views:
+    """Return the same named tuple of contiguous arrays: kernels are compiled once."""
+    return type(arrays)(*map(np.ascontiguousarray, arrays))
 
 
 def polygon_of(shape: Set) -> ConvexPolygons:

@@ -3,16 +3,18 @@
 Every step is outward by a few ulp: the computed set contains the exact one, and a true state that is computed with
 floating-point numbers from errors at their bounds.
 
-Arrays hold B polygons: `vertices`, shape (B, room, 2), and their numbers, `counts`. Kernels write the results to `out`
-and `made`, which have the same shapes, with room for more vertices.
+Kernels write their results to a batch `out` of the same size, with room for more vertices.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from infoset._compile import compiled, inlined
 from infoset.arrays import Floats, Integers
+from infoset.engine.section_life import CUT_SLACK, SUM_SLACK
 from infoset.geometry import polygon, polygon_hull, polygon_sum
 from infoset.geometry.polygon import Points
 
@@ -22,6 +24,41 @@ _SHARP = 2.0
 """Slope of both edges at an extreme vertex, relative to its axis, above which the vertex is divided."""
 _SHARP_CORNER = 0.5
 """The same for a vertex that is extreme along two axes."""
+
+
+class Batch(NamedTuple):
+    """B polygons: their vertices, shape (B, room, 2), and the numbers of vertices, shape (B,)."""
+
+    vertices: Floats
+    counts: Integers
+
+
+class Move(NamedTuple):
+    """A step matrix x + shift + w, with w in the sum of segments and a polygon.
+
+    `shifts`, and the sums `terms` of the sizes of their terms, have the shape (B, 2) or (1, 2). `generators`, shape
+    (g, 2), are half segments; the polygon `other`, shape (m, 2), may have no vertices.
+    """
+
+    matrix: Floats
+    shifts: Floats
+    terms: Floats
+    generators: Floats
+    other: Floats
+
+
+class Strips(NamedTuple):
+    """The sets {x: lower <= normal . x <= upper} of a batch of runs.
+
+    `normals`, shape (r, n), have any length; a zero one bounds nothing. `lower` and `upper`, shape (B, r), are infinite
+    for a strip that does not exist in this run. `terms`, shape (B, r), are the sums of the sizes of the terms of the
+    bounds, which determine rounding errors.
+    """
+
+    normals: Floats
+    lower: Floats
+    upper: Floats
+    terms: Floats
 
 
 @inlined
@@ -35,25 +72,13 @@ def reach(points: Points, count: int) -> tuple[float, float]:
 
 
 @compiled
-def predict_all(
-    vertices: Floats,
-    counts: Integers,
-    matrix: Floats,
-    shifts: Floats,
-    terms: Floats,
-    generators: Floats,
-    other: Points,
-    slack: float,
-    out: Floats,
-    made: Integers,
-) -> None:
-    """Write matrix P + shift + the segments of the generators + the polygon `other`, with slack, for each polygon P.
+def predict_all(sets: Batch, move: Move, out: Batch) -> None:
+    """Write each polygon after a step, with a box of `SUM_SLACK` times the terms of a coordinate as its half-widths.
 
-    `shifts`, and the sums `terms` of the sizes of their terms, have the shape (B, 2) or (1, 2). `generators`, shape (g,
-    2), are half segments; `other`, shape (m, 2), may have no vertices. `slack` is half the width of the box that is
-    added, relative to the terms of a coordinate. A result has at most 2 g + m + 4 vertices more.
+    A result has at most 2 g + m + 4 vertices more.
     """
-    scratch, second = np.empty((out.shape[1], 2)), np.empty((out.shape[1], 2))
+    matrix, other, generators = move.matrix, move.other, move.generators
+    scratch, second = np.empty_like(out.vertices[0]), np.empty_like(out.vertices[0])
     xx, xy, yx, yy = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
     determinant = polygon.scaled_determinant(xx, xy, yx, yy)
     added_x = added_y = 0.0
@@ -63,17 +88,17 @@ def predict_all(
     other_x, other_y = reach(other, len(other))
     added_x += other_x
     added_y += other_y
-    for b in range(counts.size):
-        count = counts[b]
-        made[b] = 0
+    for b in range(sets.counts.size):
+        count = sets.counts[b]
+        out.counts[b] = 0
         if count == 0:
             continue
-        points = vertices[b]
-        row = b if len(shifts) > 1 else 0
-        shift_x, shift_y = shifts[row, 0], shifts[row, 1]
+        points = sets.vertices[b]
+        row = b if len(move.shifts) > 1 else 0
+        shift_x, shift_y = move.shifts[row, 0], move.shifts[row, 1]
         x, y = reach(points, count)
-        slack_x = slack * (abs(xx) * x + abs(xy) * y + terms[row, 0] + added_x)
-        slack_y = slack * (abs(yx) * x + abs(yy) * y + terms[row, 1] + added_y)
+        slack_x = SUM_SLACK * (abs(xx) * x + abs(xy) * y + move.terms[row, 0] + added_x)
+        slack_y = SUM_SLACK * (abs(yx) * x + abs(yy) * y + move.terms[row, 1] + added_y)
         if determinant > 0.0:
             for i in range(count):
                 x, y = points[i, 0], points[i, 1]
@@ -87,7 +112,7 @@ def predict_all(
             count = polygon_sum.add_segment(scratch, count, generators[g, 0], generators[g, 1])
         if count > MAX_VERTICES:
             count = polygon_hull.reduce_outward(scratch, count, MAX_VERTICES)
-        made[b] = enlarge(scratch, count, shift_x, shift_y, slack_x, slack_y, out[b])
+        out.counts[b] = enlarge(scratch, count, shift_x, shift_y, slack_x, slack_y, out.vertices[b])
 
 
 @inlined
@@ -203,35 +228,23 @@ def enlarge_carefully(
 
 
 @compiled
-def update_all(
-    vertices: Floats,
-    counts: Integers,
-    normals: Floats,
-    lower: Floats,
-    upper: Floats,
-    terms: Floats,
-    excess: Floats,
-    slack: float,
-    out: Floats,
-    made: Integers,
-) -> None:
-    """Write the part of each polygon that is within the strips of a measurement: at most 2 r vertices more.
+def update_all(sets: Batch, strips: Strips, excess: Floats, out: Batch) -> None:
+    """Write the part of each polygon that is within strips: at most 2 r vertices more.
 
-    `normals` have the shape (r, 2). The bounds of normal . x, `lower` and `upper`, shape (B, r), are infinite for a
-    missing measurement; `terms`, shape (B, r), are the sums of the sizes of their terms. `slack` is the enlargement of
-    the bounds, relative to their terms and those of normal . x. `excess`, shape (B, r), receives the distance between
-    set and strip, in the unit of the bounds, where the set becomes empty.
+    The bounds are enlarged by `CUT_SLACK` times their terms and those of normal . x. `excess`, shape (B, r), receives
+    the distance between set and strip, in the unit of the bounds, where the set becomes empty.
     """
-    for b in range(counts.size):
-        count = counts[b]
-        points = out[b]
-        polygon.copy(vertices[b], count, points)
+    normals = strips.normals
+    for b in range(sets.counts.size):
+        count = sets.counts[b]
+        points = out.vertices[b]
+        polygon.copy(sets.vertices[b], count, points)
         x, y = reach(points, count)
         for r in range(len(normals)):
-            minimum, maximum = lower[b, r], upper[b, r]
+            minimum, maximum = strips.lower[b, r], strips.upper[b, r]
             if count == 0:
                 break
-            more = slack * (abs(normals[r, 0]) * x + abs(normals[r, 1]) * y + terms[b, r])
+            more = CUT_SLACK * (abs(normals[r, 0]) * x + abs(normals[r, 1]) * y + strips.terms[b, r])
             minimum, maximum = minimum - more, maximum + more
             if normals[r, 0] == 0.0 and normals[r, 1] == 0.0:
                 overlap = min(maximum, -minimum)
@@ -240,65 +253,57 @@ def update_all(
                 count, overlap = polygon.clip_to_band(points, count, normals[r, 0], normals[r, 1], minimum, maximum)
             if count == 0:
                 excess[b, r] = -overlap
-        made[b] = count
+        out.counts[b] = count
 
 
 @compiled
-def cut_to_preimage(
-    vertices: Floats,
-    counts: Integers,
-    later: Floats,
-    later_counts: Integers,
-    matrix: Floats,
-    slack: float,
-    out: Floats,
-    made: Integers,
-) -> None:
+def cut_to_preimage(sets: Batch, later: Batch, matrix: Floats, out: Batch) -> None:
     """Write the points x of each polygon for which matrix x is in a later polygon.
 
-    The result has at most four vertices more than both. `slack` is the enlargement of the half-planes of the later
-    polygon, relative to the terms of a height. The level of each half-plane is the maximum height of all vertices, so
-    that the half-plane of an edge of a few ulp with a wrong direction contains the set. Half-planes along the axes
-    bound what such edges leave open at sharp tips.
+    The result has at most four vertices more than both. The half-planes of the later polygon are enlarged by
+    `CUT_SLACK` times the terms of a height. The level of each one is the maximum height of all vertices, so that the
+    half-plane of an edge of a few ulp with a wrong direction contains the set. Half-planes along the axes bound what
+    such edges leave open at sharp tips.
     """
-    for b in range(counts.size):
-        made[b] = 0
-        count = counts[b]
-        if count == 0 or later_counts[b] == 0:
+    for b in range(sets.counts.size):
+        out.counts[b] = 0
+        count, sides = sets.counts[b], later.counts[b]
+        if count == 0 or sides == 0:
             continue
-        points, other = out[b], later[b]
-        polygon.copy(vertices[b], count, points)
+        points, other = out.vertices[b], later.vertices[b]
+        polygon.copy(sets.vertices[b], count, points)
         x, y = reach(points, count)
-        other_x, other_y = reach(other, later_counts[b])
+        other_x, other_y = reach(other, sides)
         terms_x = max(other_x, abs(matrix[0, 0]) * x + abs(matrix[0, 1]) * y)
         terms_y = max(other_y, abs(matrix[1, 0]) * x + abs(matrix[1, 1]) * y)
-        for i in range(-4, later_counts[b]):
+        for i in range(-4, sides):
             if i < 0:
                 normal_x = (1.0 if i == -1 else -1.0) if i >= -2 else 0.0
                 normal_y = (1.0 if i == -3 else -1.0) if i < -2 else 0.0
             else:
-                j = i + 1 if i + 1 < later_counts[b] else 0
+                j = i + 1 if i + 1 < sides else 0
                 normal_x, normal_y = other[j, 1] - other[i, 1], other[i, 0] - other[j, 0]
             mapped_x = matrix[0, 0] * normal_x + matrix[1, 0] * normal_y
             mapped_y = matrix[0, 1] * normal_x + matrix[1, 1] * normal_y
-            top = polygon.support_index(other, later_counts[b], normal_x, normal_y)
+            top = polygon.support_index(other, sides, normal_x, normal_y)
             level = polygon.height(other, top, normal_x, normal_y)
-            level += slack * (abs(normal_x) * terms_x + abs(normal_y) * terms_y)
+            level += CUT_SLACK * (abs(normal_x) * terms_x + abs(normal_y) * terms_y)
             if mapped_x == 0.0 and mapped_y == 0.0:
                 count = count if level >= 0.0 else 0
             else:
                 count, _ = polygon.clip_to_band(points, count, mapped_x, mapped_y, -np.inf, level)
             if count == 0:
                 break
-        made[b] = count
+        out.counts[b] = count
 
 
 @compiled
-def support_all(vertices: Floats, counts: Integers, direction: Floats) -> Floats:
+def support_all(sets: Batch, direction: Floats) -> Floats:
     """Return the maximum height of each polygon along a direction; -inf for the empty set."""
-    heights = np.full(counts.size, -np.inf)
-    for b in range(counts.size):
-        if counts[b] > 0:
-            top = polygon.support_index(vertices[b], counts[b], direction[0], direction[1])
-            heights[b] = polygon.height(vertices[b], top, direction[0], direction[1])
+    heights = np.full(sets.counts.size, -np.inf)
+    for b in range(sets.counts.size):
+        count = sets.counts[b]
+        if count > 0:
+            top = polygon.support_index(sets.vertices[b], count, direction[0], direction[1])
+            heights[b] = polygon.height(sets.vertices[b], top, direction[0], direction[1])
     return heights

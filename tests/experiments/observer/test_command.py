@@ -32,7 +32,7 @@ generators = [[0, 0, 0.1, 0, 0, 0], [0, 0, 0, 0, 0, 0.1]]
 [noise]
 half_width = [0.2, 0.2]
 [simulation]
-steps = 3
+steps = 10
 """
 
 
