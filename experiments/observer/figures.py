@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import matplotlib as mpl
@@ -23,9 +23,7 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.observer.report import Report, times
-from infoset import Estimate
-from infoset.arrays import Floats
+from experiments.observer.report import Report, bounds_of, times
 
 _MAX_OUTLINES = 60
 
@@ -42,7 +40,7 @@ def draw_bounds(report: Report) -> Figure:
     names = report.problem.names
     figure, grid = subplots(30.0 + 38.0 * len(names), len(names), 2, sharex=True)
     time, title = times(report)
-    (lower, upper), smoothed = _ends(report.estimates), report.smoothed and _ends(report.smoothed)
+    (lower, upper), smoothed = bounds_of(report.estimates).swapaxes(0, 1), report.smoothed
     dashed: dict[str, Any] = {"color": MEASURED, "linewidth": 0.9, "linestyle": (0, (4, 1.5))}
     missing = np.isnan(report.data.measured).all(axis=1)
     for index, (name, (panel, width)) in enumerate(zip(map(plain, names), grid, strict=True)):
@@ -51,7 +49,7 @@ def draw_bounds(report: Report) -> Figure:
             panel.plot(time, ends[:, index], color=SET_EDGE, linewidth=0.8)
         width.plot(time, upper[:, index] - lower[:, index], color=SET_EDGE)
         if smoothed:
-            first, last = smoothed[0][:, index], smoothed[1][:, index]
+            first, last = bounds_of(smoothed)[..., index].T
             for axes, values in ((panel, first), (panel, last), (width, last - first)):
                 axes.plot(time, values, label="with later measurements", **dashed)
         if report.data.states is not None:
@@ -77,11 +75,6 @@ def draw_bounds(report: Report) -> Figure:
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     legend_below(figure, 3)
     return figure
-
-
-def _ends(estimates: Sequence[Estimate]) -> list[Floats]:
-    """Return the lower and the upper bounds of the states, each of shape (N, n)."""
-    return [np.array([getattr(estimate, end) for estimate in estimates]) for end in ("lower", "upper")]
 
 
 @style()

@@ -45,12 +45,8 @@ class Report:
 
 def contains(estimate: Estimate, state: Floats) -> bool:
     """Whether a state is in a set."""
-    if estimate.is_empty:
-        return False
-    if estimate.states == 2:
-        return bool(estimate.polygons.contains(state))
-    (polytope,) = estimate.polytopes
-    return bool(polytope.contains(state))
+    shape = estimate.polygons if estimate.states == 2 else estimate.polytopes[0]
+    return bool(shape.contains(state))
 
 
 def report_json(report: Report) -> dict[str, object]:
@@ -80,9 +76,7 @@ def report_json(report: Report) -> dict[str, object]:
 
 def _bounds(estimate: Estimate) -> dict[str, object]:
     """Return the bounds of the states; null for the empty set."""
-    if estimate.is_empty:
-        return {"lower": None, "upper": None}
-    return {"lower": estimate.lower, "upper": estimate.upper}
+    return {end: None if estimate.is_empty else getattr(estimate, end) for end in ("lower", "upper")}
 
 
 def report_csv(report: Report) -> str:
@@ -90,7 +84,7 @@ def report_csv(report: Report) -> str:
     states = range(1, len(report.problem.names) + 1)
     sets = {"": report.estimates, **({} if report.smoothed is None else {"smoothed_": report.smoothed})}
     columns = [f"x{state}_{kind}{end}" for kind in sets for state in states for end in ("lower", "upper")]
-    blocks = [np.array([np.column_stack([each.lower, each.upper]).ravel() for each in sets[kind]]) for kind in sets]
+    blocks = [bounds_of(sets[kind]).swapaxes(1, 2).reshape(len(report.estimates), -1) for kind in sets]
     if report.data.states is not None:
         columns += [f"x{state}" for state in states]
         blocks.append(report.data.states)
@@ -108,12 +102,14 @@ def times(report: Report) -> tuple[Floats, str]:
     return (steps, "step") if step_s is None else (steps * step_s, "time, s")
 
 
-def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
-    """Return the lower and upper bounds of the states, shape (N, 2, n), to be read; NaN for the empty set.
+def bounds_of(estimates: Sequence[Estimate]) -> Floats:
+    """Return the lower and upper bounds of the states, shape (N, 2, n); NaN for the empty set."""
+    return np.array([[estimate.lower, estimate.upper] for estimate in estimates])
 
-    Bounds within the rounding errors of the maximum bounds of a state are zero.
-    """
-    bounds = np.array([[estimate.lower, estimate.upper] for estimate in estimates])
+
+def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
+    """Return the same to be read: bounds within the rounding errors of the maximum bounds of a state are zero."""
+    bounds = bounds_of(estimates)
     bounds[np.abs(bounds) < _ROUNDING * np.abs(np.nan_to_num(bounds)).max(axis=(0, 1))] = 0.0
     return bounds
 

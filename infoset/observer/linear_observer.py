@@ -244,39 +244,26 @@ class LinearObserver:
         runs: int | None = None,
         max_facets: int | None = 45,
     ) -> None:
-        self._a = _matrices("state_matrix", state_matrix)
-        self.states = self._a.shape[-1]
-        if self._a.shape[-2] != self.states or not 1 <= self.states <= MAX_STATES:
-            raise ValueError(
-                f"state_matrix must have the shape (n, n) or (K, n, n) with n from 1 to {MAX_STATES}: "
-                f"got {self._a.shape}"
-            )
-        self._c = _matrices("output_matrix", output_matrix)
-        if self._c.shape[-1] != self.states:
-            raise ValueError(f"output_matrix must have {self.states} columns, one for each state: got {self._c.shape}")
-        self.outputs = self._c.shape[-2]
-        self._b = np.zeros((self.states, 0)) if input_matrix is None else _matrices("input_matrix", input_matrix)
-        if self._b.shape[-2] != self.states:
-            raise ValueError(f"input_matrix must have {self.states} rows, one for each state: got {self._b.shape}")
-        self.inputs = self._b.shape[-1]
-        self._offset = np.zeros(self.states) if offset is None else finite_values("offset", offset, "...")
-        if self._offset.ndim not in (1, 2) or self._offset.shape[-1] != self.states:
-            raise ValueError(
-                f"offset must have the shape ({self.states},) or (K, {self.states}): got {self._offset.shape}"
-            )
+        self.states = n = (real_values("state_matrix", state_matrix).shape or (0,))[-1]
+        Limits(minimum=1, maximum=MAX_STATES, whole=True).need("the number of states", n)
+        self._a = _by_step("state_matrix", state_matrix, n, n)
+        self._c = _by_step("output_matrix", output_matrix, "q", n)
+        self._b = np.zeros((n, 0)) if input_matrix is None else _by_step("input_matrix", input_matrix, n, "p")
+        self._offset = np.zeros(n) if offset is None else _by_step("offset", offset, n)
+        self.outputs, self.inputs = self._c.shape[-2], self._b.shape[-1]
         if runs is not None:
             COUNT.need("runs", runs)
         if max_facets is not None:
-            Limits(minimum=2 * self.states, whole=True).need("max_facets", max_facets)
+            Limits(minimum=2 * n, whole=True).need("max_facets", max_facets)
         self._single = runs is None
         self._runs = runs or 1
-        self._disturbance = Zonotope(np.zeros(self.states), []) if disturbance is None else disturbance
+        self._disturbance = Zonotope(np.zeros(n), []) if disturbance is None else disturbance
         self._need_set("disturbance", self._disturbance)
         self._need_set("initial", initial, (self._runs,) if runs else ())
         self._noise = _Noise.of(noise, self.outputs)
         self._sets: Sets = (
             Polygons.of(initial, self._runs)
-            if self.states == 2
+            if n == 2
             else Polytopes.of(initial, self._runs, max_facets, sizes_of(self._disturbance))
         )
         self.max_facets, self._initial, self._events, self._count = max_facets, initial, list[Motion | Strips](), 0
@@ -516,8 +503,7 @@ def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
     return rows
 
 
-def _matrices(name: str, value: ArrayLike) -> Floats:
-    matrices = finite_values(name, value, "...")
-    if matrices.ndim not in (2, 3):
-        raise ValueError(f"{name} must be a matrix, or one for each step: got the shape {matrices.shape}")
-    return np.ascontiguousarray(matrices)
+def _by_step(name: str, value: ArrayLike, *shape: str | int) -> Floats:
+    """Return numbers of some shape, or of this shape for each step."""
+    values = real_values(name, value)
+    return finite_values(name, values, *["K"] * (values.ndim > len(shape)), *shape)

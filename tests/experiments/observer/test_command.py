@@ -113,7 +113,7 @@ def changed(old: str, new: str, name: str = "vehicle") -> str:
     ("setting", "told"),
     [
         ("system.A=[[1, 2], [3]]", "state_matrix must be an array, its rows of equal length"),
-        ("system.A=[[1, 2, 3], [3, 4, 5]]", "state_matrix must have the shape (n, n)"),
+        ("system.A=[[1, 2, 3], [3, 4, 5]]", "state_matrix must have the shape (3, 3): got (2, 3)"),
         ("system.c=[1]", "offset must have the shape (2,)"),
         ("noise.half_width=[3, 1]", "noise must"),
         ("initial.center=[0, 0]", "initial: must have lower and upper, or center and generators, or vertices"),
