@@ -21,6 +21,7 @@ from sim import Record
 
 TRUTH_MARK = "true (ω, α)"
 MEASUREMENT_MARK = "measured α, drawn at the true ω"
+FAR_MARK = "measured α, beyond the axes"
 SECTIONS_MARK = "sections of the set, the nearest dark"
 _TRUTH: dict[str, Any] = {"marker": "x", "color": INK, "markersize": 7.0, "markeredgewidth": 1.6, "linestyle": "none"}
 _SQUARE: dict[str, Any] = {"marker": "s", "color": INK, "markerfacecolor": "white", "markersize": 5.5}
@@ -58,7 +59,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             _shade_allowed(axes, plane)
     titles = [plane.title for planes in rows for plane in planes]
     if columns > 2:
-        letters([*grid.flat], [title.replace(", ", ",\n") for title in titles], fontsize="small")
+        letters([*grid.flat], [title.replace(", ", ",\n") for title in titles], fontsize=7.0)
     else:
         letters([*grid.flat], titles)
     legend_below(figure, min(2, columns))
@@ -177,7 +178,7 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
             margin = 0.07 * (high - low)
             margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(high), 1e-6))
             axes.set(xlim=(low[0] - margin[0], high[0] + margin[0]), ylim=(low[1] - margin[1], high[1] + margin[1]))
-            axes.locator_params("x", nbins=3)
+            axes.locator_params("x", nbins=2 if len(row) > 2 else 3, min_n_ticks=1)
             axes.locator_params("y", nbins=4)
             axes.xaxis.set_major_formatter(lambda tick, _: _short(tick))
             if np.abs(axes.get_ylim()).max() <= _SMALL_MRAD:
@@ -191,16 +192,10 @@ def _short(tick: float) -> str:
 
 
 def _draw_measurement(axes: Axes, plane: Plane) -> None:
-    """Draw the measured angle, or write on which side of the axes it is."""
-    if plane.measured_rad is None:
-        return
-    (bottom, top), angle = axes.get_ylim(), plane.measured_rad * 1e3
-    if bottom <= angle <= top:
-        axes.plot(plane.true[0], angle, zorder=5, label=MEASUREMENT_MARK, linestyle="none", **_SQUARE)
-        return
-    # Sets rise with the rate, so these corners are free.
-    arrow, corner, aligned = (
-        ("↑", (0.04, 0.96), ("left", "top")) if angle > top else ("↓", (0.96, 0.04), ("right", "bottom"))
-    )
-    where: dict[str, Any] = {"xycoords": "axes fraction", "ha": aligned[0], "va": aligned[1]}
-    axes.annotate(f"measured α {arrow}", corner, fontsize="small", zorder=7.0, **where)
+    """Draw the measured angle as a square, or beyond the limits of the axes as a triangle at their edge."""
+    if plane.measured_rad is not None:
+        (bottom, top), angle = axes.get_ylim(), plane.measured_rad * 1e3
+        look, label = _SQUARE, MEASUREMENT_MARK
+        if not bottom <= angle <= top:
+            look, label = _SQUARE | {"marker": "^" if angle > top else "v", "clip_on": False}, FAR_MARK
+        axes.plot(plane.true[0], np.clip(angle, bottom, top), zorder=5, label=label, linestyle="none", **look)
