@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -54,7 +55,7 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
     def new(file: NewFile, like: Like = example, overwrite: Overwrite = False, quiet: Quiet = False) -> None:
         _write(
             file,
-            built_in(like, kinds).text,
+            _named(built_in(like, kinds).text, file.stem, like),
             f"a copy of {like}; change it, then: {name} check {file}",
             overwrite,
             quiet,
@@ -68,6 +69,14 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
         _print_check(file, kinds, json, quiet)
 
     return app
+
+
+def _named(text: str, name: str, like: str) -> str:
+    """Return the text of a copy with another name and description: those of the results."""
+    if not re.fullmatch(r"\w[\w .-]{0,99}", name):  # "-" among others
+        return text
+    text = re.sub(r'(?m)^name = ".*"', f'name = "{name}"', text, count=1)
+    return re.sub(r'(?m)^description = ".*"', f'description = "Copy of {like}, changed"', text, count=1)
 
 
 def _write(file: Path, text: str, note: str, overwrite: bool, quiet: bool) -> None:

@@ -89,7 +89,7 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
         estimate = _Estimate(progress.console.print)
 
         def begin(name: str) -> Callable[[float], None]:
-            task, part = progress.add_task(name, total=1.0), estimate.begin()
+            task, part = progress.add_task(name, total=1.0), estimate.begin(name)
 
             def update(done: float) -> None:
                 progress.update(task, completed=done)
@@ -109,15 +109,16 @@ class _Estimate:
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
         self._done: dict[object, float] = {}
+        self._name = ""
         self._first: tuple[float, float] | None = None
         self._is_told = False
 
-    def begin(self) -> object:
+    def begin(self, name: str) -> object:
         """Return the key of another bar; the first one after finished bars begins a new estimate."""
         if all(done >= 1.0 for done in self._done.values()):
             self._done.clear()
             self._first, self._is_told = None, False
-        part = object()
+        part, self._name = object(), name
         self._done[part] = 0.0
         return part
 
@@ -134,12 +135,13 @@ class _Estimate:
         if not self._is_told:
             self._is_told = True
             if now_s - first_s + left_s > LONG_S:
-                self._tell(f"estimated time: {duration_text(round(now_s - first_s + left_s))}")
+                name = f"{self._name}: " if len(self._done) == 1 else ""
+                self._tell(f"{name}estimated time {duration_text(round(now_s - first_s + left_s))}")
         return left_s
 
 
 def _progress_lines(name: str, estimate: _Estimate) -> Callable[[float], None]:
-    part, last_s = estimate.begin(), time.monotonic()
+    part, last_s = estimate.begin(name), time.monotonic()
 
     def progress(done: float) -> None:
         nonlocal last_s

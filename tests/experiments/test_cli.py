@@ -331,7 +331,7 @@ def test_a_long_command_says_its_time_once_and_the_time_left(
         assert "estimated" not in capsys.readouterr().err
         now_s = 53.0
         one(0.13)  # of both bars 6 % in 3 s, after the first half per cent
-        assert capsys.readouterr().err == "estimated time: 50 s\n"
+        assert capsys.readouterr().err == "estimated time 50 s\n"
         now_s = 90.0
         two(0.4)
     assert capsys.readouterr().err == "two: 40 %, 113 s left\n"

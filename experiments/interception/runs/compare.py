@@ -34,6 +34,8 @@ from sim import Scenario
 from sim.parallel import Task
 
 FIGURE = "figure-comparison"
+NEAR = 0.1
+"""Relative difference of quantiles up to which strategies count as equally good."""
 TIES = "for each run, the worst of the four tie rules"
 ACROSS = ("miss_y_m", "miss_z_m", "b_dot_t_m", "b_dot_r_m")
 COLUMNS = ("run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit", "cause", *ACROSS)
@@ -168,13 +170,14 @@ def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
 
 
 def _best(compared: Sequence[Comparison], noises: Sequence[str]) -> str:
-    """Return a line with the strategy of the least 90 % quantile of the miss for each noise."""
-    best = {
-        noise: min((each for each in compared if each.noise == noise), key=lambda each: np.quantile(each.miss_m, 0.9))
-        for noise in noises
-    }
-    names = dict.fromkeys(each.strategy for each in best.values())
-    if len(names) == 1:
-        return f"least in these runs with every noise: {best[noises[0]].strategy}"
-    by_name = (f"{name} with {', '.join(noise for noise in noises if best[noise].strategy == name)}" for name in names)
-    return f"least in these runs: {'; '.join(by_name)}: which strategy is best depends on the noise"
+    """Return a line with the strategies whose 90 % quantile of the miss is near the least one, for each noise."""
+    near = {}
+    for noise in noises:
+        quantiles = {each.strategy: np.quantile(each.miss_m, 0.9) for each in compared if each.noise == noise}
+        near[noise] = [name for name, value in quantiles.items() if value <= (1.0 + NEAR) * min(quantiles.values())]
+    always = [name for name in near[noises[0]] if all(name in names for names in near.values())]
+    within = f"within {NEAR:.0%} of the least in these runs"
+    if always:
+        return f"{within} with every noise: {', '.join(always)}"
+    by_noise = "; ".join(f"{', '.join(names)} with {noise}" for noise, names in near.items())
+    return f"the best strategy depends on the noise; {within}: {by_noise}"
