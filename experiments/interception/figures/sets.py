@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from string import ascii_lowercase
 from typing import Any
 
@@ -26,8 +27,8 @@ SECTIONS_MARK = "sections of the set, the nearest dark"
 _TRUTH: dict[str, Any] = {"marker": "x", "color": INK, "markersize": 7.0, "markeredgewidth": 1.6, "linestyle": "none"}
 _SQUARE: dict[str, Any] = {"marker": "s", "color": INK, "markerfacecolor": "white", "markersize": 5.5}
 _SECTIONS = 5
-_SMALL_MRAD = 0.1
-"""Angle below which the axes of angles are in µrad."""
+_RATES, _ANGLES, _SMALL = ("µrad/s", "nrad/s"), ("mrad", "µrad"), 0.1
+"""Units of the axes, and the number up to which the second ones are used."""
 _VISIBLE = 0.3
 """Share of common limits below which a set is too small to see; the planes of a row then have their own limits."""
 _FAR = 1.5
@@ -178,17 +179,22 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
             margin = 0.07 * (high - low)
             margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(high), 1e-6))
             axes.set(xlim=(low[0] - margin[0], high[0] + margin[0]), ylim=(low[1] - margin[1], high[1] + margin[1]))
-            axes.locator_params("x", nbins=2 if len(row) > 2 else 3, min_n_ticks=1)
+            axes.locator_params("x", nbins=3)
             axes.locator_params("y", nbins=4)
-            axes.xaxis.set_major_formatter(lambda tick, _: _short(tick))
-            if np.abs(axes.get_ylim()).max() <= _SMALL_MRAD:
-                axes.yaxis.set_major_formatter(lambda tick, _: _short(1e3 * tick))
-                axes.set_ylabel(axes.get_ylabel().replace("mrad", "µrad"))
+            _name_units(axes)
             _draw_measurement(axes, plane)
 
 
-def _short(tick: float) -> str:
-    return f"{tick:g}".replace("-", "\N{MINUS SIGN}")
+def _name_units(axes: Axes) -> None:
+    """Write the numbers of both axes, in a smaller unit if they are small."""
+    for one, limits, units in ((axes.xaxis, axes.get_xlim(), _RATES), (axes.yaxis, axes.get_ylim(), _ANGLES)):
+        is_small = float(np.abs(limits).max()) <= _SMALL
+        one.set_major_formatter(partial(_number, factor=1e3 if is_small else 1.0))
+        one.set_label_text(one.get_label_text().replace(units[0], units[is_small]))
+
+
+def _number(tick: float, _place: int, factor: float) -> str:
+    return f"{factor * tick:g}".replace("-", "\N{MINUS SIGN}")
 
 
 def _draw_measurement(axes: Axes, plane: Plane) -> None:
