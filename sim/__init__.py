@@ -5,6 +5,7 @@ from sim.bound.linear_program import BoundError
 from sim.bound.lower_bound import LowerBound, lower_bound
 from sim.campaign import Campaign
 from sim.closed_form import possible_miss_of
+from sim.covariance import Covariance
 from sim.miss_cause import MissCause
 from sim.parallel import CampaignNoise
 from sim.record import Inconsistency, Record, fly_one
@@ -29,6 +30,7 @@ __all__ = [
     "BoundError",
     "Campaign",
     "CampaignNoise",
+    "Covariance",
     "Distribution",
     "HitEstimate",
     "HitRequirement",

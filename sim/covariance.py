@@ -24,8 +24,6 @@ SAMPLE = 2000
 class Covariance:
     """Covariance of a relative state, positions before velocities: a matrix, or standard deviations and correlations.
 
-    A ValueError is raised if it is no covariance.
-
     Parameters
     ----------
     position_sigma_m, velocity_sigma_m_s : tuple of float
@@ -34,6 +32,11 @@ class Covariance:
         Correlations of all components: the whole matrix, or its lower triangle. Without rows: zero.
     matrix_m2 : tuple of rows
         The covariance in place of the three others, in m^2, m^2/s and m^2/s^2: the whole matrix, or its lower triangle.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not within its limits, or the matrix is no covariance.
     """
 
     position_sigma_m: Annotated[tuple[float, ...], NOT_NEGATIVE] = ()
@@ -98,10 +101,10 @@ class Covariance:
                 lower[k:, k] = rest / np.sqrt(rest[0])
         return self.sigma[:, None] * lower
 
-    def share_within(self, lower: Floats, upper: Floats) -> float:
-        """Return the share of the normal starts around the middle of a box that are within it, from a fixed sample."""
+    def share_within(self, half: Floats) -> float:
+        """Return the share of normal values between `half` and its opposite, shape (n,), from a fixed sample."""
         sample = np.random.default_rng(0).standard_normal((SAMPLE, self.size)) @ self.root.T
-        return float((np.abs(sample) <= 0.5 * (upper - lower)).all(axis=1).mean())
+        return float((np.abs(sample) <= half).all(axis=1).mean())
 
 
 def covariance_of(matrix: Floats) -> Covariance:

@@ -227,7 +227,7 @@ class Scenario:
         if self.covariance is not None:
             if self.covariance.size != 2 * components:
                 raise ValueError(f"covariance must have {2 * components} components: got {self.covariance.size}")
-            share = self.covariance.share_within(*corners(self.dispersion))
+            share = self.covariance.share_within(0.5 * np.ptp(corners(self.dispersion), axis=0))
             if share < MIN_SHARE_WITHIN:
                 raise ValueError(
                     f"covariance: {100.0 * share:.2g} % of its starts are within dispersion, at least "

@@ -109,3 +109,11 @@ def test_a_covariance_far_wider_than_the_dispersion_is_refused() -> None:
         normal(0.05)
     with pytest.raises(ValueError, match="covariance must have 6 components: got 4"):
         replace(load_scenario("dart-2022"), covariance=Covariance((1.0, 1.0), (1.0, 1.0)))
+
+
+def test_a_plane_has_four_components() -> None:
+    plane = replace(load_scenario("asteroid-1997"), covariance=Covariance((300.0, 0.0), (0.0, 30.0)))
+    drawn = draw(plane, range(3), seed=0)
+    assert drawn.position_m[:, 1].tolist() == [5_801_300.0] * 3
+    assert drawn.velocity_m_s[:, 0].tolist() == [0.0] * 3
+    assert len({*drawn.position_m[:, 0], *drawn.velocity_m_s[:, 1]}) == 6
