@@ -64,12 +64,13 @@ def chosen_noise(text: str, names: Sequence[str] = NOISES) -> str | OwnNoise:
 
 
 def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
-    """Return the noises of a list by name, with the noise of a Python file, None for a built-in one.
+    """Return the noises of a list by name, with the noise of a Python file, None for a built-in one; `all` is four.
 
     `InputError` if there is no such noise, or one is named twice.
     """
     chosen: dict[str, NoiseSource | None] = {}
-    for text in NOISES if names == "all" else [part.strip() for part in names.split(",")]:
+    parts = [part.strip() for part in names.split(",")]
+    for text in [*(NOISES if "all" in parts else ()), *(part for part in parts if part != "all")]:
         noise = chosen_noise(text)
         name, own = (noise, None) if isinstance(noise, str) else (noise.name, noise)
         if name in chosen:

@@ -207,7 +207,7 @@ def test_a_noise_of_a_file_can_be_pickled_and_its_mistakes_are_one_message(
     assert "noise Half at step 0: angle must be an array of the shape (1, 1): got np.float64(0.0)" in err
     assert 'no class "Full" with the method measure' in infoset.refused("engage", "--noise", "noisy.py:Full")
     assert "did you mean gaussian?" in infoset.refused("campaign", "--noise", "gaus", "--runs", 1, "--out", "no")
-    assert "is named twice" in infoset.refused("compare", "--noise", "game,game")
+    assert "is named twice" in infoset.refused("compare", "--noise", "all,game")
 
 
 def test_compare_shows_what_depends_on_the_noise(brief_file: Path, infoset: Command) -> None:
