@@ -47,39 +47,20 @@ class Inconsistency:
     excess: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Record:
-    """The initial set, and the first `count` of the events: steps and measurements."""
-
-    initial: Set
-    events: list[Motion | Strips]
-    count: int
-
-    def hull(self, run: int, step: int, sizes: Floats) -> Floats:
-        """Return the exact bounds of the states of a run at a step; see `exact_hull`.
-
-        Raises
-        ------
-        ValueError
-            If there were too many steps and measurements to record.
-        """
-        if len(self.events) < self.count:
-            raise ValueError(f"exact widths are known for {MAX_RECORD} steps and measurements, not more")
-        return exact_hull(self.initial, self.events[: self.count], run, step, sizes)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
     """The sets of possible states of all runs at a step; with `single` there is one run, without an axis of runs.
 
-    `record` has the steps and the measurements that the sets result from.
+    They result from the `initial` set and the first `count` of the `events`, steps and measurements.
     """
 
     step: int
     sets: Sets
     single: bool
     states: int
-    record: Record
+    initial: Set
+    events: list[Motion | Strips]
+    count: int
 
     def __repr__(self) -> str:
         head, ends = f"<estimate of {self.states} states at step {self.step}:", np.stack(self._hull, axis=-1)
@@ -110,13 +91,16 @@ class Estimate:
         Raises
         ------
         ValueError
-            After more than 10 000 steps: the record is no longer kept.
+            After more than 20 000 steps and measurements: the record is no longer kept.
         """
         lower, upper = (np.atleast_2d(end) for end in self._hull)
         excess = np.where(np.isnan(lower), np.nan, 0.0)
         for run in np.flatnonzero(np.atleast_1d(self.reduced) & ~np.atleast_1d(self.is_empty)):
             sizes = np.maximum(np.abs(lower[run]), np.abs(upper[run]))
-            hull = self.record.hull(int(run), self.step, np.where(sizes > 0.0, sizes, 1.0))
+            if len(self.events) < self.count:
+                raise ValueError(f"exact widths are known for {MAX_RECORD} steps and measurements, not more")
+            sizes = np.where(sizes > 0.0, sizes, 1.0)
+            hull = exact_hull(self.initial, self.events[: self.count], int(run), self.step, sizes)
             excess[run] = np.maximum(upper[run] - lower[run] - (hull[1] - hull[0]), 0.0)
         return self._runs(excess)
 
@@ -344,8 +328,8 @@ class LinearObserver:
 
     def estimate(self) -> Estimate:
         """Return the present sets."""
-        record = Record(self._initial, self._events, self._count)
-        return Estimate(self.step, self._sets, self._single, self.states, record)
+        record = self._initial, self._events, self._count
+        return Estimate(self.step, self._sets, self._single, self.states, *record)
 
     @property
     def inconsistency(self) -> Inconsistency:
@@ -455,7 +439,8 @@ class _Noise:
             polytope = polytope_of(noise)
             if polytope.space != outputs:
                 raise ValueError(f"noise must have {outputs} coordinates, one for each output: got {polytope.space}")
-            return cls(*_half_spaces(polytope), polytope)
+            rows, limits = polytope.constraints()
+            return cls(rows, np.full(len(rows), -np.inf), limits, polytope)
         half = finite_values("noise", noise, "...")
         if half.shape not in ((), (outputs,)) or (half < 0.0).any():
             raise ValueError(
@@ -474,25 +459,15 @@ class _Noise:
         for pattern in np.unique(known, axis=0):
             runs = (known == pattern).all(axis=1)
             if pattern.all():
-                rows, lower, upper = self.rows, self.lower, self.upper
+                rows, upper = self.rows, self.upper
             elif pattern.any():  # the errors of the measured outputs alone
-                rows, lower, upper = _half_spaces(self.polytope.project(np.flatnonzero(pattern).tolist()))
+                rows, upper = self.polytope.project(np.flatnonzero(pattern).tolist()).constraints()
             else:
                 continue
             heights = y[:, pattern] @ rows.T
             terms = np.abs(np.nan_to_num(y[:, pattern])) @ np.abs(rows).T + np.abs(upper)
-            groups.append((runs, Strips(rows @ matrix[pattern], heights - upper, heights - lower, terms)))
+            groups.append((runs, Strips(rows @ matrix[pattern], heights - upper, np.full_like(heights, np.inf), terms)))
         return groups
-
-
-def _half_spaces(polytope: Polytope) -> tuple[Floats, Floats, Floats]:
-    """Return rows, lower and upper bounds of a polytope."""
-    open_ends = np.full(len(polytope.offsets), -np.inf)
-    return (
-        np.vstack([polytope.normals, polytope.across]),
-        np.concatenate([open_ends, polytope.levels]),
-        np.concatenate([polytope.offsets, polytope.levels]),
-    )
 
 
 def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
