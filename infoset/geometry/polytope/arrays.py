@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
 from infoset.geometry.polytope import double_description as dd
-from infoset.geometry.polytope._measures import largest_ball, orthonormal
+from infoset.geometry.polytope._measures import orthonormal
 from infoset.geometry.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from infoset.limits import COUNT
 
@@ -25,14 +25,12 @@ FLAT = 1e-11
 """Thickness below which points are flat, in coordinates in which they are one wide: ten tolerances of the kernel."""
 _FAR = 16.0
 """Ratio of coordinates to widths from which a set has a centre: differences from the centre are then exact."""
-_GAIN = 2.0**-20
-"""Minimum ratio of two scales in which half-spaces are intersected one after the other."""
 _ROUND = 64.0
 """Ratio of coordinates to a scale beyond which better coordinates are worth a second computation."""
 _VOID = 1e-13
-"""Length of a row, relative to what it was computed from, below which it is rounding: 1e3 roundings."""
+"""Violation of a row without a direction, relative to the largest offset, that is rounding."""
 _SHORT = 1e-15
-"""The same relative to the longest row, if it is not known what the rows were computed from."""
+"""Length of a row, relative to the longest one, below which it has no direction."""
 SMALL = 2.0**10
 """Ratio of two sets' widths from which half-spaces are intersected in the coordinates of the smaller one."""
 _JOGGLES = (0.0, 1e-10, 1e-8, 1e-6)
@@ -41,12 +39,7 @@ _JOGGLES = (0.0, 1e-10, 1e-8, 1e-6)
 
 @dataclass(frozen=True, eq=False)
 class PolytopeArrays:
-    """Vertices and facets of a polytope in scaled coordinates y, x = centre + scale y; see `Polytope`.
-
-    `points`, shape (v, n), are the vertices. A row (a, b) of `facets`, shape (f, n + 1), is a . y <= b, and one of
-    `equations`, shape (n - dimension, n + 1), is a . y = b. Bit j of `incidence`, shape (v, words), is set if a vertex
-    lies on facet j. The scales are powers of two, so that they round nothing; a set far from the origin has a `centre`.
-    """
+    """The arrays of a polytope and its construction; see `Polytope`."""
 
     points: Floats
     facets: Floats
@@ -54,37 +47,27 @@ class PolytopeArrays:
     incidence: dd.Bits
     centre: Floats
     scale: Floats
-    conflict: tuple[Floats, Floats] | None = field(default=None, repr=False)
-    """Normals and offsets of half-spaces that have no common point, if the set is empty."""
 
     # Construction -----------------------------------------------------------------------------------------------------
 
     @classmethod
-    def empty(cls, space: int, conflict: tuple[Floats, Floats] | None = None) -> Self:
-        """Return the empty set of R^n, n = `space`, with half-spaces that have no common point if known."""
+    def empty(cls, space: int) -> Self:
+        """Return the empty set of R^n, n = `space`."""
         COUNT.need("space", space)
         nothing = np.zeros((0, space + 1))
-        none = np.zeros((0, 1), np.uint64)
-        return cls(nothing[:, 1:], nothing, nothing, none, np.zeros(space), np.ones(space), conflict)
+        return cls(nothing[:, 1:], nothing, nothing, np.zeros((0, 1), np.uint64), np.zeros(space), np.ones(space))
 
     @classmethod
     def from_vertices(cls, points: ArrayLike, flat: float = FLAT) -> Self:
-        """Return the convex hull of `points`, shape (k, n), at least one. Its vertices are points, bit for bit.
+        """Return the convex hull of `points`, shape (m, n), at least one. Its vertices are points, bit for bit.
 
         `flat` is the relative thickness below which a set counts as flat: greater for points that are known to fewer
-        digits. The facets are the rays of a double description: O(k f) for f facets in the plane, O(k f^2) at worst.
-
-        Raises
-        ------
-        ValueError
-            If there is no point.
-        UncertainHullError
-            If rounding decides which points are vertices.
+        digits. The facets are the rays of a double description: O(m f) for f facets in the plane, O(m f^2) at worst.
         """
-        array = finite_values("points", points, "k", "n")
-        if not len(array):
-            raise ValueError("points must have at least one row: Polytope.empty makes the empty set")
-        return cls._of_points(array, flat)
+        array = finite_values("points", points, "m", "n")
+        # The minimum width also keeps a set that is nearly flat along an axis from being blown up to rounding errors.
+        centre, scale = coordinates(array.min(axis=0), array.max(axis=0), 1e-10 * np.abs(array).max(axis=0))
+        return cls._hull((array - centre) / scale, centre, scale, flat)
 
     @classmethod
     def from_constraints(
@@ -98,13 +81,12 @@ class PolytopeArrays:
         empty.
 
         Infinite offsets are no limit. One step of the double description for each row. An UnboundedPolytopeError, which
-        holds a direction, is raised if the set is unbounded, and an UncertainHullError if rounding decides which points
-        are vertices.
+        holds a direction, is raised if the set is unbounded.
         """
         rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "k", "n")
         if across is not None:
-            given: ArrayLike = [] if levels is None else levels
-            flat, heights = constraint_values(("across", "levels"), across, given, "k", rows.shape[1])
+            ends: ArrayLike = [] if levels is None else levels
+            flat, heights = constraint_values(("across", "levels"), across, ends, "k", rows.shape[1])
             need_finite("levels", heights)
             rows, limits = np.vstack([rows, flat, -flat]), np.concatenate([limits, heights, -heights])
         return cls._of_rows(rows, limits)
@@ -128,8 +110,7 @@ class PolytopeArrays:
     @classmethod
     def _of_shape(cls, points: Floats, facets: Floats, equations: Floats, centre: Floats, scale: Floats) -> Self:
         """Return a polytope whose vertices and facets are known; the incidence follows from their distances."""
-        unit = np.ldexp(1.0, -np.frexp(np.abs(facets).max(axis=1))[1])
-        facets = facets * unit[:, None]
+        facets = facets * _units(facets)
         on = facets[:, -1] - points @ facets[:, :-1].T <= dd.ON * max(1.0, float(np.abs(points).max()))
         return cls(points, facets, equations, dd.packed(on), centre, scale)
 
@@ -199,14 +180,6 @@ class PolytopeArrays:
     # Double description -----------------------------------------------------------------------------------------------
 
     @classmethod
-    def _of_points(cls, points: Floats, flat: float = FLAT) -> Self:
-        """Return the hull of points whose coordinates are exact."""
-        lower, upper = points.min(axis=0), points.max(axis=0)
-        # The minimum width also keeps a set that is nearly flat along an axis from being blown up to rounding errors.
-        centre, scale = coordinates(lower, upper, 1e-10 * np.maximum(np.abs(lower), np.abs(upper)))
-        return cls._hull((points - centre) / scale, centre, scale, flat)
-
-    @classmethod
     def _hull(cls, points: Floats, centre: Floats, scale: Floats, flat: float, errors: Floats | None = None) -> Self:
         """Return the convex hull of points in scaled coordinates, known to `errors`, shape (n,).
 
@@ -228,111 +201,100 @@ class PolytopeArrays:
             nothing, none = np.zeros((0, space + 1)), np.zeros((1, 1), np.uint64)
             return cls(points[:1].copy(), nothing, equations, none, centre, scale)
         inner = np.ascontiguousarray(points[:, own])
+        rows = np.column_stack([-inner, np.ones(len(inner))])
         for joggle in _JOGGLES:
-            # Points that have moved have simplices as facets; offsets follow from the points themselves.
-            moved = inner + joggle * np.random.default_rng(0).uniform(-1.0, 1.0, inner.shape)
-            rows = np.column_stack([-moved, np.ones(len(inner))])
-            rays, on, _ = dd.extreme_rays(rows, np.ones(len(rows)), False, 0.0)
-            incidence = dd.transposed(on, len(rows))
-            used = np.flatnonzero(dd.maximal(incidence, dimension))
-            sides, incidence = _facets_of(incidence[used], len(rays), dimension)
-            if _agree(incidence, len(sides), dimension):
+            if joggle:  # points that have moved have simplices as facets; offsets follow from the points themselves
+                rows[:, :-1] = joggle * np.random.default_rng(0).uniform(-1.0, 1.0, inner.shape) - inner
+            rays, on, _ = dd.extreme_rays(rows, False, 0.0)
+            with suppress(UncertainHullError):
+                used, sides, incidence = _lattice(dd.transposed(on, len(rows)), len(rays), dimension)
                 break
         else:
             raise UncertainHullError(f"rounding decides which of {len(points)} points are vertices")
-        facets = np.zeros((len(sides), space + 1))
-        facets[:, own] = rays[sides, :-1]
-        facets[:, -1] = dd.supports(inner, np.ascontiguousarray(rays[sides, :-1]))
-        vertices = points[used]
-        if errors is not None and errors.any():
-            facets[:, -1] += (1.0 + dd.EPS) * np.abs(facets[:, :-1]) @ errors
-            vertices = dd.push_out(vertices, facets, incidence, np.ones(len(used), bool), len(rest) > 0, dd.TIP)
-        return cls(vertices, facets, equations, incidence, centre, scale)
+        facets, normals = np.zeros((len(sides), space + 1)), np.ascontiguousarray(rays[sides, :-1])
+        facets[:, own], facets[:, -1] = normals, dd.supports(inner, normals)
+        hull = cls(points[used], facets, equations, incidence, centre, scale)
+        return hull if errors is None else hull._around(errors)
+
+    def _around(self, by: Floats) -> Self:
+        """Return a set that contains {y + e: |e_i| <= by_i}, in scaled coordinates, `by` of shape (n,).
+
+        Facets move outward, and vertices to the outer sides of their facets.
+        """
+        facets = self.facets * _units(self.facets)
+        if not by.any():
+            return replace(self, facets=facets)
+        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ by
+        flat, most = len(self.equations) > 0, dd.TIP + 32.0 * float(by.max())
+        points = dd.push_out(self.points, facets, self.incidence, np.ones(len(self.points), bool), flat, most)
+        return replace(self, points=points, facets=facets)
 
     @classmethod
-    def _of_rows(
-        cls,
-        rows: Floats,
-        limits: Floats,
-        terms: tuple[Floats, Floats] | None = None,
-        box: tuple[Floats, Floats] | None = None,
-        origin: Floats | float = 0.0,
-    ) -> Self:
+    def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0) -> Self:
         """Return {x: rows (x - origin) <= limits}.
 
-        `terms`, shapes (m, n) and (m,), are the sizes of what rows and limits were computed from. The coordinates in
-        which the set is round are not known before the set, unless a `box`, two ends, contains it; so it is computed
-        again if others are much better.
+        The coordinates in which the set is round are not known before the set, so it is computed again if others are
+        much better.
         """
-        space = rows.shape[1]
         if np.isneginf(limits).any():
-            return cls.empty(space)
-        if not (limited := limits < np.inf).all():
-            rows, limits = rows[limited], limits[limited]
+            return cls.empty(rows.shape[1])
+        rows, limits = rows[limits < np.inf], limits[limits < np.inf]
         # In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
-        for share in (0.25, 1.0):
-            if box is None:
-                centre, scale = np.zeros(space), _guess(rows, limits, share)
-            else:
-                centre, scale = coordinates(*box, 1e-10 * np.abs(box).max(axis=0))
-            try:
-                found = cls._intersect(rows, limits, terms, (origin, centre, scale))
-            except (UnboundedPolytopeError, UncertainHullError):
-                if share == 1.0 or box is not None:
-                    raise
-            else:
-                if box is not None or not found.is_empty:
-                    break
-        flat = np.zeros(space, bool)
-        for _ in range(8):
-            if found.is_empty:
-                break
-            lower, upper = found.points.min(axis=0), found.points.max(axis=0)
-            # An axis along which the set has no width is tried once in finer coordinates.
-            narrow = (_ROUND * (upper - lower) < 1.0) & ((upper > lower) | ~flat)
-            flat = upper == lower
-            if max(-lower.min(), upper.max()) <= _ROUND and not narrow.any():
-                break
-            ends = found.centre + found.scale * lower, found.centre + found.scale * upper
-            centre, scale = coordinates(*ends, np.maximum(_GAIN * found.scale, 1e-10 * np.abs(ends).max(axis=0)))
-            if (centre == found.centre).all() and (scale == found.scale).all():
-                break
-            try:
-                better = cls._intersect(rows, limits, terms, (origin, centre, scale))
-            except (UnboundedPolytopeError, UncertainHullError):
-                break
-            if better.is_empty:
-                break
-            found = better
-        return found
+        centre, found = np.zeros(rows.shape[1]), None
+        with suppress(UnboundedPolytopeError, UncertainHullError):
+            found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 0.25))
+        if found is None or found.is_empty:
+            found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 1.0))
+        return found if found._is_round else cls._in_box(rows, limits, origin, found._box) or found
 
     @classmethod
-    def _intersect(
-        cls,
-        rows: Floats,
-        limits: Floats,
-        terms: tuple[Floats, Floats] | None,
-        coordinates: tuple[Floats | float, Floats, Floats],
-    ) -> Self:
-        """Return {x: rows (x - origin) <= limits}, computed in coordinates: an origin, a centre and scales."""
-        origin, centre, scale = coordinates
-        space = rows.shape[1]
-        scaled, slack, possible = _scaled_rows(rows, limits, terms, centre - origin, scale)
+    def _in_box(cls, rows: Floats, limits: Floats, origin: Floats | float, box: tuple[Floats, Floats]) -> Self | None:
+        """Return {x: rows (x - origin) <= limits}, which a box contains, computed in the coordinates of the box.
+
+        Again, if those of the result are much better. None if it is empty, or rounding decides.
+        """
+        found = None
+        with suppress(UnboundedPolytopeError, UncertainHullError):
+            for _ in range(3):
+                better = cls._intersect(rows, limits, origin, *coordinates(*box, 1e-10 * np.abs(box).max(axis=0)))
+                if better.is_empty:
+                    break
+                found, box = better, better._box
+                if found._is_round:
+                    break
+        return found
+
+    @property
+    def _box(self) -> tuple[Floats, Floats]:
+        """Minimum and maximum coordinates."""
+        return self.vertices.min(axis=0), self.vertices.max(axis=0)
+
+    @property
+    def _is_round(self) -> bool:
+        """Whether no other coordinates are much better; in none the empty set has points."""
+        widths = np.ptp(self.points, axis=0) if len(self.points) else 1.0
+        return bool(np.abs(self.points).max(initial=0.0) <= _ROUND and np.min(widths) * _ROUND >= 1.0)
+
+    @classmethod
+    def _intersect(cls, rows: Floats, limits: Floats, origin: Floats | float, centre: Floats, scale: Floats) -> Self:
+        """Return {x: rows (x - origin) <= limits}, computed in coordinates with a centre and scales."""
+        space = len(scale)
+        scaled, possible = _scaled_rows(rows, _moved(rows, limits, centre - origin), scale)
         if not possible:
-            return cls.empty(space, (rows, limits))
-        # The first row is t >= 0.
-        table, slack = np.zeros((len(scaled) + 1, space + 1)), np.append(1.0, slack)
-        table[0, -1] = 1.0
-        table[1:] = scaled * ([-1.0] * space + [1.0])
+            return cls.empty(space)
+        table = np.vstack([np.eye(space + 1)[-1:], scaled * ([-1.0] * space + [1.0])])  # the first row is t >= 0
         for joggle in _JOGGLES:
-            # Half-spaces that move outward by different amounts have simple vertices.
-            table[1:, -1] = scaled[:, -1] + joggle * np.random.default_rng(0).uniform(0.5, 1.0, len(scaled))
-            rays, on, rank = dd.extreme_rays(table, slack, True, dd.ON)
-            if rank <= space:
-                return cls._unbounded(table, slack, (rows, limits), scale)
+            if joggle:  # half-spaces that move outward by different amounts have simple vertices
+                table[1:, -1] = scaled[:, -1] + joggle * np.random.default_rng(0).uniform(0.5, 1.0, len(scaled))
+            rays, on, rank = dd.extreme_rays(table, True, dd.ON)
+            if rank <= space:  # the rows do not depend on all coordinates
+                columns = np.sort(dd.pivots(table, dd.ON, 0)[1])
+                rays, _, _ = dd.extreme_rays(np.ascontiguousarray(table[:, columns]), True, dd.ON)
             ends = rays[:, -1] == 1.0
             if not ends.any():
-                return cls.empty(space, (rows, limits))
+                return cls.empty(space)
+            if rank <= space:
+                raise UnboundedPolytopeError(np.linalg.svd(table)[2][-1, :-1] * scale)
             if not ends.all():
                 raise UnboundedPolytopeError(rays[~ends][0, :-1] * scale)
             incidence = dd.transposed(dd.transposed(on, len(table))[1:], len(rays))  # no point lies on the first row
@@ -341,41 +303,42 @@ class PolytopeArrays:
                 return start._reduced(np.ones(len(rays), bool))
         raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet")
 
-    @classmethod
-    def _unbounded(cls, table: Floats, slack: Floats, conflict: tuple[Floats, Floats], scale: Floats) -> Self:
-        """Return the empty set, or raise an error, for rows that do not depend on all coordinates."""
-        chosen, columns = dd.pivots(table, dd.ON, 0)
-        free = np.setdiff1d(np.arange(table.shape[1]), columns)
-        rays, _, _ = dd.extreme_rays(np.ascontiguousarray(table[:, np.sort(columns)]), slack, True, dd.ON)
-        if not (rays[:, -1] == 1.0).any():
-            return cls.empty(len(scale), conflict)
-        direction = np.zeros(table.shape[1])
-        direction[free[0]] = 1.0
-        direction[columns] = -np.linalg.solve(table[np.ix_(chosen, columns)], table[chosen, free[0]])
-        raise UnboundedPolytopeError(direction[:-1] * scale)
-
     def _reduced(self, new: Flags) -> Self:
         """Return the set without redundant vertices and facets; new vertices do not lie inside their facets.
 
         Facets on which all vertices lie are equations of a set of lower dimension: the hull of its vertices.
         """
-        dimension, incidence, facets = self.dimension, self.incidence, self.facets
+        incidence, facets = self.incidence, self.facets
         whole = np.bitwise_and.reduce(incidence, axis=0)
-        flat = bool(whole.any()) or len(self.points) <= dimension
+        flat = bool(whole.any()) or len(self.points) <= self.dimension
         points = dd.push_out(self.points, facets, incidence & ~whole, new, flat or len(self.equations) > 0, dd.TIP)
         if flat:
             return self._hull(points, self.centre, self.scale, 1e2 * FLAT)
-        used = np.flatnonzero(dd.maximal(incidence, dimension))
-        sides, incidence = _facets_of(incidence[used], len(facets), dimension)
-        if not _agree(incidence, len(sides), dimension):
-            raise UncertainHullError(f"rounding decides where {len(facets)} half-spaces meet")
+        used, sides, incidence = _lattice(incidence, len(facets), self.dimension)
         return replace(self, points=points[used], facets=facets[sides], incidence=incidence)
 
-    def _with_rows(self, rows: Floats, limits: Floats, origin: Floats | float = 0.0) -> Self:
-        """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all."""
-        scaled, slack, possible = _scaled_rows(rows, limits, None, self.centre - origin, self.scale)
+    def _with_rows(
+        self,
+        rows: Floats,
+        limits: Floats,
+        origin: Floats | float = 0.0,
+        box: tuple[Floats, Floats] | None = None,
+    ) -> Self:
+        """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all.
+
+        `box` are two ends that contain the part, if known.
+        """
+        limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
+        own, ends = self._rows(self.centre)
+        both = np.vstack([own, rows]), np.append(ends, limits)
+        if box is not None and (SMALL * (box[1] - box[0]) < before * self.scale).any():
+            # Sets that touch each other do so within the rounding of their own coordinates.
+            better = self._in_box(*both, self.centre, box)
+            if better is not None:
+                return better
+        scaled, possible = _scaled_rows(rows, limits, self.scale)
         heights = self.points @ scaled[:, :-1].T - scaled[:, -1]
-        cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * slack * max(1.0, float(np.abs(self.points).max())))
+        cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max())))
         if not len(cuts) and possible:
             return self
         rays, count = np.column_stack([self.points, np.ones(len(self.points))]), len(self.facets)
@@ -383,35 +346,19 @@ class PolytopeArrays:
         bits[:, : self.incidence.shape[1]] = self.incidence[:, : bits.shape[1]]
         for number, cut in enumerate(cuts, count):
             row = np.append(-scaled[cut, :-1], scaled[cut, -1])
-            rays, bits = dd.insert(rays, bits, row, slack[cut], number, self.dimension - 1, True)
-        sides = np.vstack([self.facets, scaled[cuts]])
+            rays, bits = dd.insert(rays, bits, row, number, self.dimension - 1, True)
         if not len(rays) or not possible:
-            own, ends = self.constraints()
-            return self.empty(
-                self.space,
-                (np.vstack([own, rows]), np.append(ends, limits + rows @ np.broadcast_to(origin, self.space))),
-            )
-        part = replace(self, points=rays[:, :-1].copy(), facets=sides, incidence=bits)
-        new = np.asarray(dd.unpacked(bits, len(sides))[:, count:].any(axis=1))
-        lower, upper, before = part.points.min(axis=0), part.points.max(axis=0), np.ptp(self.points, axis=0)
+            return self.empty(self.space)
+        part = replace(self, points=rays[:, :-1].copy(), facets=np.vstack([self.facets, scaled[cuts]]), incidence=bits)
+        new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
+        widths = np.ptp(part.points, axis=0)
         with suppress(UncertainHullError):
             # An axis along which the part has no width is no reason: its equations fix that coordinate.
-            if not ((SMALL * (upper - lower) < before) & (upper - lower > FLAT * before)).any():
+            if not ((SMALL * widths < before) & (widths > FLAT * before)).any():
                 return part._reduced(new)
-        # The result is much smaller: again, in its own coordinates, with the rows on which it has vertices and a box.
-        margin = 2.0**-8 * before  # far from the set: rounding can have moved sharp corners of the part
-        unit, box = np.eye(self.space), (lower - margin, upper + margin)
-        used = np.bitwise_or.reduce(bits, axis=0)[None]
-        sides = np.vstack([sides[dd.unpacked(used, len(sides))[0]], self.equations, -self.equations])
-        rows = np.vstack([sides[:, :-1], unit, -unit]) / self.scale
-        around = self.centre + self.scale * box[0], self.centre + self.scale * box[1]
-        with suppress(UncertainHullError, UnboundedPolytopeError):
-            better = self._of_rows(
-                rows, np.concatenate([sides[:, -1], box[1], -box[0]]), box=around, origin=self.centre
-            )
-            if not better.is_empty:
-                return better
-        return part._reduced(new)
+        # The part is much smaller: again, in its own coordinates.
+        better = self._in_box(*both, self.centre, part._box)
+        return part._reduced(new) if better is None else better
 
     # Representation ---------------------------------------------------------------------------------------------------
 
@@ -454,21 +401,6 @@ class PolytopeArrays:
     def levels(self) -> Floats:
         """Levels of the affine hull, shape (n - dimension,): across x = levels."""
         return self._sides[3]
-
-    @cached_property
-    def relaxation(self) -> float:
-        """Minimum relaxation of the constraints of an empty set, normals of unit length, with which a point satisfies
-        all; 0 if it is not known. One linear program (HiGHS).
-        """
-        if self.conflict is None:
-            return 0.0
-        rows, limits = self.conflict
-        lengths = np.linalg.norm(rows, axis=1)
-        if not lengths.all():
-            return float(max(0.0, -limits[lengths == 0.0].min()))
-        with suppress(UncertainHullError):
-            return max(0.0, -largest_ball(rows / lengths[:, None], limits / lengths, _guess(rows, limits))[1])
-        return 0.0
 
     @cached_property
     def _sides(self) -> tuple[Floats, Floats, Floats, Floats]:
@@ -518,8 +450,8 @@ class PolytopeArrays:
     def _rows(self, origin: Floats | float = 0.0) -> tuple[Floats, Floats]:
         """Return half-spaces rows (x - origin) <= limits: the facets, and two of each equation."""
         sides = np.vstack([self.facets, self.equations, -self.equations])
-        rows, limits, shift = sides[:, :-1] / self.scale, sides[:, -1], self.centre - origin
-        return rows, dd.affine_image(shift[None], rows, limits)[0][0] if shift.any() else limits
+        rows = sides[:, :-1] / self.scale
+        return rows, _moved(rows, sides[:, -1], origin - self.centre)
 
     def needed(self) -> Self:
         """Return the set itself.
@@ -527,10 +459,10 @@ class PolytopeArrays:
         Raises
         ------
         EmptyPolytopeError
-            If it is empty; the error has the minimum relaxation of the constraints.
+            If it is empty.
         """
         if self.is_empty:
-            raise EmptyPolytopeError(self.relaxation)
+            raise EmptyPolytopeError("the polytope is empty")
         return self
 
     def __repr__(self) -> str:
@@ -550,7 +482,7 @@ def coordinates(lower: Floats, upper: Floats, minimum: Floats) -> tuple[Floats, 
     return np.where(far, 0.5 * lower + 0.5 * upper, 0.0), scale
 
 
-def _guess(rows: Floats, limits: Floats, share: float = 0.25) -> Floats:
+def _guess(rows: Floats, limits: Floats, share: float) -> Floats:
     """Return sizes of coordinates, powers of two, shape (n,): those at which a `share` of the rows is tight."""
     large = np.abs(rows) > 1e-14 * np.abs(rows).max(axis=1, initial=0.0, keepdims=True)  # others may be rounding
     used = np.where(large.any(axis=0), large, rows != 0.0) & (limits[:, None] != 0.0)
@@ -564,41 +496,39 @@ def _guess(rows: Floats, limits: Floats, share: float = 0.25) -> Floats:
     return np.asarray(np.ldexp(1.0, np.frexp(sizes)[1]))
 
 
-def _scaled_rows(
-    rows: Floats, limits: Floats, terms: tuple[Floats, Floats] | None, shift: Floats, scale: Floats
-) -> tuple[Floats, Floats, bool]:
-    """Return rows (a, b), a . y <= b, the factors of their tolerances, and whether rows without a direction hold.
+def _units(rows: Floats) -> Floats:
+    """Return powers of two, shape (m, 1): times these, the largest entry of each row is from 1/2 to 1."""
+    return np.asarray(np.ldexp(1.0, -np.frexp(np.abs(rows).max(axis=1, keepdims=True))[1]))
 
-    A row whose length is rounding has no direction. The longest entry of the others is from 1/2 to 1.
+
+def _moved(rows: Floats, limits: Floats, shift: Floats) -> Floats:
+    """Return the limits of rows (x - shift) from those of rows x."""
+    return dd.affine_image(shift[None], -rows, limits)[0][0] if shift.any() else limits
+
+
+def _scaled_rows(rows: Floats, limits: Floats, scale: Floats) -> tuple[Floats, bool]:
+    """Return rows (a, b), a . y <= b with x = scale y, and whether rows without a direction hold.
+
+    A row whose length is rounding has no direction.
     """
-    inner, ends = rows * scale, limits
-    sizes, reach = np.abs(inner).max(axis=1, initial=0.0), np.abs(limits)
-    shortest, noise = _SHORT * sizes.max(initial=0.0), np.zeros(len(rows))
-    if terms is not None:
-        noise, reach = (terms[0] * scale).max(axis=1) + terms[1], terms[1]
-        shortest = _VOID * (terms[0] * scale).max(axis=1)
-    if shift.any():
-        ends = dd.affine_image(shift[None], -rows, limits)[0][0]
-    directed = sizes > shortest
-    possible = bool((ends >= -_VOID * np.maximum(reach.max(initial=0.0), 1e-300))[~directed].all())
-    if not directed.all():
-        inner, ends, sizes, noise = inner[directed], ends[directed], sizes[directed], noise[directed]
-    unit = np.ldexp(1.0, -np.frexp(np.maximum(sizes, np.abs(ends)))[1])
-    scaled = np.empty((len(inner), len(scale) + 1))
-    scaled[:, :-1], scaled[:, -1] = inner * unit[:, None], ends * unit
-    # Rows that were computed are known to 9 roundings of their terms.
-    return scaled, np.maximum(1.0, noise * unit / 512.0), possible
+    table = np.column_stack([rows * scale, limits])
+    sizes = np.abs(table[:, :-1]).max(axis=1)
+    directed = sizes > _SHORT * sizes.max(initial=0.0)
+    possible = bool((limits[~directed] >= -_VOID * np.abs(limits).max(initial=1e-300)).all())
+    table = table[directed]
+    return table * _units(table), possible
 
 
-def _facets_of(incidence: dd.Bits, count: int, dimension: int) -> tuple[Integers, dd.Bits]:
-    """Return which of `count` rows are facets, and the incidence of vertices with these alone."""
-    sides = dd.transposed(incidence, count)
-    used = np.flatnonzero(dd.maximal(sides, dimension))
-    return used, dd.transposed(sides[used], len(incidence))
+def _lattice(incidence: dd.Bits, count: int, dimension: int) -> tuple[Integers, Integers, dd.Bits]:
+    """Return which vertices and which of `count` rows are not redundant, and the incidence of these.
 
-
-def _agree(incidence: dd.Bits, facets: int, dimension: int) -> bool:
-    """Whether each vertex has at least d facets and edges, and each facet d vertices and ridges."""
-    if min(len(incidence), facets) <= dimension:
-        return False
-    return all(dd.have_neighbours(bits, dimension) for bits in (incidence, dd.transposed(incidence, facets)))
+    An UncertainHullError is raised unless each vertex has d facets and edges, and each facet d vertices and ridges.
+    """
+    used = np.flatnonzero(dd.maximal(incidence, dimension))
+    on = dd.transposed(incidence[used], count)
+    sides = np.flatnonzero(dd.maximal(on, dimension))
+    on, incidence = on[sides], dd.transposed(on[sides], len(used))
+    agree = min(len(used), len(sides)) > dimension and dd.have_neighbours(incidence, dimension)
+    if not (agree and dd.have_neighbours(on, dimension)):
+        raise UncertainHullError("rounding decides which points are vertices of a set")
+    return used, sides, incidence

@@ -107,33 +107,23 @@ def _forbids(rays: Floats, signs: Integers, p: Any, q: Any, k: int) -> bool:
 def _combine(p: Floats, q: Floats, alpha: float, beta: float, affine: bool, result: Floats) -> None:
     """Write the ray alpha q + beta p; with t = 1 if it is a point. Coordinates that both points share stay exact."""
     last = len(p) - 1
-    if affine and p[last] == 1.0 and q[last] == 1.0:
-        share = beta / (alpha + beta)
-        if share > 0.5:
-            share = alpha / (alpha + beta)
-            p, q = q, p
-        for i in range(len(p)):
-            result[i] = q[i] + share * (p[i] - q[i])
-    elif affine and p[last] + q[last] == 1.0:
-        share = beta / alpha
-        if p[last] == 1.0:
-            share = alpha / beta
-            p, q = q, p
-        for i in range(len(p)):
-            result[i] = q[i] + share * p[i]
-    else:
-        size = 0.0
-        for i in range(len(p)):
-            result[i] = alpha * q[i] + beta * p[i]
-            size = max(size, abs(result[i]))
-        size = math.ldexp(1.0, -math.frexp(size)[1])
-        for i in range(len(p)):
-            result[i] *= size
+    total = alpha * q[last] + beta * p[last] if affine else 0.0
+    if total > 0.0:
+        if beta * p[last] > alpha * q[last]:
+            p, q, beta = q, p, alpha
+        for i in range(len(p)):  # q is the nearer point
+            result[i] = q[i] + beta / total * (p[i] - p[last] * q[i])
+        return
+    size = 0.0
+    for i in range(len(p)):
+        result[i] = alpha * q[i] + beta * p[i]
+        size = max(size, abs(result[i]))
+    result *= math.ldexp(1.0, -math.frexp(size)[1])
 
 
 @_kernels.compiled
-def sides(rays: Floats, row: Floats, slack: float) -> tuple[Floats, Integers]:
-    """Return the heights row . z of rays, and their signs, 0 for rays on the row: within `slack` tolerances."""
+def sides(rays: Floats, row: Floats) -> tuple[Floats, Integers]:
+    """Return the heights row . z of rays, and their signs, 0 for rays on the row."""
     heights, signs = np.empty(len(rays)), np.zeros(len(rays), np.int64)
     for i in range(len(rays)):
         height, length = 0.0, 0.0
@@ -141,7 +131,7 @@ def sides(rays: Floats, row: Floats, slack: float) -> tuple[Floats, Integers]:
             height += row[j] * rays[i, j]
             length = max(length, abs(rays[i, j]))
         heights[i] = height
-        if abs(height) > ON * slack * length:
+        if abs(height) > ON * length:
             signs[i] = 1 if height > 0.0 else -1
     return heights, signs
 
@@ -199,9 +189,7 @@ def crossings(
                 raise UncertainHullError("rounding decides which points are vertices: one half-space cuts 50000 edges")
             if count == room:
                 room *= 2
-                more, more_marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)
-                more[:count], more_marks[:count] = result, marks
-                result, marks = more, more_marks
+                result, marks = np.concatenate((result, result)), np.concatenate((marks, marks))
             _combine(rays[p], rays[q], heights[p], -heights[q], affine, result[count])
             for w in range(bits.shape[1]):
                 marks[count, w] = bits[p, w] & bits[q, w]
@@ -210,15 +198,13 @@ def crossings(
 
 
 @_kernels.compiled
-def insert(
-    rays: Floats, bits: Bits, row: Floats, slack: float, number: int, least: int, affine: bool
-) -> tuple[Floats, Bits]:
+def insert(rays: Floats, bits: Bits, row: Floats, number: int, least: int, affine: bool) -> tuple[Floats, Bits]:
     """Return the rays with row . z >= 0, shape (k, D), and their bits, shape (k, words), for one more row.
 
     One step of the double description: rays on the wrong side go; each edge that crosses the row gives a ray. `number`
     is the bit of the row; see `sides` and `crossings`.
     """
-    heights, signs = sides(rays, row, slack)
+    heights, signs = sides(rays, row)
     word, bit = number // 64, _1 << np.uint64(number % 64)
     on, above = signs == 0, signs > 0
     marks = bits.copy()
@@ -241,50 +227,32 @@ def insert(
 
 @_kernels.compiled
 def _merged(rays: Floats, bits: Bits, on: int, old: int) -> tuple[Floats, Bits]:
-    """Return rays without new ones (from number `old`) that equal another new one or one of the first `on` ones.
+    """Return rays without new ones (from number `old`) that equal one of the first `on` ones or an earlier new one.
 
-    The ray that stays lies on the rows of both. Equal rays are neighbours in the order of one coordinate.
+    The ray that stays lies on the rows of both. Otherwise rays that rounding doubles would multiply. Equal rays are
+    neighbours in the order of one coordinate.
     """
     k, size = rays.shape
-    if k - old + on < 2 or k == old:
-        return rays.copy(), bits.copy()
-    numbers, keys = np.empty(on + k - old, np.int64), np.empty(on + k - old)
-    lengths = np.empty(on + k - old)
+    numbers, kept = np.concatenate((np.arange(on), np.arange(old, k))), np.ones(k, np.bool_)
+    unit, keys = rays[numbers], np.zeros(len(numbers))
     for n in range(len(numbers)):
-        i = n if n < on else old + n - on
-        numbers[n] = i
-        length, key = 0.0, 0.0
+        length = 0.0
         for j in range(size):
-            length = max(length, abs(rays[i, j]))
-            key += rays[i, j] * (1.0 + 0.618 * j)  # a direction that is not an axis
-        keys[n], lengths[n] = key / length, length
+            length = max(length, abs(unit[n, j]))
+        for j in range(size):
+            unit[n, j] /= length
+            keys[n] += unit[n, j] * (1.0 + 0.618 * j)  # a direction that is not an axis
     order = np.argsort(keys)
-    gone = np.zeros(k, np.bool_)
     for place in range(len(order)):
-        one = order[place]
-        i = numbers[one]
-        if gone[i]:
-            continue
         for after in range(place + 1, len(order)):
-            two = order[after]
-            if keys[two] - keys[one] > 4.0 * size * ON:
+            one, two = min(order[place], order[after]), max(order[place], order[after])
+            if abs(keys[two] - keys[one]) > 4.0 * size * ON:
                 break
-            j = numbers[two]
-            if gone[j] or (i < old and j < old):
-                continue
-            near = True
-            for c in range(size):
-                if abs(rays[i, c] / lengths[one] - rays[j, c] / lengths[two]) > ON:
-                    near = False
-                    break
-            if near:
-                stays, goes = (j, i) if j < i else (i, j)
-                for w in range(bits.shape[1]):
-                    bits[stays, w] |= bits[goes, w]
-                gone[goes] = True
-                if goes == i:
-                    break
-    return rays[~gone], bits[~gone]
+            i, j = numbers[one], numbers[two]
+            if j >= old and kept[i] and kept[j] and (np.abs(unit[one] - unit[two]) <= ON).all():
+                bits[i] |= bits[j]
+                kept[j] = False
+    return rays[kept], bits[kept]
 
 
 @_kernels.compiled
@@ -322,7 +290,7 @@ def pivots(rows: Floats, tolerance: float, first: int) -> tuple[Integers, Intege
 
 
 @_kernels.compiled
-def extreme_rays(rows: Floats, slack: Floats, affine: bool, tolerance: float) -> tuple[Floats, Bits, int]:
+def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, Bits, int]:
     """Return the extreme rays, shape (k, D), of {z: rows z >= 0}, their bits, and the rank of the rows, shape (m, D).
 
     If `affine`, the first row is t >= 0, and rays with t > 0 have t = 1. It starts with the simplicial cone of D rows
@@ -348,7 +316,7 @@ def extreme_rays(rows: Floats, slack: Floats, affine: bool, tolerance: float) ->
             rays[i] *= math.ldexp(1.0, -math.frexp(length)[1])
     for i in range(m):
         if not inside[i]:
-            rays, bits = insert(rays, bits, rows[i], slack[i], i, size - 2, affine)
+            rays, bits = insert(rays, bits, rows[i], i, size - 2, affine)
             if len(rays) == 0:
                 break
     return rays, bits, size

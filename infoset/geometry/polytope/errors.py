@@ -8,16 +8,7 @@ from infoset.arrays import Floats
 
 
 class EmptyPolytopeError(ValueError):
-    """No point satisfies the constraints.
-
-    `relaxation` is the minimum relaxation of every constraint, its normal of unit length, with which a point satisfies
-    all; 0 if it is not known.
-    """
-
-    def __init__(self, relaxation: float) -> None:
-        remedy = f"; it is not if its constraints are relaxed by {relaxation:.3g}" if relaxation else ""
-        super().__init__(f"the polytope is empty{remedy}")
-        self.relaxation = relaxation
+    """No point satisfies the constraints."""
 
 
 class UnboundedPolytopeError(ValueError):

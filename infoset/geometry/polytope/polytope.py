@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from math import factorial
@@ -25,13 +24,13 @@ from infoset.geometry._set_arguments import (
 )
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, nearest_difference, simplices_of, triangle_of
-from infoset.geometry.polytope.arrays import FLAT, SMALL, PolytopeArrays, coordinates
-from infoset.geometry.polytope.errors import UnboundedPolytopeError, UncertainHullError
+from infoset.geometry.polytope.arrays import FLAT, PolytopeArrays, coordinates
+from infoset.geometry.polytope.errors import UncertainHullError
+from infoset.geometry.polytope.reduction import reduced_outward
 from infoset.limits import Limits, real_values
 
 _MAX_CONDITION = 1e6
 """Condition of a matrix, in scaled coordinates, up to which facets are mapped; beyond, they are those of a hull."""
-
 _THICK = 3e-8
 """Thickness of a flat set that is enlarged, relative to its coordinates: rounding does not lose it again."""
 
@@ -44,23 +43,18 @@ class Polytope(PolytopeArrays):
     rows of `across` are orthonormal. Construct it with `from_vertices`, `from_constraints`, `from_box`, `from_ball` or
     `from_zonotope`.
 
-    One algorithm, the double description, computes all sets: a half-space is added by one step, which finds the edges
-    that cross it from the incidence of vertices and facets. Vertices and facets that are given are kept; those that are
-    computed are rounded outward, so that the set contains the exact one, and exceeds it by about 1e-12 of its size. A
-    set that is 1e11 times thinner than it is long, in units in which it is one wide along each axis, counts as flat;
+    One algorithm, the double description, computes all sets. Vertices and facets that are given are kept; those that
+    are computed are rounded outward, so that the set contains the exact one, and exceeds it by about 1e-12 of its size.
+    A set that is 1e11 times thinner than it is long, in units in which it is one wide along each axis, counts as flat;
     the hull of points in such a set is their affine hull to rounding. A set that sticks out by less than 1e-12 of its
     size from a half-space touches it.
 
-    The arrays are stored in scaled coordinates y, x = `centre` + `scale` y: `points`, shape (v, n), and rows (a, b) of
-    `facets`, a y <= b, shape (f, n + 1), and of `equations`, a y = b, shape (n - dimension, n + 1). Bit j of a row of
-    `incidence`, shape (v, words), is whether the vertex lies on facet j. `conflict` are half-spaces without a common
-    point.
+    The arrays are stored in scaled coordinates y, x = `centre` + `scale` y, with powers of two, which round nothing:
+    `points`, shape (v, n), and rows (a, b) of `facets`, a . y <= b, shape (f, n + 1), and of `equations`, a . y = b,
+    shape (n - dimension, n + 1). Bit j of a row of `incidence`, shape (v, words), is set if the vertex is on facet j.
 
-    An empty set has no vertices; `relaxation` is then the minimum relaxation of the constraints that made it empty,
-    their normals of unit length, with which a point satisfies them; 0 if it is not known. Operations on it give the
-    empty set; points such as its centroid do not exist, and an EmptyPolytopeError is raised.
-
-    All arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
+    Operations on the empty set give the empty set; points such as its centroid do not exist (EmptyPolytopeError). All
+    arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
     (ValueError). An UncertainHullError is raised if vertices and facets do not agree because of rounding.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
@@ -77,44 +71,33 @@ class Polytope(PolytopeArrays):
         return self.affine_map(matrix)
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
-        """Return {matrix x + offset} in R^m, with a matrix of shape (m, n), singular or not, and an offset of shape
-        (m,) or 0.
+        """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.
 
         Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull.
         """
         rows = finite_values("matrix", matrix, "m", self.space)
-        return self._mapped(rows, self._shift(offset, len(rows)), np.zeros(len(rows)))
-
-    def _mapped(self, rows: Floats, moved: Floats, errors: Floats) -> Polytope:
-        """Return {rows x + moved}, known to `errors`, shape (m,)."""
+        moved = self._shift(offset, len(rows))
         if self.is_empty:
-            return self.empty(len(rows), self.conflict if len(rows) == self.space else None)
+            return self.empty(len(rows))
         shift, rounded = dd.affine_image(self.centre[None], rows, moved)
-        points, centre, scale, errors = _image(self.points, rows * self.scale, shift[0], rounded + errors)
-        if len(rows) == self.dimension == self.space:
-            mapped = rows * self.scale / scale[:, None]
-            inverse = _inverse(mapped, _MAX_CONDITION)
-            if inverse is not None:
-                facets = np.empty_like(self.facets)
-                facets[:, :-1] = self.facets[:, :-1] @ inverse
-                # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding.
-                normals = np.ascontiguousarray(facets[:, :-1])
-                back, _ = dd.affine_image(normals, np.ascontiguousarray(mapped.T), np.zeros(self.space))
-                away = np.abs(back - self.facets[:, :-1]) @ np.abs(self.points).max(axis=0)
-                ends, low = dd.affine_image((shift - centre) / scale, normals, self.facets[:, -1])
-                facets[:, -1] = ends[0] + (low + away)
-                moved_set = replace(self, points=points, facets=facets, centre=centre, scale=scale)
-                return moved_set._around(errors)
-        return self._hull(points, centre, scale, FLAT, errors)
-
-    def _around(self, errors: Floats) -> Polytope:
-        """Return a set that contains this one, whose vertices are known to `errors`, shape (n,)."""
-        facets, points = self.facets.copy(), self.points
-        facets[:, -1] += np.abs(facets[:, :-1]) @ errors
-        facets *= np.ldexp(1.0, -np.frexp(np.abs(facets).max(axis=1))[1])[:, None]
-        if errors.any():
-            points = dd.push_out(points, facets, self.incidence, np.ones(len(points), bool), False, dd.TIP)
-        return replace(self, points=points, facets=facets)
+        matrix, shift = rows * self.scale, shift[0]
+        rough = self.points @ matrix.T
+        # Of a coordinate that is zero but for rounding, the errors stay small in the new coordinates.
+        minimum = 2.0**-10 * np.abs(matrix) @ np.abs(self.points).max(axis=0)
+        centre, scale = coordinates(rough.min(axis=0) + shift, rough.max(axis=0) + shift, minimum)
+        matrix, shift = matrix / scale[:, None], (shift - centre) / scale
+        points, errors = dd.affine_image(self.points, matrix, shift)
+        errors += rounded / scale
+        units = np.abs(matrix).max(axis=0) + 1e-300  # the condition does not depend on those of the columns
+        if not len(rows) == self.dimension == self.space or np.linalg.cond(matrix / units) > _MAX_CONDITION:
+            return self._hull(points, centre, scale, FLAT, errors)
+        normals = self.facets[:, :-1] @ np.linalg.inv(matrix)
+        # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding.
+        back, _ = dd.affine_image(normals, np.ascontiguousarray(matrix.T), np.zeros(self.space))
+        away = np.abs(back - self.facets[:, :-1]) @ np.abs(self.points).max(axis=0)
+        ends, low = dd.affine_image(shift[None], normals, self.facets[:, -1])
+        facets = np.column_stack([normals, ends[0] + (low + away)])
+        return replace(self, points=points, facets=facets, centre=centre, scale=scale)._around(errors)
 
     @staticmethod
     def _shift(offset: ArrayLike, space: int) -> Floats:
@@ -130,23 +113,15 @@ class Polytope(PolytopeArrays):
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m).
 
-        The image under the inverse of a regular matrix; otherwise from the facets, mapped. An UnboundedPolytopeError is
-        raised if the preimage is unbounded: the matrix has a null space.
+        A step of the double description for each facet. An UnboundedPolytopeError is raised if the preimage is
+        unbounded: the matrix has a null space.
         """
         factor, moved = finite_values("matrix", matrix, self.space, "m"), self._shift(offset, self.space)
         if self.is_empty:
             return self.empty(factor.shape[1])
-        inverse = _inverse(factor, 1.0 / FLAT) if len(factor) == factor.shape[1] else None
-        if inverse is not None:
-            product, _ = dd.affine_image(np.ascontiguousarray(inverse.T), factor, np.zeros(self.space))
-            reach = np.abs(self.vertices - moved).max(axis=0)
-            errors = 1.01 * np.abs(inverse) @ (np.abs(product.T - np.eye(self.space)) @ reach)
-            shift, rounded = dd.affine_image(-moved[None], inverse, np.zeros(self.space))
-            return self._mapped(inverse, shift[0], errors + rounded)
-        rows, limits = self._rows()
+        rows, limits = self._rows(moved)
         mapped, rounded = dd.affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
-        terms = np.abs(rows) @ np.abs(factor), np.abs(limits) + np.abs(rows) @ np.abs(moved)
-        found = self._of_rows(mapped, limits - rows @ moved, terms)
+        found = self._of_rows(mapped, limits)
         if found.is_empty or len(found.equations) or not (rounded.any() or moved.any()):
             return found
         return found.enlarged(2.0 * dd.EPS * np.abs(found.vertices).max(axis=0))
@@ -157,10 +132,9 @@ class Polytope(PolytopeArrays):
         if self.is_empty or other.is_empty:
             return self if self.is_empty else other
         pairs = [np.repeat(self.points, len(other.points), axis=0), np.tile(other.points, (len(self.points), 1))]
-        matrix = np.hstack([np.diag(self.scale), np.diag(other.scale)])
-        shift, rounded = dd.affine_image(self.centre[None], np.eye(self.space), other.centre)
-        points, centre, scale, errors = _image(np.hstack(pairs), matrix, shift[0], rounded)
-        return self._hull(points, centre, scale, FLAT, errors)
+        centre, scale = np.append(self.centre, other.centre), np.append(self.scale, other.scale)
+        product = replace(self, points=np.hstack(pairs), centre=centre, scale=scale)
+        return product.affine_map(np.tile(np.eye(self.space), 2))
 
     def add_segment(self, half: ArrayLike, *, hull: bool = True) -> Polytope:
         """Return the Minkowski sum with the segment from -half to +half, shape (n,).
@@ -176,23 +150,17 @@ class Polytope(PolytopeArrays):
             return self.minkowski_sum(self.from_vertices([-along, along]))
         along = along / self.scale
         row = np.append(along / np.abs(along).max(), 0.0)
-        heights, signs = dd.sides(self.facets, row, 1.0)
+        heights, signs = dd.sides(self.facets, row)
         ridges = dd.transposed(self.incidence, len(self.facets))
         new, common = dd.crossings(self.facets, ridges, heights, signs, self.space - 1, False)
         directed = np.abs(new[:, :-1]).max(axis=1, initial=0.0) > dd.ON  # not of two opposite facets
-        new, common = new[directed], common[directed]
-        on, on_new = dd.unpacked(self.incidence, len(signs)), dd.unpacked(common, len(self.points)).T
-        upper, lower = on[:, signs > 0].any(axis=1), on[:, signs < 0].any(axis=1)
-        incidence = np.vstack(
-            [
-                np.hstack([on[upper] & (signs >= 0), on_new[upper]]),
-                np.hstack([on[lower] & (signs <= 0), on_new[lower]]),
-            ]
-        )
-        ends = np.repeat([1.0, -1.0], [upper.sum(), lower.sum()])
-        starts = np.column_stack([np.vstack([self.points[upper], self.points[lower]]), ends])
+        facets, signs = np.vstack([self.facets, new[directed]]), np.append(signs, np.zeros(directed.sum()))
+        on = np.hstack([dd.unpacked(self.incidence, len(ridges)), dd.unpacked(common[directed], len(self.points)).T])
+        # A vertex moves to an end of the segment if it lies on a facet that faces this end.
+        moves = [(on[:, end * signs > 0].any(axis=1), end) for end in (1.0, -1.0)]
+        incidence = np.vstack([on[moved] & (end * signs >= 0) for moved, end in moves])
+        starts = np.vstack([np.column_stack([self.points[moved], np.full(moved.sum(), end)]) for moved, end in moves])
         points, errors = dd.affine_image(starts, np.column_stack([np.eye(self.space), along]), np.zeros(self.space))
-        facets = np.vstack([self.facets, new])
         facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1] @ along) + 2.0 * dd.EPS * np.abs(facets[:, -1])
         whole = replace(self, points=points, facets=facets, incidence=dd.packed(incidence))
         try:
@@ -213,11 +181,7 @@ class Polytope(PolytopeArrays):
         if self.is_empty or not margin.any():
             return self
         start = self if self.dimension == self.space else self._prism(margin)
-        facets = start.facets.copy()
-        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ (margin / start.scale)
-        most = dd.TIP + 32.0 * float((margin / start.scale).max())
-        points = dd.push_out(start.points, facets, start.incidence, np.ones(len(start.points), bool), False, most)
-        return replace(start, points=points, facets=facets)
+        return start._around(margin / start.scale)
 
     def _prism(self, margin: Floats) -> Polytope:
         """Return a flat set and its translations across the affine hull by a `margin`, shape (n,), or 3e-8 of its size.
@@ -237,11 +201,8 @@ class Polytope(PolytopeArrays):
             on = np.column_stack([np.vstack([on, on]), above, ~above])
         ends = np.stack([self.equations, -self.equations], axis=1)
         ends[:, :, -1] += heights[:, None]
-        sides = np.vstack([self.facets, ends.reshape(-1, self.space + 1)])
-        sides *= np.ldexp(1.0, -np.frexp(np.abs(sides).max(axis=1))[1])[:, None]
-        return replace(
-            self, points=points, facets=sides, equations=self.equations[:0], incidence=dd.packed(on), scale=scale
-        )
+        sides, none = np.vstack([self.facets, ends.reshape(-1, self.space + 1)]), self.equations[:0]
+        return replace(self, points=points, facets=sides, equations=none, incidence=dd.packed(on), scale=scale)
 
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
@@ -262,42 +223,25 @@ class Polytope(PolytopeArrays):
         widths = dd.supports(other.vertices, rows)
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
-        (lower, upper), (start, end) = self.bounding_box(), other.bounding_box()
-        terms = np.abs(rows), np.abs(limits) + np.abs(widths)
-        box = lower - start, np.maximum(upper - end, lower - start)
-        return self._of_rows(rows, less, terms, box, self.centre)
+        lower, upper = np.array(self.bounding_box()) - other.bounding_box()
+        found = self._in_box(rows, less, self.centre, (lower, np.maximum(lower, upper)))
+        return found or self._of_rows(rows, less, self.centre)
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
         sets = sorted((self, *map(self._need_other, others)), key=lambda one: (one.dimension, -len(one.facets)))
-        if sets[0].is_empty:
-            return sets[0]
         found = sets[0]
         for one in sets[1:]:
-            found = found._meet(one)
-            if found.is_empty:
-                rows, limits = zip(*(one.constraints() for one in sets), strict=True)
-                return self.empty(self.space, (np.vstack(rows), np.concatenate(limits)))
+            if not found.is_empty:
+                ends = np.array([found.bounding_box(), one.bounding_box()])
+                box = ends[:, 0].max(axis=0), ends[:, 1].min(axis=0)
+                found = found._with_rows(*one._rows(one.centre), one.centre, box)
         return found
-
-    def _meet(self, other: Polytope) -> Polytope:
-        """Return the intersection with one polytope; neither is empty."""
-        boxes = np.array([self.bounding_box(), other.bounding_box()])
-        lower, upper, widths = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0), boxes[0, 1] - boxes[0, 0]
-        if (SMALL * (upper - lower) < widths).any():
-            rows, limits = zip(*(one._rows(self.centre) for one in (self, other)), strict=True)
-            box = lower, np.maximum(lower, upper)
-            with suppress(UncertainHullError, UnboundedPolytopeError):
-                found = self._of_rows(np.vstack(rows), np.concatenate(limits), box=box, origin=self.centre)
-                if not found.is_empty:
-                    return found
-        # Sets that touch each other do so within the rounding of their own coordinates.
-        return self._with_rows(*other._rows(other.centre), other.centre)
 
     def convex_hull(self, *others: Polytope) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
         sets = [one for one in (self, *map(self._need_other, others)) if not one.is_empty]
-        return self._of_points(np.vstack([one.vertices for one in sets])) if sets else self
+        return self.from_vertices(np.vstack([one.vertices for one in sets])) if sets else self
 
     def cut(
         self,
@@ -325,13 +269,9 @@ class Polytope(PolytopeArrays):
             return self
         wider = slack_ulp * dd.EPS * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
         rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - minimum])
-        if np.isneginf(limits).any():
+        if np.isneginf(limits).any() or (minimum > most + 2.0 * wider).any():
             return self.empty(self.space)
-        limited = limits < np.inf
-        if (minimum > most + 2.0 * wider).any():
-            own, ends = self.constraints()
-            return self.empty(self.space, (np.vstack([own, rows[limited]]), np.append(ends, limits[limited])))
-        return self._with_rows(rows[limited], limits[limited])
+        return self._with_rows(rows[limits < np.inf], limits[limits < np.inf])
 
     def project(self, axes: ArrayLike) -> Polytope:
         """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
@@ -340,7 +280,7 @@ class Polytope(PolytopeArrays):
     def slice(self, axes: ArrayLike, values: ArrayLike) -> Polytope:
         """Return the set of the other coordinates where the coordinates `axes`, not all, have some `values`.
 
-        `axes` is an integer or a sequence of integers; `values` is a number, or an array with one for each of them.
+        `values` is a number, or an array with one for each of the axes.
         """
         numbers = axis_numbers(axes, self.space, self.space - 1)
         fixed = finite_values("values", values, *[len(numbers)] * min(np.ndim(values), 1))
@@ -351,28 +291,14 @@ class Polytope(PolytopeArrays):
         """Return a polytope with at most `cap` (>= 2n) facets that contains the set.
 
         It starts with the bounding box. Then it is cut by the facet with the greatest excess, relative to the width of
-        the set along its normal, until it has `cap` facets.
+        the set along its normal, until it has `cap` facets. A flat set becomes 3e-8 of its coordinates thick.
         """
         Limits(minimum=2 * self.space, whole=True).need("cap", cap)
         most = 10**9 if max_vertices is None else max_vertices
         if self.is_empty or (len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= most):
             return self
-        if self.dimension == self.space:
-            from infoset.geometry.polytope.reduction import reduced_outward
-
-            return reduced_outward(self, cap, most)
-        outer = self.from_box(*self.bounding_box())
-        rows, limits = self._rows()
-        widths = np.ptp(self.vertices @ rows.T, axis=0)
-        widths = np.maximum(widths, dd.EPS * np.abs(rows) @ np.abs(self.vertices).max(axis=0))
-        for _ in range(cap):
-            beyond = (outer.vertices @ rows.T).max(axis=0) - limits
-            worst = int((beyond / widths).argmax())
-            tighter = outer._with_rows(rows[worst : worst + 1], limits[worst : worst + 1])
-            if beyond[worst] <= 0.0 or len(tighter.facets) + 2 * len(tighter.equations) > cap:
-                break
-            outer = tighter
-        return outer
+        solid = self if self.dimension == self.space else self._prism(np.zeros(self.space))
+        return reduced_outward(solid, cap, most)
 
     def _need_other(self, other: Polytope) -> Polytope:
         """Return another polytope; it must be in the same space."""
@@ -383,10 +309,7 @@ class Polytope(PolytopeArrays):
     # Measures ---------------------------------------------------------------------------------------------------------
 
     def support_function(self, directions: ArrayLike) -> Floats:
-        """Return the maximum of direction . x, shape (...), for `directions` of shape (..., n); -inf for the empty set.
-
-        O(v n).
-        """
+        """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the empty set. O(v n)."""
         rows = finite_values("directions", directions, "...", self.space)
         return np.asarray((rows @ self.vertices.T).max(axis=-1, initial=-np.inf))
 
@@ -417,8 +340,8 @@ class Polytope(PolytopeArrays):
             return np.full(x.shape[:-1], np.inf)
         reach = (self.space + 2) * dd.EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
         over, apart = self._misfits
-        beyond = x @ self.normals.T - self.offsets - over - _bent(reach, self.normals)
-        away = np.abs(x @ self.across.T - self.levels) - apart - _bent(reach, self.across)
+        beyond = x @ self.normals.T - self.offsets - over - reach @ np.abs(self.normals).T
+        away = np.abs(x @ self.across.T - self.levels) - apart - reach @ np.abs(self.across).T
         return np.asarray(np.maximum(beyond.max(axis=-1, initial=-np.inf), away.max(axis=-1, initial=-np.inf)))
 
     def margin(self, points: ArrayLike) -> Floats:
@@ -429,17 +352,11 @@ class Polytope(PolytopeArrays):
         return -self.excess(points)
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether `points`, shape (..., n), are in the set, to rounding, or within a `tolerance` of its facets.
-
-        O(f n).
-        """
+        """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`excess`)."""
         return np.asarray(self.excess(points) <= not_negative("tolerance", tolerance))
 
     def is_subset(self, other: Polytope, tolerance: float = 0.0) -> bool:
-        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets.
-
-        O(v f n).
-        """
+        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
         return bool(self._need_other(other).contains(self.vertices, tolerance).all())
 
     def equals(self, other: Polytope, tolerance: float = 0.0) -> bool:
@@ -454,7 +371,7 @@ class Polytope(PolytopeArrays):
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
         if self.is_empty:
             return 0.0
-        # Along each column of the triangle of `_steps` the scaled coordinates are turned and stretched by its diagonal.
+        # Along each column of the triangle of `_steps` scaled coordinates are turned and stretched by its diagonal.
         stretch = np.prod(np.abs(np.diag(triangle_of(self._steps)[0]))) if self.dimension else 1.0
         return float(self._simplices[1].sum() * stretch / factorial(self.dimension))
 
@@ -487,7 +404,7 @@ class Polytope(PolytopeArrays):
     def chebyshev_centre(self) -> tuple[Floats, float]:
         """Return the centre, shape (n,), and the radius of a largest ball in the set, within its affine hull.
 
-        A linear program (HiGHS) in coordinates about the centre of the vertices.
+        A linear program (HiGHS).
         """
         middle = self.needed().vertices.mean(axis=0)
         if not self.dimension:
@@ -542,9 +459,7 @@ class Polytope(PolytopeArrays):
         return max((two.distance(vertex) for one, two in pairs for vertex in one.vertices), default=0.0)
 
     def plot(self, axes: Any = None, **style: Any) -> None:
-        """Fill a set of R^2 on matplotlib axes (default: the present ones), with the options of
-        `matplotlib.axes.Axes.fill`.
-        """
+        """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""
         self._of_plane()
         points = self.vertices - self.vertices.mean(axis=0) if len(self.vertices) else self.vertices
         order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
@@ -577,34 +492,3 @@ class Polytope(PolytopeArrays):
 
     def __le__(self, other: Polytope) -> bool:
         return self.is_subset(other) if isinstance(other, Polytope) else NotImplemented
-
-
-def _inverse(matrix: Floats, condition: float) -> Floats | None:
-    """Return the inverse of a square matrix; None if its condition is greater, whatever the units of its columns."""
-    units = np.abs(matrix).max(axis=0)
-    if not units.all():
-        return None
-    try:
-        inverse = np.linalg.inv(matrix / units)
-    except np.linalg.LinAlgError:
-        return None
-    sizes = np.abs(matrix / units).sum(axis=1).max() * np.abs(inverse).sum(axis=1).max()
-    return inverse / units[:, None] if sizes < condition else None
-
-
-def _image(points: Floats, matrix: Floats, shift: Floats, rounded: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return matrix y + shift of points, shape (k, m), in new coordinates, with their centre, scale and errors.
-
-    `rounded`, shape (m,), are errors of the shift.
-    """
-    rough = points @ matrix.T
-    reach = np.abs(matrix) @ np.abs(points).max(axis=0)
-    # Of a coordinate that is zero but for rounding, the errors stay small in the new coordinates.
-    centre, scale = coordinates(rough.min(axis=0) + shift, rough.max(axis=0) + shift, 2.0**-10 * reach)
-    image, errors = dd.affine_image(points, matrix / scale[:, None], (shift - centre) / scale)
-    return image, centre, scale, errors + rounded / scale
-
-
-def _bent(reach: Floats, rows: Floats) -> Floats:
-    """Return bounds of the rounding of scalar products of points and rows."""
-    return np.asarray(reach @ np.abs(rows).T)

@@ -77,7 +77,7 @@ def _cut_by_worst(
             break
         row = np.empty(n + 1)
         row[:n], row[n] = -facets[worst, :n], facets[worst, n]
-        cut, cut_bits = dd.insert(rays, bits, row, 1.0, 2 * n + count, n - 1, True)
+        cut, cut_bits = dd.insert(rays, bits, row, 2 * n + count, n - 1, True)
         if len(cut) > max_vertices or (2 * n + count >= cap and _sides(cut_bits, 2 * n + count + 1, n) > cap):
             break
         rays, bits = cut, cut_bits

@@ -30,10 +30,9 @@ ONLY_POLYGONS = {
 ONLY_POLYTOPES = {
     **dict.fromkeys(["normals", "offsets", "across", "levels"], "stored facets and affine hull; polygons compute them"),
     **dict.fromkeys(["space", "dimension"], "a polygon is in R^2, and its number of vertices shows its dimension"),
-    **dict.fromkeys(["relaxation", "needed"], "minimum relaxation of an empty set, known from linear programs"),
+    "needed": "the set itself, or an error: members of a batch that are empty are masked",
     "excess": "-margin; needed where no sign must change",
     **dict.fromkeys(["points", "facets", "equations", "incidence", "centre", "scale"], "arrays in scaled coordinates"),
-    "conflict": "half-spaces without a common point, for the relaxation",
     "separating_direction": "a witness; polygons decide exactly whether they meet",
     "enlarged": "outward by given errors; kernels of polygons do this at each step",
 }
