@@ -35,12 +35,13 @@ class LabelEnds:
         self._model, self._laws = model, section_laws(model)
         self.published_m: Floats = np.zeros(batch)
         self.left: Flags = np.zeros(batch, dtype=bool)
-        self._settled_m = np.zeros(batch)
         self._exists = np.zeros(batch, dtype=bool)
         # Without control, no later section counts.
         self._is_over = np.zeros(batch, dtype=bool)
-        # Labels, which sections count, and their misses: impulses move them until their range is zero.
-        self._moving: list[tuple[Floats, Flags, Floats]] = []
+        # Sections whose control has ended: engagement, label and misses. Impulses move them until their range is zero.
+        self._of = np.empty(0, dtype=np.int64)
+        self._labels_m = np.empty(0)
+        self._misses_m = np.empty((2, len(self._laws), 0))
 
     def ends_now(self, control_is_over: Flags) -> bool:
         """Return whether control ends now in an engagement where it had not ended before."""
@@ -48,18 +49,13 @@ class LabelEnds:
 
     def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
         """Move the labels that have left and have not arrived by impulses of shape (C, B), m/s."""
-        still = []
-        for labels, counts, misses in self._moving:
-            to_go_s = np.maximum(labels / self._model.closing_speed_m_s - time_s, 0.0)
-            if not (counts & (to_go_s > 0.0)).any():
-                self._settled_m = np.maximum(self._settled_m, self._reached_m(labels, counts, misses))
-                continue
-            impulse = np.where(where, impulse_m_s, 0.0)
-            doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
-            misses[0] -= (impulse + doubt)[..., None] * to_go_s
-            misses[1] -= (impulse - doubt)[..., None] * to_go_s
-            still.append((labels, counts, misses))
-        self._moving = still
+        impulse = np.where(where, impulse_m_s, 0.0)
+        if not self._of.size or not impulse.any():
+            return
+        doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
+        to_go_s = np.maximum(self._labels_m / self._model.closing_speed_m_s - time_s, 0.0)
+        self._misses_m[0] -= (impulse + doubt)[:, self._of] * to_go_s
+        self._misses_m[1] -= (impulse - doubt)[:, self._of] * to_go_s
 
     def end(self, left: Flags, living: Flags, control_is_over: Flags, labels_m: Floats, misses_m: Floats) -> None:
         """Add the sections whose control ends in this step.
@@ -81,7 +77,9 @@ class LabelEnds:
         self._is_over = self._is_over | control_is_over
         if counts.any():
             self._exists |= counts.any(axis=1)
-            self._moving.append((labels_m, counts, misses_m))
+            self._of = np.append(self._of, np.nonzero(counts)[0])
+            self._labels_m = np.append(self._labels_m, labels_m[counts])
+            self._misses_m = np.concatenate((self._misses_m, misses_m[:, :, counts]), axis=2)
 
     def any_state_miss_m(self, results: Results) -> Floats:
         """Return the maximum miss of a state that the set contained when control ended for its label, m, shape (B,).
@@ -91,12 +89,9 @@ class LabelEnds:
         """
         ended = self._exists & ~results.set_emptied
         of_truth = np.where(ended & ~results.truth_kept, 0.0, results.miss_m)
-        of_sections = np.maximum.reduce([self._settled_m, *(self._reached_m(*part) for part in self._moving)])
+        of_sections = np.zeros_like(self.published_m)
+        np.maximum.at(of_sections, self._of, _max(self._misses_m) * self._scale(self._labels_m))
         return np.maximum(np.where(ended, of_sections, 0.0), of_truth)
-
-    def _reached_m(self, labels: Floats, counts: Flags, misses: Floats) -> Floats:
-        """Return the maximum true miss of some sections of each engagement, m, shape (B,)."""
-        return np.asarray(np.where(counts, _max(misses) * self._scale(labels), 0.0).max(axis=1))
 
     def _scale(self, labels: Floats) -> Floats:
         """Return the maximum 1 + eta of a label: a length of the guaranteed model times 1 + eta is the true one.
@@ -111,5 +106,5 @@ class LabelEnds:
 
 
 def _max(misses: Floats) -> Floats:
-    """Return the maximum modulus of minimum and maximum misses of shape (2, C, B, S), shape (B, S)."""
+    """Return the maximum modulus of minimum and maximum misses of shape (2, C, ...), shape (...)."""
     return np.asarray(np.hypot.reduce(np.maximum(misses[1], -misses[0]), axis=0))
