@@ -12,8 +12,9 @@ from typing import Annotated
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.limits import POSITIVE, WHOLE, NotNegative, Part, Positive, check_fields
+from infoset.limits import POSITIVE, Limits, NotNegative, Part, Positive, check_fields
 
+_DELAY = Limits(minimum=0, maximum=100_000, whole=True)  # a flight has no more steps
 MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
 STEP_TOLERANCE = 1e-9
 """Part of a step by which a time may be after a step and still belong to it, for times that are rounded decimals."""
@@ -58,7 +59,7 @@ class Thruster:
     pointing_error_rad: Part = 0.0
     last_impulse_s: NotNegative | None = None
     impulses_s: Annotated[tuple[float, ...], POSITIVE] = ()
-    delay_steps: Annotated[int, WHOLE] = 0
+    delay_steps: Annotated[int, _DELAY] = 0
 
     def __post_init__(self) -> None:
         check_fields(self)
