@@ -65,7 +65,7 @@ MISTAKES = {
     "no such choice": (
         'noise = "random"',
         'noise = "rndom"',
-        "mine.toml: noise: must be 'random' or 'game', found \"rndom\"",
+        "mine.toml: noise: must be 'random', 'gaussian', 'correlated' or 'game', found \"rndom\"",
     ),
 }
 """Old and new text of a file, and the message."""

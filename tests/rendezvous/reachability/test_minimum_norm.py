@@ -173,7 +173,11 @@ def check(seed: int, *, precise_to: int = 0, members: bool = True) -> str:
         told += ", to forty digits"
     if members:
         for select in SELECTIONS:
-            assert float(optimal.excess(select(optimal))) < 1e-8
+            try:
+                controls = select(optimal)
+            except NoSolutionError:
+                return "refused"
+            assert float(optimal.excess(controls)) < 1e-8
         assert float(optimal.excess(samples(optimal, 2, np.random.default_rng(seed))).max()) < 1e-8
         optimal.ranges()
         minimum = min_periods(problem)
@@ -190,9 +194,10 @@ def test_a_model_that_amplifies_rounding_is_refused(paper: Paper) -> None:
 
 
 def test_random_problems() -> None:
-    # In problem 11, with thrust in a ball, the set is so thin that rounding decides whether a program is accepted.
-    told = Counter(check(seed) for seed in range(12, 24))
-    assert told["refused"] == 0
+    # In problem 11, with thrust in a ball, the set is so thin that rounding decides whether the solver reaches a gap of
+    # 1e-7 for the sum of the norms, or one of 2.6e-7, which is refused.
+    told = Counter(check(seed) for seed in range(24))
+    assert told["refused"] <= 1
     assert told["reached"] > 0
     assert told["missed"] > 3
 
