@@ -456,13 +456,13 @@ def _along(row: Floats, step: Floats) -> tuple[float, float]:
 
 
 @_kernels.allocation_free
-def _least_factor(facets: Floats, mine: Integers, needs: Floats, step: Floats, least: float) -> float:
-    """Return the minimum factor of a step, at least `least`, that moves a point by its needs across its facets."""
-    factor = least
+def _least_factor(facets: Floats, mine: Integers, needs: Floats, step: Floats) -> float:
+    """Return the minimum factor of a step away from the centre that moves a point by its needs across its facets."""
+    factor = 0.0
     for m in range(len(mine)):
         along, _ = _along(facets[mine[m]], step)
-        if needs[m] > factor * along:
-            factor = needs[m] / along if along > 0.0 else np.inf
+        if along > 0.0 and needs[m] > factor * along:
+            factor = needs[m] / along
     return factor
 
 
@@ -496,11 +496,11 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
     its outer side covers the set. A point that is exactly on its facets stays. The others move to the common point of n
     facets that are moved outward by rounding; to the outer sides of more than n facets, one after the other (Agmon and
-    Motzkin); those of a `flat` set move away from the centre. No point moves by more than `most`: at a sharp corner,
-    where rounding moves facets more than the vertex, the hull may lack the very tip.
+    Motzkin); and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves by more
+    than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
     v, n = points.shape
-    result, middle, step = points.copy(), np.zeros(n), np.empty(n)
+    result, middle, away, step = points.copy(), np.zeros(n), np.empty(n), np.empty(n)
     for i in range(v):
         for j in range(n):
             middle[j] += points[i, j] / v
@@ -519,16 +519,15 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                 needs[m] = 0.4 * attempt * EPS * terms - high  # rounding of coordinates
             if not inside:
                 break
-            radial = flat or count > n
             for j in range(n):
-                step[j] = points[i, j] - middle[j] if radial else 0.0
-            factor = _least_factor(facets, mine[:count], needs, step, 0.0)
-            if not flat and (not radial or factor * math.sqrt(_along(step, step)[0]) > _RADIAL):
-                step[:] = 0.0
+                away[j], step[j] = points[i, j] - middle[j], 0.0
+            factor = _least_factor(facets, mine[:count], needs, away)
+            if not flat and (count == n or factor * math.sqrt(_along(away, away)[0]) > _RADIAL):
                 if count == n:
                     for m in range(n):
                         table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
                     _solve(table, step)
+                rounding = 0.0
                 for _ in range(50):
                     done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
                     for m in range(count):
@@ -541,13 +540,16 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                             done = False
                     if done:
                         break
-                needs[:count] -= EPS * math.sqrt(_along(step, step)[0])
-                factor = _least_factor(facets, mine[:count], needs, step, 1.0)
+                for m in range(count):  # what is left, at sharp corners, away from the centre
+                    needs[m] -= _along(facets[mine[m]], step)[0] + rounding
+                factor = _least_factor(facets, mine[:count], needs, away)
+            for j in range(n):
+                step[j] += factor * away[j]
             length = math.sqrt(_along(step, step)[0])
             if length == 0.0 or moved >= most:
                 break
-            factor = min(factor, (most - moved) / length)
-            moved += factor * length
+            share = min(1.0, (most - moved) / length)
+            moved += share * length
             for j in range(n):
-                result[i, j] += factor * step[j]
+                result[i, j] += share * step[j]
     return result
