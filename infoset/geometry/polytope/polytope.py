@@ -154,7 +154,10 @@ class Polytope(PolytopeArrays):
         ridges = dd.transposed(self.incidence, len(self.facets))
         new, common = dd.crossings(self.facets, ridges, heights, signs, self.space - 1, False)
         directed = np.abs(new[:, :-1]).max(axis=1, initial=0.0) > dd.ON  # not of two opposite facets
-        facets, signs = np.vstack([self.facets, new[directed]]), np.append(signs, np.zeros(directed.sum()))
+        new = new[directed]
+        # Two facets that are nearly opposite give a facet in which rounding is large: it holds all vertices.
+        new[:, -1] = dd.supports(self.points, np.ascontiguousarray(new[:, :-1]))
+        facets, signs = np.vstack([self.facets, new]), np.append(signs, np.zeros(len(new)))
         on = np.hstack([dd.unpacked(self.incidence, len(ridges)), dd.unpacked(common[directed], len(self.points)).T])
         # A vertex moves to an end of the segment if it lies on a facet that faces this end.
         moves = [(on[:, end * signs > 0].any(axis=1), end) for end in (1.0, -1.0)]
