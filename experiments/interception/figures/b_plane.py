@@ -124,7 +124,7 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
         halves += [_BODY_SCALE * radius_m] * len(clouds)
     columns = min(_MAX_COLUMNS, len(clouds)) if len(clouds) > 1 else len(halves)
     rows = -(-len(halves) // columns)
-    figure, grid = subplots(35.0 + 68.0 * rows, rows, columns, width_mm=56.0 * columns + 22.0)
+    figure, grid = subplots(40.0 + 68.0 * rows, rows, columns, width_mm=56.0 * columns + 22.0)
     panels = first_panels(grid, len(halves))
     titles = []
     for place, (axes, each, half) in enumerate(zip(panels, itertools.cycle(clouds), halves, strict=False)):
