@@ -36,6 +36,31 @@ class EventLog(NamedTuple):
     elapsed: int
 
 
+class LastSight(NamedTuple):
+    """The last angle measurement of a history, and the impulses so far.
+
+    Parameters
+    ----------
+    known : bool
+        Whether an angle was measured. If not, the initial box bounds the angle.
+    alpha, across : float
+        The measured angles of this axis and of the other one, rad.
+    steps : int
+        Steps since the measurement.
+    fired : float
+        Sum of the magnitudes of all impulses, m/s.
+    """
+
+    known: bool
+    alpha: float
+    across: float
+    steps: int
+    fired: float
+
+
+NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0)
+
+
 class History:
     """Events of a batch of B engagements: the kinds are common to all of them, the values belong to one each.
 
@@ -52,6 +77,10 @@ class History:
         Whether the event applies to the engagement; a prediction applies to all.
     events, elapsed : int
         Number of events, and of the predictions among them.
+    sights : ndarray, shape (C, B, columns)
+        Fields of the last sight of each axis and engagement after the first `seen` events, for measured rates.
+    seen : int
+        Number of events before the latest measured rate. They are final: `retract` removes only the latest measurement.
     """
 
     def __init__(self, channels: int, batch: int) -> None:
@@ -61,6 +90,8 @@ class History:
         self.applies = np.zeros((ROOM_AT_START, batch), dtype=bool)
         self.events = 0
         self.elapsed = 0
+        self.sights = np.zeros((channels, batch, len(NO_SIGHT)))
+        self.seen = 0
         self._has_rates = False
         self._fired, self._summed = np.zeros(batch), 0
 

@@ -11,7 +11,7 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.chain_storage import Chains, copy_section, empty_sections, view_of, working_room
 from infoset.engine.chains import SectionView
-from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, WIDENING, EventLog, History
+from infoset.engine.history import ANGLE, IMPULSE, NO_SIGHT, PREDICTION, WIDENING, EventLog, History, LastSight
 from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
     ALIVE,
@@ -19,6 +19,7 @@ from infoset.engine.section_life import (
     measure_section,
     predict_section,
     shift_section,
+    sight_after,
     start_section,
     time_to_go,
     widen_section,
@@ -170,13 +171,14 @@ def replayed_section(past: Past, channel: int, row: int, label: float) -> Sectio
 
 
 class Replayed(NamedTuple):
-    """Part of a history that is replayed: its events, and the predictions among them."""
+    """Part of a history that is replayed: its events, the predictions among them, and the last sight after them."""
 
     events: int
     elapsed: int
+    sight: LastSight
 
 
-AT_START = Replayed(ZERO, ZERO)
+AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
 
 
 @allocation_free
@@ -195,7 +197,7 @@ def replay(
     kinds, applies, points = past.log.kinds, past.room.applies, past.room.points
     values, overlaps = past.room.values, past.room.overlaps[law.channel]
     own = values[law.channel]
-    first, elapsed = done
+    first, elapsed, sight = done
     middle, room = label, 0.0
     if errors is not None:
         window = new_window(min(label, past.nearest), max(label, past.farthest), law)
@@ -225,16 +227,17 @@ def replay(
         elif kinds[event] == WIDENING:
             widen_section(section, elapsed, law)
         elif errors is not None:
-            rate = Rate(own[event], errors[event])
+            rate = Rate(own[event], errors[event], sight)
             living, overlaps[event] = measure_rate_section(section, label, elapsed, rate, window, law, points)
             if not living:
                 return event, done
         if errors is not None:
+            sight = sight_after(sight, kinds[event], own[event], across, applies[event], law)
             window = window_after(window, kinds[event], own[event], across, errors[event], elapsed, law)
     if errors is not None:
         past.room.drifts[law.channel, 0] = window.turned
         past.room.drifts[law.channel, 1] = window.loose * half_time(window, law)
-    return ALIVE, Replayed(until, elapsed)
+    return ALIVE, Replayed(until, elapsed, sight)
 
 
 @allocation_free

@@ -18,6 +18,7 @@ from infoset._compile import ZERO, allocation_free, inlined
 from infoset.arrays import Floats
 from infoset.engine import chains
 from infoset.engine.chains import SectionView
+from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, LastSight
 from infoset.engine.section_law import SectionLaw
 
 CUT_SLACK = 16.0 * chains.EPSILON
@@ -182,6 +183,21 @@ def measure_section(
     lower, upper = slope_band(alpha, across, law.closing_speed * (law.step * elapsed), x, law)
     slack = CUT_SLACK * (label * (abs(alpha) + bound) + section.right.reach * (label / law.closing_speed))
     return chains.cut(section, x / law.closing_speed, x * lower - slack, x * upper + slack)
+
+
+@inlined
+def sight_after(
+    sight: LastSight, kind: int, value: float, other_value: float, applies: bool, law: SectionLaw
+) -> LastSight:
+    """Return the last sight after one more event of the history."""
+    known, alpha, across, steps, fired = sight
+    if kind == PREDICTION:
+        steps += 1
+    elif applies and kind == ANGLE:
+        known, alpha, across, steps = True, value, other_value, 0
+    elif applies and kind == IMPULSE:
+        fired += abs(value) + pointing_doubt(value, other_value, law)
+    return LastSight(known, alpha, across, steps, fired)
 
 
 @inlined

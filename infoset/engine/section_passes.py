@@ -12,8 +12,8 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chain_storage, chains
 from infoset.engine.chain_storage import Chains, view_of
 from infoset.engine.chains import SectionView
-from infoset.engine.history import EventLog
-from infoset.engine.section_law import Laws, law_of
+from infoset.engine.history import EventLog, LastSight
+from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
     ALIVE,
     CUT_SLACK,
@@ -28,6 +28,7 @@ from infoset.engine.section_life import (
     predict_section,
     range_of,
     shift_section,
+    sight_after,
     start_section,
     steepest_angles,
     summarise_section,
@@ -218,11 +219,37 @@ def step_all(
     return deaths
 
 
+@allocation_free
+def follow_sight(log: EventLog, done: int, b: int, sights: Floats, law: SectionLaw) -> LastSight:
+    """Return the last sight of an engagement along an axis.
+
+    `sights` contains the last sights after `done` events, shape (C, B, columns), and is updated.
+    """
+    c = law.channel
+    sight = LastSight(
+        sights[c, b, 0] != 0.0,
+        sights[c, b, 1],
+        sights[c, b, 2],
+        int(sights[c, b, 3]),
+        sights[c, b, 4],
+    )
+    for event in range(done, log.number):
+        values = log.values[event]
+        across, applies = across_of(values, b, law), log.applies[event, b]
+        sight = sight_after(sight, log.kinds[event], values[c, b], across, applies, law)
+    sights[c, b, 0] = 1.0 if sight.known else 0.0
+    sights[c, b, 1], sights[c, b, 2] = sight.alpha, sight.across
+    sights[c, b, 3], sights[c, b, 4] = sight.steps, sight.fired
+    return sight
+
+
 @entry
-def measure_rate_all(log: EventLog, error: float, sections: Sections, laws: Laws, points: Floats) -> int:
+def measure_rate_all(
+    log: EventLog, error: float, done: int, sights: Floats, sections: Sections, laws: Laws, points: Floats
+) -> int:
     """Cut the living sections by the rates of the latest event and summarise them; return how many became empty.
 
-    `error` is the error bound of the rates, rad/s.
+    `error` is the error bound of the rates, rad/s; `sights` has the last sights after `done` events and is updated.
     """
     deaths = 0
     slots, used = sections.slots, sections.used
@@ -231,7 +258,8 @@ def measure_rate_all(log: EventLog, error: float, sections: Sections, laws: Laws
     for b in range(len(used)):
         for channel in range(laws.shape[0]):
             law = law_of(laws, channel)
-            rate = Rate(omega[channel, b], error)
+            sight = follow_sight(log, done, b, sights, law)
+            rate = Rate(omega[channel, b], error, sight)
             for s in range(used[b]):
                 if not (active[b] and is_cut(sections, channel, event, b, s)):
                     continue

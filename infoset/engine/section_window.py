@@ -15,7 +15,7 @@ from infoset._compile import allocation_free, inlined
 from infoset.arrays import Floats
 from infoset.engine import chains
 from infoset.engine.chains import SectionView
-from infoset.engine.history import IMPULSE, PREDICTION, RATE
+from infoset.engine.history import IMPULSE, PREDICTION, RATE, LastSight
 from infoset.engine.section_law import SectionLaw
 from infoset.engine.section_life import CUT_SLACK, impulse_doubt, range_of, slope_band, time_to_go
 
@@ -45,10 +45,11 @@ class Window(NamedTuple):
 
 
 class Rate(NamedTuple):
-    """A measured rate of the line of sight along one axis and its error bound, rad/s."""
+    """A measured rate of the line of sight along one axis, its error bound, rad/s, and the last angle before it."""
 
     omega: float
     error: float
+    sight: LastSight
 
 
 @inlined
@@ -160,16 +161,25 @@ def rate_band(
     return lower + turn - room, upper + turn + room
 
 
-@inlined
-def max_slope(section: SectionView, elapsed: int, window: Window, law: SectionLaw) -> float:
-    """Return a bound of |z/x|: from the heights of the section of one label; in a window |Pi|/x + |V|/e."""
-    near = range_of(window.near, elapsed, law)
-    if near <= 0.0:
-        return np.inf
-    if window.near < window.far:
-        return window.most / near + window.fastest / law.closing_speed
-    minimum, maximum = chains.heights(section, near / law.closing_speed)
-    return max(abs(minimum), abs(maximum)) / near
+@allocation_free
+def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -> float:
+    """Return a bound of |z/x| in a window: from the last angle, or the box without one, and the motion since."""
+    e, travelled, ago = law.closing_speed, law.closing_speed * (law.step * elapsed), law.step * sight.steps
+    near, far = window.near - travelled, window.far - travelled
+    near_then, far_then = near + e * ago, far + e * ago
+    if sight.known:
+        lower, upper = slope_band(sight.alpha, sight.across, travelled - e * ago, near_then, law)
+        steepest = max(abs(lower), abs(upper))
+        if far > near:
+            lower, upper = slope_band(sight.alpha, sight.across, travelled - e * ago, far_then, law)
+            steepest = max(steepest, abs(lower), abs(upper))
+    else:
+        steepest = max(abs(law.z_min), abs(law.z_max)) / near_then
+    if sight.steps == 0:
+        return steepest
+    fastest = max(abs(law.vz_min), abs(law.vz_max)) + sight.fired * (1.0 + law.impulse_error)
+    fastest += law.disturbance * (law.step * elapsed)
+    return (steepest * far_then + fastest * ago) / near if near > 0.0 else np.inf
 
 
 @allocation_free
@@ -191,7 +201,7 @@ def measure_rate_section(
     if lower - slack <= lower_miss and upper_miss <= upper + slack:
         return True, min(upper_miss - lower, upper - lower_miss) + slack
     if law.exact_angles:
-        steepest = max_slope(section, elapsed, window, law)
+        steepest = max_slope(elapsed, rate.sight, window, law)
         lower, upper = rate_band(label, elapsed, rate, 1.0 + steepest * steepest, window, law)
     if chains.is_crowded(section):
         chains.reduce_outward(section, tau, points)

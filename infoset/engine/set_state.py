@@ -176,7 +176,11 @@ class SetState:
         self._catch_up()
         self._make_room(history.applies[history.events - 1])
         points = chain_storage.working_room()
-        return section_passes.measure_rate_all(history.log, error, self.sections, self.table, points)
+        deaths = section_passes.measure_rate_all(
+            history.log, error, history.seen, history.sights, self.sections, self.table, points
+        )
+        history.seen = history.events
+        return deaths
 
     def shift(self, active: Flags, impulse: Floats) -> None:
         """Shift the living sections and their summaries by impulses of shape (C, B), m/s."""

@@ -17,6 +17,7 @@ from guidance import NoiseKind, RandomNoise, Thruster, TieRule
 from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 from infoset.engine import section_window as windows
+from infoset.engine.history import LastSight
 from infoset.engine.section_law import BOUND_SLACK, SectionLaw, section_laws
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
@@ -130,16 +131,18 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
 ) -> None:  # fmt: skip
     """The measured rate of a motion in closed form admits its predicted miss, displaced by (13), for every window.
 
-    The impulse is given in the middle of the last `ago` steps.
+    The last angle was measured `ago` steps before the rate, or never: then the initial box stands for it.
     """
     error = 10.0**log_error
-    _, law = flat_law(error, rising)
+    model, law = flat_law(error, rising)
     e, step, elapsed = law.closing_speed, law.step, 60 if measured else ago
     label = 4.2e5 + 1.5e5 * place
     near, far = label - 8e4 * width * place, label + 8e4 * width * (1.0 - place)
-    # An impulse with an error, and a push all the way.
+    # The last angle, `ago` steps before; an impulse in the middle, with an error; a push all the way.
     x_then, executed = label - e * step * (elapsed - ago), impulse * (1.0 + 0.02 * angle_draw)
     z_then = slope * x_then
+    bound = model.angle_sensor.error_bound(x_then / math.cos(math.atan(slope)))
+    alpha = math.atan(slope) + angle_draw * bound
     fired_after = (ago // 2) * step if ago else 0.0
     time, acceleration = ago * step, push * law.disturbance
     v_now = v + acceleration * time - (executed if ago else 0.0)
@@ -149,13 +152,16 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     rate_error = 1e-9 * (1.0 + BOUND_SLACK)
     omega = omega_true + rate_draw * 1e-9
     size = abs(impulse) if ago else 0.0
+    sight = LastSight(measured, alpha, 0.0, ago, size)
     if abs(v) + size + law.disturbance * time > 300.0 or abs(z_then) > 1e4:
         return
     window = windows.Window(near, far, impulse, abs(push), 0.0, 0.0)
-    rate = windows.Rate(omega, rate_error)
+    rate = windows.Rate(omega, rate_error, sight)
+    steepest = kernels.max_slope(elapsed, sight, window, law)
+    assert abs(z / x) <= steepest * (1.0 + 1e-12)
 
     def rate_band(label: float, window: windows.Window) -> tuple[float, float]:
-        lower, upper = kernels.rate_band(label, elapsed, rate, 1.0 + (z / x) ** 2, window, law)
+        lower, upper = kernels.rate_band(label, elapsed, rate, 1.0 + steepest**2, window, law)
         return lower, upper
 
     lower, upper = rate_band(label, window)

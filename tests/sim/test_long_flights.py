@@ -72,8 +72,8 @@ def test_labels_of_a_long_flight_leave_in_groups(asteroid: Scenario, monkeypatch
     assert alone == grouped.guaranteed_miss_m.tolist()
 
 
-def test_sections_with_rates_equal_their_replays_after_a_retracted_angle(asteroid: Scenario) -> None:
-    """A contradicting angle is retracted and does not count."""
+def test_a_measured_rate_reads_the_events_since_the_previous_one(asteroid: Scenario) -> None:
+    """A contradicting angle is retracted and does not count; stored sections equal replays of the whole history."""
     information = InformationSet(asteroid.set_model, 2)
 
     def step(sets: InformationSet, alpha_rad: float) -> None:
@@ -89,3 +89,9 @@ def test_sections_with_rates_equal_their_replays_after_a_retracted_angle(asteroi
     for section in information.sections():
         replayed = information.section_at(section.label_m).polygons[0]
         np.testing.assert_array_equal(section.polygons[0].vertices, replayed.vertices)
+    twin = information.copy()
+    twin._state.history.values[: twin._state.history.seen] = np.nan
+    for sets in (information, twin):
+        step(sets, 1.5e-4)
+    for section, other in zip(information.sections(), twin.sections(), strict=True):
+        np.testing.assert_array_equal(section.polygons[0].vertices, other.polygons[0].vertices)
