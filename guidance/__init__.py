@@ -4,7 +4,7 @@ from guidance.estimate import Estimator, MissEstimate
 from guidance.game_noise import GameNoise
 from guidance.kalman import Kalman, KalmanBank
 from guidance.least_effort import LeastEffort
-from guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, NoiseSource, TieRule
+from guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, TieRule
 from guidance.patient import Patient
 from guidance.predictive import Predictive
 from guidance.proportional_navigation import ProportionalNavigation
@@ -27,7 +27,6 @@ __all__ = [
     "MeasurementNoise",
     "MissEstimate",
     "NoiseKind",
-    "NoiseSource",
     "Patient",
     "Predictive",
     "ProportionalNavigation",

@@ -10,7 +10,8 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from guidance import NoiseSource, Strategy
+from guidance import Strategy
+from guidance.noise import NoiseSource
 from infoset.limits import COUNT, WHOLE, Limits
 from sim.parallel import CampaignNoise, Task, simulate_tasks
 from sim.requirement import AnyRequirement

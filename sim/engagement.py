@@ -14,14 +14,13 @@ from guidance import (
     LineOfSight,
     MeasurementNoise,
     NoiseKind,
-    NoiseSource,
     RandomNoise,
     Situation,
     Strategy,
     make_strategy,
 )
 from guidance.gaussian_noise import gaussian_noise
-from guidance.noise import checked_measurements
+from guidance.noise import NoiseSource, checked_measurements
 from guidance.strategy import checked_impulses
 from guidance.thruster import MIN_FLOAT, modulus
 from infoset import BearingSensor, InformationSet, InformationSetView, PredictedMiss

@@ -16,7 +16,8 @@ from enum import Enum
 
 import numpy as np
 
-from guidance import NoiseKind, NoiseSource, Strategy
+from guidance import NoiseKind, Strategy
+from guidance.noise import NoiseSource
 from sim.engagement import Step
 from sim.results import Results, join
 from sim.scenario import Scenario

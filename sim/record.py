@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from guidance import NoiseSource, Strategy
+from guidance import Strategy
+from guidance.noise import NoiseSource
 from infoset import Section
 from infoset.arrays import Flags, Floats
 from infoset.limits import WHOLE

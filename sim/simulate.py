@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from guidance import NoiseSource, Strategy
+from guidance import Strategy
+from guidance.noise import NoiseSource
 from infoset.limits import WHOLE, shown
 from sim.draws import draw, max_number_of_steps
 from sim.engagement import Engagements, Step

@@ -15,8 +15,8 @@ from typing import Any
 
 from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
-from guidance import LineOfSight, MeasurementNoise, NoiseKind, NoiseSource, Situation, Strategy, strategy_names
-from guidance.noise import checked_measurements
+from guidance import LineOfSight, MeasurementNoise, NoiseKind, Situation, Strategy, strategy_names
+from guidance.noise import NoiseSource, checked_measurements
 from guidance.strategy import checked_impulses
 from infoset import InformationSetView
 from infoset.sensors import Measurements

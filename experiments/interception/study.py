@@ -10,8 +10,9 @@ import numpy as np
 
 from experiments.common.screen import some_runs
 from experiments.common.units import length_text
-from guidance import NoiseKind, NoiseSource, Strategy, TieRule
+from guidance import NoiseKind, Strategy, TieRule
 from guidance.gaussian_noise import share_cut
+from guidance.noise import NoiseSource
 from infoset import Model
 from infoset.arrays import Flags, Floats
 from sim import HitEstimate, MissCause, Results, Scenario, estimate_hits

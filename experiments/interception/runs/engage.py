@@ -22,7 +22,8 @@ from experiments.interception.runs.engagement_table import (
 from experiments.interception.runs.shared import need_finite, work_of
 from experiments.interception.scenario_file import scenario_with
 from experiments.interception.strategies import NOISES, chosen_noise, own_strategy
-from guidance import NoiseKind, NoiseSource
+from guidance import NoiseKind
+from guidance.noise import NoiseSource
 from guidance.thruster import modulus
 from sim import Record, fly_one
 
