@@ -167,20 +167,24 @@ class Member:
         smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES)
         return self if smaller is self.polytope else replace(self, polytope=smaller, reduced=True)
 
-    def _apply(self, operation: Callable[[Polytope], Polytope]) -> Member:
+    def _apply(
+        self, operation: Callable[[Polytope], Polytope], outer: Callable[[Polytope], Polytope] | None = None
+    ) -> Member:
         """Return the result of an operation; where rounding decides about facets, that of a larger set with fewer ones.
 
-        The last one is a box.
+        The last one is a box; `outer` is then an operation with a larger result, if there is one, that needs no hull.
         """
+        if self.max_facets is None:
+            return replace(self, polytope=operation(self.polytope))
         polytope = self.polytope
-        for few in (self.max_facets // 2, 0) if self.max_facets is not None else ():
+        for few in (self.max_facets // 2, 0):
             try:
                 return replace(
                     self, polytope=operation(polytope), reduced=self.reduced or polytope is not self.polytope
                 )
             except (UncertainHullError, UnboundedPolytopeError):
                 polytope = polytope.reduce_outward(max(few, 2 * polytope.space))
-        return replace(self, polytope=operation(polytope), reduced=self.max_facets is not None)
+        return replace(self, polytope=(outer or operation)(polytope), reduced=True)
 
     def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
         """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w.
@@ -195,7 +199,10 @@ class Member:
             for k, half in enumerate(disturbance.generators):
                 if k > 0 and len(shift) > 4:  # in many dimensions a sum has many facets
                     moved = moved.limited()
-                moved = moved._apply(methodcaller("add_segment", half, hull=self.max_facets is None))
+                moved = moved._apply(
+                    methodcaller("add_segment", half, hull=self.max_facets is None),
+                    methodcaller("enlarged", np.abs(half)),
+                )
         else:
             moved = moved._apply(methodcaller("minkowski_sum", polytope_of(disturbance)))
         if self.max_facets is None:
