@@ -55,3 +55,18 @@ def correctable_m(
     return np.asarray(
         thruster.max_impulse_m_s * (full * to_go_s - (sums_s[end] - sums_s[first])) + rest * (to_go_s - next_s)
     )
+
+
+def max_correctable_m(
+    times_s: Floats,
+    thruster: Thruster,
+    to_go_s: Floats,
+    first: Integers | int = 0,
+    budget: Floats | float | None = None,
+) -> Floats:
+    """Return `correctable_m` with the errors of execution in favour of the engine: it never corrects more.
+
+    The default budget is no limit.
+    """
+    limit = np.asarray(thruster.max_impulse_m_s * (len(times_s) + 1.0) if budget is None else budget)
+    return (1.0 + thruster.execution_error_relative) * correctable_m(times_s, thruster, limit, to_go_s, first)

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guidance.authority import correctable_m
-from infoset.arrays import Floats
+from guidance.authority import max_correctable_m
 from sim.closed_form import image_times_s, last_possible_miss_m
 from sim.draws import draw_starts
 from sim.scenario import MAX_STEPS, Scenario
@@ -60,26 +59,18 @@ def feasibility(scenario: Scenario) -> Feasibility | None:
     unguided_m = np.hypot.reduce(position_m[:, :-1] + velocity_m_s[:, :-1] * arrivals_s[:, None], axis=1)
     every = range(thruster.delay_steps, int(arrivals_s.max() / model.step_s) + 1)
     times_s = model.step_s * np.array(every if scenario.impulse_steps is None else scenario.impulse_steps, dtype=float)
-
-    def corrected_m(budget_m_s: float, to_go_s: Floats) -> Floats:
-        favour = 1.0 + thruster.execution_error_relative  # errors of all impulses that help
-        return favour * correctable_m(times_s, thruster, np.full_like(to_go_s, budget_m_s), to_go_s)
-
-    engine_m_s = thruster.max_impulse_m_s * (len(times_s) + 1)
-    radius_m = scenario.radius_m or 0.0
-    beyond = {
-        budget_m_s: float((unguided_m - corrected_m(budget_m_s, arrivals_s) > radius_m).mean())
-        for budget_m_s in (engine_m_s, thruster.budget_m_s)
-    }
-    nominal_s = np.array([arrival_s])
+    radius_m, to_go_s = scenario.radius_m or 0.0, np.append(arrivals_s, arrival_s)  # the last one is the nominal flight
+    by_engine, by_budget = (
+        max_correctable_m(times_s, thruster, to_go_s, budget=budget) for budget in (None, thruster.budget_m_s)
+    )
     return Feasibility(
         steps=int(arrival_s / model.step_s),
         images=len(image_times_s(scenario)),
         decisions=int((times_s < arrival_s).sum()),
         unguided_miss_m=float(unguided_m.max()),
-        engine_corrects_m=corrected_m(engine_m_s, nominal_s).item(),
-        budget_corrects_m=corrected_m(thruster.budget_m_s, nominal_s).item(),
-        beyond_engine=beyond[engine_m_s],
-        beyond_budget=beyond[thruster.budget_m_s],
+        engine_corrects_m=float(by_engine[-1]),
+        budget_corrects_m=float(by_budget[-1]),
+        beyond_engine=float((unguided_m - by_engine[:-1] > radius_m).mean()),
+        beyond_budget=float((unguided_m - by_budget[:-1] > radius_m).mean()),
         last_possible_miss_m=last_possible_miss_m(scenario),
     )

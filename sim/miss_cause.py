@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.authority import correctable_m
+from guidance.authority import max_correctable_m
 from guidance.thruster import modulus
 from infoset import PredictedMiss
 from infoset.arrays import Flags, Floats, Integers
@@ -66,7 +67,8 @@ class DecisionLog:
         In space the impulses of a flight reach a disc, so the modulus of M_i is compared with the authority, and the
         radius of the possible misses is that of the disc around their rectangle.
         """
-        steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + self._scenario.thruster.delay_steps
+        thruster = self._scenario.thruster
+        steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + thruster.delay_steps
         times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
         executed = _with_end(_rows(self._executed, lateral_miss_m.shape))
         changes = executed[np.minimum(steps, len(executed) - 1)]
@@ -80,19 +82,10 @@ class DecisionLog:
         return {
             "causes": tuple(causes),
             "unguided_miss_m": modulus(miss[0]),
-            "engine_corrects_m": self._corrects_m(times_s, arrival_s),
-            "budget_corrects_m": self._corrects_m(times_s, arrival_s, 0, self._scenario.thruster.budget_m_s),
+            "engine_corrects_m": max_correctable_m(times_s, thruster, arrival_s),
+            "budget_corrects_m": max_correctable_m(times_s, thruster, arrival_s, budget=thruster.budget_m_s),
             "last_possible_m": np.ma.MaskedArray(modulus(0.5 * (upper - lower)), mask=last < 0),
         }
-
-    def _corrects_m(
-        self, times_s: Floats, arrival_s: Floats, first: Integers | int = 0, budget: Floats | float | None = None
-    ) -> Floats:
-        """Return the authority of the impulses from index `first` on, m; None is without a budget."""
-        thruster = self._scenario.thruster
-        limit = np.asarray(thruster.max_impulse_m_s * (len(times_s) + 1.0) if budget is None else budget)
-        # What the engine cannot correct with the errors of its impulses in its favour, it never can.
-        return (1.0 + thruster.execution_error_relative) * correctable_m(times_s, thruster, limit, arrival_s, first)
 
     def _possible(self, rows: Integers, runs: Integers) -> tuple[Floats, Floats]:
         """Return the ends of the possible misses of runs, shape (C, n), at a decision of each; zeros without one."""
@@ -113,10 +106,11 @@ class DecisionLog:
         runs, radius_m, at = np.flatnonzero(missed), self._scenario.radius_m or 0.0, np.arange(miss.shape[2])
         budget = _rows([left for _, _, left, _ in self._decisions], missed.shape)[:, missed]
         sizes, decisions = modulus(miss.swapaxes(0, 1)), np.arange(len(times_s))[:, None]
-        possible = tracking & (sizes[:-1] - self._corrects_m(times_s, arrival_s, decisions, budget) <= radius_m)
+        corrects_m = partial(max_correctable_m, times_s, self._scenario.thruster, arrival_s)
+        possible = tracking & (sizes[:-1] - corrects_m(decisions, budget) <= radius_m)
         critical, last, exists = _last(possible), _last(tracking), possible.any(axis=0)
         then = np.minimum(critical + 1, len(times_s))
-        now_m, then_m = (self._corrects_m(times_s, arrival_s, first) for first in (critical, then))
+        now_m, then_m = corrects_m(critical), corrects_m(then)
         ends = [self._possible(rows, runs) for rows in (critical, last)]
         farthest_m = modulus(np.maximum(ends[0][1], -ends[0][0]))
         # More than the half-width of the possible misses if they exclude the true one.
@@ -127,10 +121,10 @@ class DecisionLog:
         # What the impulse that is best for all possible misses leaves beyond the later ones.
         beyond_m = np.maximum(unknown_m - np.where(critical < last, then_m, 0.0), farthest_m - now_m)
         by_budget = exists & (critical < last) & (sizes[then, at] - then_m <= radius_m)
-        within_m = self._corrects_m(times_s, arrival_s, 0, self._scenario.thruster.budget_m_s)
+        within_m = corrects_m(budget=self._scenario.thruster.budget_m_s)
         wide = ~exists | (beyond_m > radius_m)
         conditions = (
-            sizes[0] - self._corrects_m(times_s, arrival_s) > radius_m,
+            sizes[0] - corrects_m() > radius_m,
             by_budget | (sizes[0] - within_m > radius_m),
             wide & (~exists | (unknown_at_last_m > radius_m)),
             wide,
