@@ -208,4 +208,4 @@ def _spice_state(trajectory: Trajectory, body: str, folder: Path) -> Floats:
 
 
 def _absent(error: ModuleNotFoundError, what: str) -> InputError:
-    return InputError(f"{error.name} is not installed; {what} need the extra [{EXTRA}]: pip install infoset[{EXTRA}]")
+    return InputError(f"{error.name} is not installed: for {what}, install infoset with the extra [{EXTRA}]")

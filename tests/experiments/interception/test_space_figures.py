@@ -85,7 +85,9 @@ def test_ellipses_contain_their_share_of_the_runs_and_are_not_beyond_the_guarant
     for level in (0.5, 0.99):
         outline = ellipse(across, level)
         assert outline is not None
-        assert np.mean(Path(outline.T).contains_points(across)) == pytest.approx(level, abs=0.006)
+        centre = across.mean(axis=0)[:, None]
+        wider = centre + (1.0 + 2e-4) * (outline - centre)  # 180 chords are up to 1.5e-4 inside, and a point is on them
+        assert np.mean(Path(wider.T).contains_points(across)) == pytest.approx(level, abs=0.003)
         reach = float(np.hypot(*outline).max())
         assert ellipse(across, level, 0.99 * reach) is None
         assert ellipse(across, level, 1.01 * reach) is not None

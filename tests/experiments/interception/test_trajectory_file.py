@@ -214,7 +214,7 @@ def test_without_the_extra_it_is_named(infoset: Command, monkeypatch: pytest.Mon
         Path("states.toml").write_text(f"{first.split('[spacecraft]')[0]}[spacecraft]\n{source}\n[object]{rest}")
         message = infoset.refused("scenarios", "from-states", "states.toml", "--out", "-")
         assert f"{library} is not installed" in message
-        assert "pip install infoset[trajectory]" in message
+        assert "install infoset with the extra [trajectory]" in message
 
 
 def test_states_of_spice_kernels(tmp_path: Path) -> None:
