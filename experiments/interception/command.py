@@ -116,7 +116,8 @@ class Experiment(FileOptions):
         typer.Option(
             "--remedy",
             help="For each cause of misses, find the least maximum impulse or budget, the earliest cut-off and the "
-            "greatest errors of the angles without it, with the same random numbers.",
+            "greatest errors of the angles without it, with the same random numbers; and the hits of other runs "
+            "with this value.",
         ),
     ] = False
     csv: Csv = None

@@ -5,11 +5,10 @@ from __future__ import annotations
 import functools
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from experiments.common.input_file import changed
-from experiments.common.screen import some_runs
 from experiments.interception.runs.shared import Progress, simulate_all
 from experiments.interception.study import percent
 from sim import HitEstimate, MissCause, Results, Scenario
@@ -43,9 +42,10 @@ class Remedy:
     enough : float or None
         Value nearest to `now`, of three digits, at which it does not; None if no value up to `not_enough` is enough.
     hits : HitEstimate or None
-        Of all runs with `enough`.
+        Of as many other runs with `enough`: the value was chosen for the first ones, so their share of hits is no
+        estimate.
     missed : mapping of str to int
-        Their misses by cause.
+        Misses of these other runs by cause.
     """
 
     cause: MissCause
@@ -63,7 +63,7 @@ class Remedy:
         others = ", ".join(f"{name} {count}" for name, count in self.missed.items())
         return (
             f"remedy for {self.cause.value}: {self.key} = {self.enough:g} instead of {self.now:g} ({limit}); then "
-            f"{self.hits.hits} of {some_runs(self.hits.runs)} hit (95 % CI {percent(self.hits.lower)} to "
+            f"{self.hits.hits} of {self.hits.runs} other runs hit (95 % CI {percent(self.hits.lower)} to "
             f"{percent(self.hits.upper)}){f', missed by {others}' if others else ''}"
         )
 
@@ -89,11 +89,11 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
     now, not_enough = 1.0 if key == SCALE else values[key], None
 
     @functools.cache
-    def simulated(value: float) -> Results:
+    def simulated(value: float, runs: Sequence[int] = task.runs) -> Results:
         changes = {name: old * value / now for name, old in values.items()}
         flown = changed(scenario, changes, f"{scenario.name} with {key} = {value:g}")
         flight = replace(task, scenario=flown, guarantee=False, progress=None, observe=None)
-        parts = [task.runs[first::cores] for first in range(min(len(task.runs), cores))]
+        parts = [runs[first::cores] for first in range(min(len(runs), cores))]
         return join(simulate_all([replace(flight, runs=part) for part in parts]))
 
     enough: float | None
@@ -105,7 +105,8 @@ def _remedy(task: Task, results: Results, cause: MissCause, key: str) -> Remedy:
         not_enough, enough = _search(lambda value: cause in simulated(value).causes, now, factor)
         if enough is None:
             return Remedy(cause, key, now, not_enough, None)
-    then = simulated(enough)
+    next_run = max(task.runs) + 1
+    then = simulated(enough, range(next_run, next_run + len(task.runs)))
     left = {name: count for name, count in then.missed.items() if count and not name.endswith("_m")}
     return Remedy(cause, key, now, not_enough, enough, then.hits, left)
 

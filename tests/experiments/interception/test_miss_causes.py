@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,8 +33,8 @@ def weak(brief: Scenario, tmp_path: Path, infoset: Command) -> Scenario:
     return scenario
 
 
-def counts(scenario: Scenario, noise: NoiseKind) -> dict[str, int]:
-    causes = Counter(simulate(replace(scenario, noise=noise), RUNS, guarantee=False).causes)
+def counts(scenario: Scenario, noise: NoiseKind, runs: Sequence[int] = range(RUNS)) -> dict[str, int]:
+    causes = Counter(simulate(replace(scenario, noise=noise), runs, guarantee=False).causes)
     return {cause.value: causes[cause] for cause in MissCause}
 
 
@@ -56,9 +57,11 @@ def test_experiment_says_why_runs_miss_and_what_would_help(infoset: Command, wea
             if remedy["enough"] is None or remedy["key"] == "angle_sensor.scale":
                 continue
             remedies += 1
-            enough = counts(changed(weak, {remedy["key"]: remedy["enough"]}, "enough"), noise)
-            assert enough[remedy["cause"]] == 0
-            assert remedy["missed"] == {name: count for name, count in enough.items() if count}
+            enough = changed(weak, {remedy["key"]: remedy["enough"]}, "enough")
+            assert counts(enough, noise)[remedy["cause"]] == 0
+            others = counts(enough, noise, range(RUNS, 2 * RUNS))
+            assert remedy["missed"] == {name: count for name, count in others.items() if count}
+            assert remedy["hits"]["hits"] == RUNS - sum(others.values())
             less = 0.98 * remedy["enough"] if remedy["not_enough"] is None else remedy["not_enough"]
             assert counts(changed(weak, {remedy["key"]: less}, "less"), noise)[remedy["cause"]] > 0
             assert f"remedy for {remedy['cause']}: {remedy['key']} = {remedy['enough']:g} instead of" in out
