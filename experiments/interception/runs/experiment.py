@@ -136,8 +136,8 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
         ranging = "  + range sensor" if curve.range_sensor else ""
         table.add_row(ranging, "impulse, m/s", *map(number, summary(results.impulse_m_s).values()))
         if results.guaranteed_miss_m.count():
-            bound_m = summary(results.guaranteed_miss_m.compressed())["p50"]
-            table.add_row("", bound_name(scenario), "", number(bound_m))
+            bounds = summary(results.guaranteed_miss_m.compressed())
+            table.add_row("", bound_name(scenario), *map(number, bounds.values()))
     yield (
         f"{scenario.name}: quantiles of {some_runs(runs)} per curve; game noise with the tie rule {scenario.tie.value}"
     )
