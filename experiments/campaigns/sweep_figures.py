@@ -166,7 +166,7 @@ def _draw_decisions(axes: Axes, table: SweepTable, cells: pd.DataFrame) -> None:
     values = _grid(table, cells["required_value"])
     _write_numbers(axes, values, np.zeros(values.shape, dtype=bool), path_effects=HALO)
     if {Decision.MET.value, Decision.NOT_MET.value} <= set(cells["requirement"]):
-        _draw_zero(axes, table, cells, "limit_quantile", color=INK, label="limit by interpolation of the quantiles")
+        _draw_zero(axes, table, cells, "limit_quantile", color=INK, label="limit, interpolated between cells")
     if "closed_form_m" in cells:
         look = {"color": GUARANTEED, "linestyle": "--", "label": "closed form: worst errors, no later images"}
         _draw_zero(axes, table, cells, "closed_form_m", **look)

@@ -114,7 +114,7 @@ def _draw_moduli(axes: Axes, record: Record) -> None:
 
 
 def _draw_b_plane(axes: Axes, record: Record) -> None:
-    """Draw the B-plane of one engagement: the box of the last predicted misses, and the path of that of the truth."""
+    """Draw the B-plane: the box of possible misses at the last decision, and the path of the true predicted miss."""
     known = complete_steps(record)
     end = record.result.lateral_miss_m[0]
     guaranteed, radius = _guaranteed_m(record), record.scenario.radius_m
@@ -122,7 +122,8 @@ def _draw_b_plane(axes: Axes, record: Record) -> None:
     if len(known):
         y, z = record.predicted_miss_m[known[-1]]
         sizes.append(float(np.abs([y, z]).max()))
-        axes.add_patch(Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], label="last box of possible misses", **SET))
+        box = Rectangle((y[0], z[0]), y[1] - y[0], z[1] - z[0], label="possible misses at the last decision", **SET)
+        axes.add_patch(box)
     if radius is not None and radius <= RADIUS_SHOWN * max(sizes):
         sizes.append(radius)
     axes.plot(*true_predicted_misses(record).T, zorder=3.0, **_TRUE)
