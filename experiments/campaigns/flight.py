@@ -14,7 +14,7 @@ from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
 from experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
 from experiments.interception.scenario_file import feasibility_warnings, scenario_warnings, study_scenario
-from experiments.interception.strategies import OwnNoise, chosen_noise
+from experiments.interception.strategies import OwnNoise, chosen_noise, own_code_errors
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import MANIFEST, CampaignFolder, StorageError, need_free, read_manifest
 from sim.versions import VersionError
@@ -78,7 +78,8 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
 def campaign_errors(resume_hint: str = "") -> Iterator[None]:
     """Turn errors of a campaign into messages for the user, with a hint where it can be resumed."""
     try:
-        yield
+        with own_code_errors():
+            yield
     except KeyboardInterrupt:
         raise KeyboardInterrupt(resume_hint) from None
     except MemoryError as error:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
 from experiments.common.units import duration_text
 from experiments.interception.course import (
@@ -23,8 +21,9 @@ from experiments.interception.course import (
     record_titles,
     true_predicted_misses,
 )
+from experiments.interception.record_file import replayed
 from guidance.thruster import modulus
-from infoset import InformationSet, Section
+from infoset import Section
 from infoset.arrays import Flags, Floats, Integers
 from infoset.sensors import SENSORS
 from sim import Record
@@ -66,7 +65,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
     scenario = record.scenario
     thruster, model = scenario.thruster, scenario.set_model
     modulus_m_s = modulus(record.impulse_m_s.T)
-    stages = list(replayed(record, kept))
+    stages = [*stages_of(record, kept)]
     states: list[tuple[Section, ...]] = []
     numbers: list[tuple[int, int, int]] = []
     for previous, index in zip([-2, *kept], kept, strict=False):
@@ -175,9 +174,8 @@ def _omega_alpha(section: Section, axis: int) -> Floats:
     return np.stack([(v + section.closing_speed_m_s * alpha) / section.range_m, alpha], axis=1)
 
 
-@dataclass(frozen=True)
-class Stages:
-    """The sections of one step predicted from the step before, and after its measurement, equal to the recorded ones.
+class Stages(NamedTuple):
+    """The sections of one step predicted from the step before, and after its measurement.
 
     `miss_m` is the predicted-miss interval of each measured section, m, shape (C, sections, 2).
     """
@@ -187,44 +185,28 @@ class Stages:
     miss_m: Floats
 
 
-def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stages]:
-    """Yield the stages of each step of a record, computed again from its measurements.
+def stages_of(record: Record, kept: Collection[int]) -> Iterator[Stages]:
+    """Yield the stages of each step of a record, and the set predicted from the last step.
 
-    The last stages have an empty `measured`: the set predicted from the last step. With `kept`, the sections are those
-    of these steps and of the predictions from them; the other stages are empty. Raise `InputError` if the sets differ
-    from the recorded ones: another version of the library wrote the record.
+    The sections are those of the steps `kept` and of the predictions from them; the other stages are empty.
 
     Notes
     -----
     After the impulse k a section is the measured one with V reduced by k; after the prediction it is `before` of the
     next step. Two of the four stages are therefore enough. The cost is that of the steps of the set, a few ms.
     """
-    scenario = record.scenario
-    information = InformationSet(on_board_model(scenario))
-    wanted = set(range(record.steps) if kept is None else kept)
-    empty, seen = np.empty((len(information.axes), 0, 2)), {name: record.measures(name) for name in record.measured}
-    for number, recorded in enumerate(record.sections):
-        before = tuple(information.sections()) if {number - 1, number} & wanted else ()
-        values = {name: values[number, ..., None] for name, values in record.measured.items() if seen[name][number]}
-        for name, sensor in scenario.sensors.items():
-            if name in values:
-                sensor.cut(information, values, np.array([True]))
-        if number in wanted:
-            measured = tuple(information.sections())
-            if [section.label_m for section in measured] != [section.label_m for section in recorded]:
-                made = ", ".join(f"{name} {version}" for name, version in record.versions.items())
-                raise InputError(
-                    f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; it was "
-                    f"made with {made}: make it again with `infoset engage --record FILE.npz`"
-                )
+    wanted, empty = {*kept}, np.empty((len(record.scenario.set_model.axes), 0, 2))
+    before: tuple[Section, ...] = ()
+    for number, information in enumerate(replayed(record.scenario, record.measured, record.impulse_m_s)):
+        step, is_measured = divmod(number, 2)
+        if not is_measured:
+            before = tuple(information.sections()) if {step - 1, step} & wanted else ()
+        elif step in wanted:
             intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)[:, 0, information.living[0]]
-            yield Stages(before, measured, intervals)
+            yield Stages(before, tuple(information.sections()), intervals)
         else:
             yield Stages(before, (), empty)
-        information.shift(record.impulse_m_s[number, :, None])
-        information.drop_below_threshold()
-        information.predict()
-    yield Stages(tuple(information.sections()), (), empty)
+    yield Stages(before, (), empty)
 
 
 def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:

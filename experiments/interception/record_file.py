@@ -1,7 +1,7 @@
 """Records of engagements as `.npz` files: arrays without pickle, and a JSON header.
 
 The lateral axes of arrays are those of `SetModel.axes`, in their order. NaN is a value that is not known. The sets are
-flat: a section has a polygon for each lateral axis, and a polygon has the vertices between two offsets.
+not stored: they follow from the measurements and the impulses.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import io
 import json
 import os
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -23,10 +23,10 @@ from pydantic import Field
 from experiments.common.errors import InputError, on_a_screen
 from experiments.common.input_file import read_input
 from experiments.common.output import write_file
-from infoset import ConvexPolygons, Section
+from infoset import InformationSet
+from infoset.arrays import Floats
 from infoset.limits import MAXIMUM
-from infoset.sensors import SENSORS
-from infoset.set_queries import MIN_RANGE_M
+from infoset.sensors import SENSORS, Measurements
 from sim import Inconsistency, MissCause, Outcome, Record, Results, Scenario
 from sim.columns import columns_of
 from sim.gravity import on_board_model
@@ -72,11 +72,6 @@ MEMBERS = {
         else Member(("steps",), nullable=True, minimum=0.0)
         for name, kind in _MEASURED.items()
     },
-    "section_offsets": Member(("steps + 1",), "<i8"),
-    "section_label_m": Member(("sections",)),
-    "section_range_m": Member(("sections",), minimum=MIN_RANGE_M),
-    "vertex_offsets": Member(("polygons + 1",), "<i8"),
-    "vertices": Member(("vertices", 2)),
     **{
         name: Member((1, *_BY_AXIS.get(column.field, ())), nullable=column.nullable) for name, column in _RESULT.items()
     },
@@ -132,24 +127,22 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
 def load_record(path: str | os.PathLike[str]) -> Record:
     """Read the record of an engagement: equal, bit for bit, to the record that was written.
 
-    `InputError` if the file is not a record, or is damaged.
+    The sets are computed again; other versions of the packages may give other last digits. `InputError` if the file is
+    not a record, or is damaged.
     """
     file = Path(path)
     content = read_input(file, MAX_FILE_BYTES)
     try:
         arrays = _read_arrays(content)
         header = from_json(Header, json.loads(arrays["header"].tobytes()))
-        on_board_model(header.scenario)
-        _check(arrays, header.scenario.set_model.axes)
+        _check(arrays, len(header.scenario.set_model.axes))
         return _to_record(header, arrays)
-    except (ValueError, RecursionError) as error:
+    except (ValueError, ArithmeticError, RecursionError) as error:
         reason = on_a_screen(str(error)[:LONGEST_REASON])
     raise InputError(f"{file}: is not a readable record: {reason}; {REMEDY}")
 
 
 def _to_arrays(record: Record) -> Arrays:
-    sections = [section for step in record.sections for section in step]
-    polygons = [polygon.polygon() for section in sections for polygon in section.polygons]
     unknown = np.full((record.steps, len(record.scenario.set_model.axes)), np.nan)
     arrays: dict[str, Any] = {
         **{name: getattr(record, name) for name in _OF_STEPS},
@@ -157,11 +150,6 @@ def _to_arrays(record: Record) -> Arrays:
             name: record.measured.get(kind.name, unknown if kind.is_lateral else unknown[:, 0])
             for name, kind in _MEASURED.items()
         },
-        "section_offsets": np.cumsum([0, *map(len, record.sections)]),
-        "section_label_m": [section.label_m for section in sections],
-        "section_range_m": [section.range_m for section in sections],
-        "vertex_offsets": np.cumsum([0, *map(len, polygons)]),
-        "vertices": np.concatenate([np.empty((0, 2)), *polygons]),
         **{
             name: np.ma.filled(np.ma.asarray(getattr(record.result, column.field), float), np.nan)
             for name, column in _RESULT.items()
@@ -191,12 +179,10 @@ def _read_arrays(content: bytes) -> Arrays:
         raise ValueError(" ".join(str(error).split()) or type(error).__name__) from None
 
 
-def _check(arrays: Arrays, axes: Sequence[str]) -> None:
-    """Raise ValueError if arrays do not have their declared types, shapes and values, or offsets do not increase."""
-    steps, sections, vertices = (arrays[name].size for name in ("time_s", "section_label_m", "vertices"))
-    sizes: dict[str | int, int] = {"steps": steps, "axes": len(axes), "sections": sections, "vertices": vertices // 2}
-    sizes["axes + 1"] = len(axes) + 1
-    sizes |= {"steps + 1": steps + 1, "polygons + 1": len(axes) * sections + 1, "bytes": arrays["header"].size}
+def _check(arrays: Arrays, axes: int) -> None:
+    """Raise ValueError if arrays do not have their declared types, shapes and values."""
+    steps = arrays["time_s"].size
+    sizes: dict[str | int, int] = {"steps": steps, "axes": axes, "axes + 1": axes + 1, "bytes": arrays["header"].size}
     for name, member in MEMBERS.items():
         values, shape = arrays[name], tuple(sizes.get(size, size) for size in member.shape)
         if (values.dtype.str, values.shape) != (member.dtype, shape):
@@ -209,30 +195,30 @@ def _check(arrays: Arrays, axes: Sequence[str]) -> None:
         raise ValueError("time_s does not increase")
     if arrays["result_velocity_m_s"][0, -1] >= 0.0:
         raise ValueError("result_velocity_m_s does not approach")
-    for name, rows, min_rows in (("section_offsets", sections, 0), ("vertex_offsets", vertices // 2, 1)):
-        offsets = arrays[name]
-        is_within = ((offsets >= 0) & (offsets <= rows)).all()  # otherwise a difference may overflow
-        if offsets[0] != 0 or offsets[-1] != rows or not is_within or (np.diff(offsets) < min_rows).any():
-            raise ValueError(f"{name} does not increase from 0 to {rows}")
+
+
+def replayed(scenario: Scenario, measured: Measurements, impulse_m_s: Floats) -> Iterator[InformationSet]:
+    """Yield the set of an engagement before and after the measurement of each step, and predicted from the last step.
+
+    It is one object, which changes. It is computed from measurements and impulses, arrays as in `Record`, and equals
+    that of the engagement bit for bit if the versions of the packages are the same.
+    """
+    information = InformationSet(on_board_model(scenario), guarantee=False)
+    is_known = {name: ~np.isnan(values.reshape(len(values), -1)).any(axis=1) for name, values in measured.items()}
+    for step, impulse in enumerate(impulse_m_s):
+        yield information
+        values = {name: each[step, ..., None] for name, each in measured.items() if is_known[name][step]}
+        for name, sensor in scenario.sensors.items():
+            if name in values:
+                sensor.cut(information, values, np.array([True]))
+        yield information
+        information.shift(impulse[:, None])
+        information.drop_below_threshold()
+        information.predict()
+    yield information
 
 
 def _to_record(header: Header, arrays: Arrays) -> Record:
-    model = header.scenario.set_model
-    count = len(model.axes)
-    polygons = [
-        ConvexPolygons.unchecked(arrays["vertices"][start:end].copy(), np.asarray(end - start))
-        for start, end in pairwise(arrays["vertex_offsets"].tolist())
-    ]
-    places = zip(arrays["section_label_m"].tolist(), arrays["section_range_m"].tolist(), strict=True)
-    sections = [
-        Section(
-            label_m,
-            range_m,
-            model.closing_speed_m_s,
-            ConvexPolygons.stack(polygons[count * index : count * (index + 1)]),
-        )
-        for index, (label_m, range_m) in enumerate(places)
-    ]
     first = header.inconsistency
     if first is not None and not (0 <= first.step < len(arrays["time_s"]) and abs(first.label_m) <= MAXIMUM):
         raise ValueError("inconsistency is not at a step of the record")
@@ -241,11 +227,13 @@ def _to_record(header: Header, arrays: Arrays) -> Record:
         unknown = np.isnan(arrays[name])
         values: NDArray[Any] = np.where(unknown, 0.0, arrays[name]).astype(column.kind)
         fields[column.field] = np.ma.MaskedArray(values, mask=unknown) if column.nullable else values
-    result = Results(**fields, guarantees=model.is_guaranteed, b_plane_t_rad=header.scenario.b_plane_t_rad)
+    scenario = header.scenario
+    measured = {kind.name: arrays[name] for name, kind in _MEASURED.items() if kind.name in scenario.sensors}
+    after_measurements = islice(replayed(scenario, measured, arrays["impulse_m_s"]), 1, None, 2)
     known: dict[str, Any] = {name: getattr(header, name) for name in _OF_HEADER}
     return Record(
         **known | {name: arrays[name] for name in _OF_STEPS},
-        result=result,
-        measured={kind.name: arrays[name] for name, kind in _MEASURED.items() if kind.name in header.scenario.sensors},
-        sections=tuple(tuple(sections[start:end]) for start, end in pairwise(arrays["section_offsets"].tolist())),
+        result=Results(**fields, guarantees=scenario.set_model.is_guaranteed, b_plane_t_rad=scenario.b_plane_t_rad),
+        measured=measured,
+        sections=tuple(tuple(information.sections()) for information in after_measurements),
     )

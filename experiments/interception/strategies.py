@@ -6,20 +6,17 @@ import contextlib
 import hashlib
 import importlib
 import os
+import re
 import sys
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
-from guidance import LineOfSight, MeasurementNoise, NoiseKind, Situation, Strategy, strategy_names
-from guidance.noise import NoiseSource, checked_measurements
-from guidance.strategy import checked_impulses
-from infoset import InformationSetView
-from infoset.sensors import Measurements
+from guidance import MeasurementNoise, NoiseKind, Strategy, strategy_names
+from guidance.noise import NoiseSource
 from sim import Scenario
 from sim.scenario import strategy_name
 
@@ -82,125 +79,81 @@ def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
 def load_strategy(text: str, option: str = "--strategy", version: str | None = None) -> Strategy:
     """Import a file and return a strategy of one of its classes, from a text ``FILE.py:CLASS``.
 
-    The folder of the file is searched for the modules that it imports. The errors of its code are `InputError`s. The
-    strategy is pickled as this text with its version: another process imports the same file, or refuses it.
+    The folder of the file is searched for the modules that it imports. The strategy is pickled as this text with its
+    version: another process imports the same file, or refuses it.
     """
-    code = _load(text, option, ("start", "decide"), version)
-    with code.errors():
-        strategy: Strategy = _reporting(code)
+    kind, again = _load(text, option, ("start", "decide"), version)
+    kind.version, kind.__reduce__ = again[2], lambda _self: (load_strategy, again)
+    with own_code_errors():
+        strategy: Strategy = kind()
     return strategy
 
 
 def load_noise(text: str, option: str = "--noise", version: str | None = None) -> OwnNoise:
     """Import a file and return the noise of one of its classes, as `load_strategy` does."""
-    return OwnNoise(_load(text, option, ("measure",), version))
-
-
-@dataclass(frozen=True)
-class _Code:
-    """A class of a Python file, the value of an option, and the version of the file."""
-
-    kind: Any
-    file: Path
-    option: str
-    version: str
-
-    def errors(self) -> contextlib.AbstractContextManager[None]:
-        """Turn an exception of the code in the file into a message with its line."""
-        return _errors_of(self.file, self.option)
-
-    @property
-    def again(self) -> tuple[str, str, str]:
-        """Arguments that load the class in another process."""
-        return f"{self.file}:{self.kind.__name__}", self.option, self.version
-
-
-def _load(text: str, option: str, methods: tuple[str, ...], version: str | None) -> _Code:
-    name, _, class_name = text.rpartition(":")
-    file = Path(name).resolve()
-    if file.suffix != ".py" or not file.is_file():
-        raise InputError(f"{option}: {shown(text)} must be FILE.py:CLASS, with a file that exists; check the path")
-    with _errors_of(file, option):
-        if str(file.parent) not in sys.path:
-            sys.path.append(str(file.parent))
-        importlib.invalidate_caches()
-        module = importlib.import_module(file.stem)
-        if Path(module.__file__ or "").resolve() != file:
-            raise InputError(f"{option}: {file.name} has the name of another Python module; rename the file")
-        # Kept by the module: the file may change after its import.
-        digest = vars(module).setdefault("_sha256_at_import", hashlib.sha256(file.read_bytes()).hexdigest())
-        kind = vars(module).get(class_name)
-        if not (isinstance(kind, type) and all(hasattr(kind, method) for method in methods)):
-            needed = f"method{'s' if len(methods) > 1 else ''} {' and '.join(methods)}"
-            raise InputError(f"{option}: {name} has no class {shown(class_name)} with the {needed}; check the name")
-    code = _Code(kind, file, option, f"{file.name}:{kind.__name__} sha256:{digest[:16]}")
-    if version not in (None, code.version):
-        raise InputError(f"{option}: {text} has changed since the command started; run it again")
-    return code
-
-
-def _reporting(code: _Code) -> Any:
-    """Return an object of a subclass, whose methods raise `InputError` with the line of an error in the file."""
-    kind: Any = code.kind
-
-    class Reporting(kind):  # type: ignore[misc]
-        version = code.version
-
-        def __reduce__(self) -> tuple[Any, ...]:
-            return load_strategy, code.again
-
-        def start(self, shape: tuple[int, int]) -> Any:
-            with code.errors():
-                return super().start(shape)
-
-        def decide(self, situation: Situation, state: Any) -> Any:
-            with code.errors():
-                wanted = super().decide(situation, state)
-                return checked_impulses(wanted, situation, situation.predicted_miss.exists, self)
-
-    Reporting.__module__, Reporting.__qualname__, Reporting.__name__ = kind.__module__, kind.__qualname__, kind.__name__
-    return Reporting()
+    return OwnNoise(*_load(text, option, ("measure",), version))
 
 
 class OwnNoise:
     """The noise of a Python file: it makes an object of its class for each batch of runs."""
 
-    def __init__(self, code: _Code) -> None:
-        self._code = code
-        self.version, self.name = code.version, f"{code.kind.__module__}.{code.kind.__qualname__}"
+    def __init__(self, kind: Any, again: tuple[str, str, str]) -> None:
+        self._kind, self._again = kind, again
+        self.version, self.name = again[2], f"{kind.__module__}.{kind.__qualname__}"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return load_noise, self._code.again
+        return load_noise, self._again
 
     def __call__(self) -> MeasurementNoise:
         """Return the noise of a batch."""
-        with self._code.errors():
-            return _ReportingNoise(self._code.kind(), self._code)
+        noise: MeasurementNoise = self._kind()
+        return noise
 
 
-@dataclass(frozen=True)
-class _ReportingNoise:
-    """A noise of a batch, whose method raises `InputError` with the line of an error in the file."""
+_LOADED: dict[tuple[Path, str], str] = {}
+"""The options that named the loaded classes, by file and name."""
 
-    noise: Any
-    code: _Code
 
-    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
-        with self.code.errors():
-            return checked_measurements(self.noise.measure(sight, predicted), sight, self.noise)
+def _load(text: str, option: str, methods: tuple[str, ...], version: str | None) -> tuple[Any, tuple[str, str, str]]:
+    """Return the class of a text ``FILE.py:CLASS``, and text, option and version that load it in another process."""
+    name, _, class_name = text.rpartition(":")
+    file = Path(name).resolve()
+    if file.suffix != ".py" or not file.is_file():
+        raise InputError(f"{option}: {shown(text)} must be FILE.py:CLASS, with a file that exists; check the path")
+    _LOADED.pop((file, class_name), None)  # the last one is looked at first
+    _LOADED[file, class_name] = option
+    with own_code_errors():
+        if str(file.parent) not in sys.path:
+            sys.path.append(str(file.parent))
+        importlib.invalidate_caches()
+        module = importlib.import_module(file.stem)
+    if Path(module.__file__ or "").resolve() != file:
+        raise InputError(f"{option}: {file.name} has the name of another Python module; rename the file")
+    # Kept by the module: the file may change after its import.
+    digest = vars(module).setdefault("_sha256_at_import", hashlib.sha256(file.read_bytes()).hexdigest())
+    kind = vars(module).get(class_name)
+    if not (isinstance(kind, type) and all(hasattr(kind, method) for method in methods)):
+        needed = f"method{'s' if len(methods) > 1 else ''} {' and '.join(methods)}"
+        raise InputError(f"{option}: {name} has no class {shown(class_name)} with the {needed}; check the name")
+    found = f"{file.name}:{class_name} sha256:{digest[:16]}"
+    if version not in (None, found):
+        raise InputError(f"{option}: {text} has changed since the command started; run it again")
+    return kind, (f"{file}:{class_name}", option, found)
 
 
 @contextlib.contextmanager
-def _errors_of(file: Path, option: str) -> Iterator[None]:
-    """Turn an exception of the code in a file into a message with its line."""
+def own_code_errors() -> Iterator[None]:
+    """Turn an exception of the code in a loaded file, or about what it returned, into a message with its line."""
     try:
         yield
-    except (InputError, MemoryError):
-        raise
     except (Exception, SystemExit) as error:
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == file]
-        line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-        where = "" if line is None else f", line {line}"
-        raise InputError(
-            f"{option}: {os.path.relpath(file)}{where}: {type(error).__name__}: {error}; correct the file"
-        ) from None
+        trace = "".join(traceback.format_exception(error))  # also that of another process
+        for (file, name), option in reversed(_LOADED.items()):
+            lines = re.findall(rf'File "{re.escape(str(file))}", line (\d+)', trace)
+            # Without a line: the class needs arguments, or returned a value that `sim` refuses.
+            if lines or re.match(rf"((strategy|noise) )?{name}\b", str(error)):
+                where = f", line {lines[-1]}" if lines else ""
+                raise InputError(
+                    f"{option}: {os.path.relpath(file)}{where}: {type(error).__name__}: {error}; correct the file"
+                ) from None
+        raise

@@ -15,6 +15,7 @@ from experiments.common.input_file import to_toml
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import NOT_FINITE, BeginProgress, progress_bar, say_warnings, some_runs
 from experiments.interception.scenario_file import feasibility_warnings, scenario_warnings
+from experiments.interception.strategies import own_code_errors
 from experiments.interception.study import set_counts
 from guidance import Strategy
 from sim import Results, Scenario
@@ -85,7 +86,7 @@ def work_of(
     by option.
     """
     wanted = ("scenario.toml", "results.json", *names)
-    with output_of(options, wanted, files) as written, progress_bar(options.quiet) as begin:
+    with own_code_errors(), output_of(options, wanted, files) as written, progress_bar(options.quiet) as begin:
         warnings = scenario_warnings(scenario) + feasibility_warnings(scenario)
         say_warnings(warnings, options.quiet, notes)
         yield Work(scenario, warnings, written, begin, perf_counter())
