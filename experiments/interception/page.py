@@ -24,16 +24,12 @@ from experiments.interception.course import (
 from experiments.interception.record_file import replayed
 from guidance.thruster import modulus
 from infoset import Section
-from infoset.arrays import Flags, Floats, Integers
+from infoset.arrays import Flags, Floats
 from infoset.sensors import SENSORS
 from sim import Record
 from sim.gravity import on_board_model
 
 MAX_RECORDS = 2
-TOLERANCE = 5e-4
-"""Tolerance of outlines in a page of a long flight, as a part of their box: about 0.2 pixels on a screen."""
-_PASSES = (1, 0) * 4
-_FEWEST_VERTICES = 5
 STEPS_OF_A_BOX = 65535
 """Steps of the vertex grid across the box of a polygon: about 0.01 pixels on a screen."""
 
@@ -74,6 +70,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         states += [stages[index].measured, stages[index + 1].before]
         numbers.append((len(states) - 3, len(states) - 2, len(states) - 1))
     sections = [section for state in states for section in state]
+    outlines = [section.omega_alpha for section in sections]
     thinned = f"; the page has {len(kept)} of {record.steps} steps" if len(kept) < record.steps else ""
     fired = np.flatnonzero(modulus_m_s)
     return {
@@ -116,9 +113,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
                 "fired_m_s": record.impulse_m_s[fired, number].tolist(),
                 "outlines": {
                     "predicted_miss_m": _packed(np.concatenate([stages[k].miss_m[number] for k in kept]), "<f8"),
-                    **packed_outlines(
-                        [_omega_alpha(section, number) for section in sections], TOLERANCE if thinned else 0.0
-                    ),
+                    **packed_outlines([outline[number].polygon() for outline in outlines]),
                 },
             }
             for number, axis in enumerate(model.axes)
@@ -167,13 +162,6 @@ def _known(values: Floats) -> list[Any]:
     return [value if is_known else None for value, is_known in zip(values.tolist(), known, strict=True)]
 
 
-def _omega_alpha(section: Section, axis: int) -> Floats:
-    """Vertices of a section in (omega, alpha), as `Section.omega_alpha` but without its checks."""
-    v, z = section.polygons[axis].polygon().T
-    alpha = z / section.range_m
-    return np.stack([(v + section.closing_speed_m_s * alpha) / section.range_m, alpha], axis=1)
-
-
 class Stages(NamedTuple):
     """The sections of one step predicted from the step before, and after its measurement.
 
@@ -209,11 +197,10 @@ def stages_of(record: Record, kept: Collection[int]) -> Iterator[Stages]:
     yield Stages(before, (), empty)
 
 
-def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:
+def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:
     """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX` across the box.
 
-    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum. Vertices are left out
-    that are nearer than `tolerance`, a part of the box, to the line through their neighbours.
+    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
     if not len(counts):
@@ -223,31 +210,11 @@ def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[
     minimum, maximum = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
     width = np.where(maximum > minimum, maximum - minimum, 1.0)
     share = (points - np.repeat(minimum, counts, axis=0)) / np.repeat(width, counts, axis=0)
-    if tolerance > 0.0:
-        share, counts = _simplified(share, counts, tolerance)
     return {
         "boxes": _packed(np.concatenate([minimum, maximum], axis=1), "<f8"),
         "counts": _packed(counts, "<u4"),
         "vertices": _packed(np.rint(share * STEPS_OF_A_BOX), "<u2"),
     }
-
-
-def _simplified(points: Floats, counts: Integers, tolerance: float) -> tuple[Floats, Integers]:
-    """Return outlines without the vertices near the line through their neighbours, and their numbers of vertices.
-
-    Every second vertex is looked at in each pass, so that neighbours are not removed at once.
-    """
-    for parity in _PASSES:
-        ends = np.cumsum(counts)
-        first, size = np.repeat(ends - counts, counts), np.repeat(counts, counts)
-        number = np.arange(len(points)) - first
-        before, after = (points[first + (number + step) % size] for step in (-1, 1))
-        chord = after - before
-        area = np.abs(chord[:, 0] * (points - before)[:, 1] - chord[:, 1] * (points - before)[:, 0])
-        is_near = area < tolerance * np.hypot(*chord.T)
-        kept = ~is_near | (number % 2 != parity) | (number == 0) | (size < _FEWEST_VERTICES)
-        points, counts = points[kept], np.add.reduceat(kept, ends - counts, dtype=np.int64)
-    return points, counts
 
 
 def _packed(values: ArrayLike, kind: str) -> str:

@@ -204,7 +204,9 @@ def replayed(scenario: Scenario, measured: Measurements, impulse_m_s: Floats) ->
     that of the engagement bit for bit if the versions of the packages are the same.
     """
     information = InformationSet(on_board_model(scenario), guarantee=False)
-    is_known = {name: ~np.isnan(values.reshape(len(values), -1)).any(axis=1) for name, values in measured.items()}
+    is_known = {
+        name: np.asarray(~np.isnan(values.reshape(len(values), -1)).any(axis=1)) for name, values in measured.items()
+    }
     for step, impulse in enumerate(impulse_m_s):
         yield information
         values = {name: each[step, ..., None] for name, each in measured.items() if is_known[name][step]}
