@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from experiments.common.options import Csv, FileOptions, Json, Overwrite, Quiet, Seed, Settings
-from experiments.interception.command import MAX_RUNS, RangeSensor, ScenarioName, StrategyName, StudyModel, TieName
+from experiments.interception.command import MAX_RUNS, RangeSensor, ScenarioName, StrategyName, StudyModel
 
 MAX_WORKERS = 1024
 MAX_AT_ONCE = 1_000_000
@@ -55,7 +55,6 @@ class Flight:
     seed: Seed = 0
     strategy: StrategyName = None
     model: StudyModel = None
-    tie: TieName = None
     range_sensor: RangeSensor = None
     json: Json = None
     overwrite: Overwrite = False
@@ -163,7 +162,6 @@ class Sweep(Flight):
     guarantee: Annotated[
         bool, typer.Option("--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed.")
     ] = False
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a sweep of more than a million runs.")] = False
 
 
 @dataclass(frozen=True)

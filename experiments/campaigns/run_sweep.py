@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
-import typer
-
 from experiments.campaigns.command import Sweep as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
@@ -17,10 +13,7 @@ from experiments.common.output import output_of, to_json
 from experiments.common.screen import say, show
 from experiments.interception.strategies import own_strategy
 from sim import Campaign
-from sim.storage import need_free
 
-ASK_FROM = 1_000_000
-"""Number of engagements above which the command asks before it starts a sweep."""
 MAX_RUNS_A_CELL = 2000
 """Default limit of the runs of a cell that is undecided."""
 
@@ -54,9 +47,6 @@ def run(options: Options) -> None:
             max_runs=_max_runs(options),
             require=required,
         )
-        need_free(options.out, resume=options.resume)
-        if not options.yes:
-            _ask(swept)
         flown = fly(swept, options, notes)
         report = SweepReport(flown.folder, sweep_table(flown.folder, required, shown), shown)
         summary = to_json(report.to_json(flown.elapsed_s))
@@ -80,16 +70,3 @@ def _max_runs(options: Options) -> int | None:
             f"--max-runs: must be at least --runs, {options.runs}, found {options.max_runs}; give a greater number"
         )
     return max(MAX_RUNS_A_CELL, options.runs) if options.max_runs is None else options.max_runs
-
-
-def _ask(swept: Campaign) -> None:
-    """Ask the user to confirm a long sweep; without a terminal, refuse it."""
-    if swept.engagements <= ASK_FROM:
-        return
-    cells = f"{len(swept.cells)} cells of {swept.cell_runs} runs"
-    question = f"{cells} are {swept.engagements} engagements, more than a million"
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        fewer = "--max-runs" if swept.until else "--runs"
-        raise InputError(f"{question}; give --yes to start the sweep, or fewer {fewer} or values")
-    if not typer.confirm(f"{question}. Continue?", err=True):
-        raise InputError("the sweep was not started; give fewer --runs or values")

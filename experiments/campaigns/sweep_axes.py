@@ -9,7 +9,8 @@ import itertools
 import math
 import re
 from collections.abc import Sequence
-from decimal import Context, Decimal
+
+import numpy as np
 
 from experiments.common.errors import InputError, input_errors, shown
 from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
@@ -23,8 +24,6 @@ SCALE = "scale"
 """Name, after the table of a sensor, of the factor of its error bounds."""
 _NUMBER = r"([+-]?(?:[0-9]{1,20}\.?[0-9]{0,20}|\.[0-9]{1,20})(?:[eE][+-]?[0-9]{1,4})?)"
 _RANGE = re.compile(rf"(log:)?\s*{_NUMBER}\s*:\s*{_NUMBER}\s*:\s*([0-9]{{1,9}})")
-_PLACES = Context(prec=12)
-"""Values between the ends are rounded to 12 digits."""
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
@@ -99,31 +98,22 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
             f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT or KEY=log:FROM:TO:COUNT; for example "
             "--vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
         )
-    is_log, first, last, count = bool(match[1]), Decimal(match[2]), Decimal(match[3]), int(match[4])
-    if first >= last or not 2 <= count <= MAX_VALUES:
+    is_log, first, last, count = bool(match[1]), float(match[2]), float(match[3]), int(match[4])
+    if not first < last < math.inf or not 2 <= count <= MAX_VALUES:
         raise InputError(
             f"--vary: {keys[0]}: must go from a smaller to a greater value, with a count from 2 to {MAX_VALUES}, found "
             f"{shown(written)}"
         )
     if first <= 0 and (is_log or any(key in factors for key in keys)):
         raise InputError(f"--vary: {keys[0]}: factors and logarithmic values must be greater than 0, found {match[2]}")
-    values = _spaced(first, last, count, is_log=is_log)
+    between = (np.geomspace if is_log else np.linspace)(first, last, count)[1:-1]
+    values = [first, *(float(f"{value:.12g}") for value in between), last]
     if any(numeric_key(Scenario, key) is int for key in keys):
-        values = [Decimal(round(value)) for value in values]
+        values = [float(round(value)) for value in values]
     if len(set(values)) < count:
-        raise InputError(f"--vary: {keys[0]}: {count} values from {first} to {last} are not all different; give fewer")
+        raise InputError(f"--vary: {keys[0]}: {count} values in {shown(written)} are not all different; give fewer")
     with input_errors("--vary"):
-        return Axis("=".join(keys), tuple(map(float, values)), "log" if is_log else "linear")
-
-
-def _spaced(first: Decimal, last: Decimal, count: int, *, is_log: bool) -> list[Decimal]:
-    """Return evenly spaced values; the first and the last are not rounded."""
-    if is_log:
-        rise = math.log(last / first) / (count - 1)
-        between = [Decimal(float(first) * math.exp(rise * index)) for index in range(1, count - 1)]
-    else:
-        between = [first + (last - first) * index / (count - 1) for index in range(1, count - 1)]
-    return [first, *(_PLACES.plus(value) for value in between), last]
+        return Axis("=".join(keys), tuple(values), "log" if is_log else "linear")
 
 
 def tied_keys(key: str) -> list[str]:

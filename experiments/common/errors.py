@@ -34,16 +34,12 @@ def input_errors(source: str, remedy: str = "", kind: type[Exception] = ValueErr
 
 def shown(value: object) -> str:
     """Return a TOML value of any size and depth as a short text for a message."""
-    text = "an array of many values"
-    if isinstance(value, bool):
-        text = "true" if value else "false"
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list):
+        text = f"[{', '.join('[...]' if isinstance(item, list) else shown(item) for item in value[:LONGEST_SHOWN])}]"
     elif isinstance(value, str):
         text = '"' + "".join(c if c.isprintable() else "?" for c in value[: LONGEST_SHOWN + 1]) + '"'
-    elif isinstance(value, dict):
-        text = "a table"
-    elif isinstance(value, list):
-        if len(value) <= 4:
-            text = "[" + ", ".join("[...]" if isinstance(item, list) else shown(item) for item in value) + "]"
     else:
         text = str(value).lower().replace("infinity", "inf")
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."

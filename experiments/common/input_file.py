@@ -192,17 +192,13 @@ class _Reading:
         key, mark, literal = (part.strip() for part in setting.partition("="))
         if not mark or not key or not literal:
             raise InputError(f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set name=mine")
-        path, end = key.split("."), None
-        found = _table_at(values, self._owner, path[:-1])
-        if found is None and path[-1] in ENDS:
-            end = ENDS.index(path.pop())
-            found = _table_at(values, self._owner, path[:-1])
-        name = None if found is None else next((n for n in fields_of(found[1]) if si_factor(path[-1], n)), None)
-        if found is None or name is None or (end is not None and not fields_of(found[1])[name].pair):
+        found = _found(values, self._owner, key)
+        if found is None:
             guess = similar_key(key, keys_of(self._owner))
             hint = f"; did you mean {guess}?" if guess else ""
             raise InputError(f"--set: {self._source} has no key {shown(key)}{hint}")
-        table, owner = found
+        table, owner, name, end = found
+        path = key.split(".")[: None if end is None else -1]
         where = tuple(str(int(part) - 1) if part.isdecimal() else part for part in path[:-1])
         given = _value(literal)
         value = self.in_si({path[-1]: given}, owner, where)[name]
@@ -291,15 +287,28 @@ def similar_key(key: str, known: Sequence[str]) -> str | None:
 
 def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:
     """Return whether the value of a key may be a whole number or any number; None if neither, or there is no key."""
-    path, is_end = key.split("."), False
-    if path[-1] in ENDS:
-        is_end = path.pop() is not None
-    found = _table_at({}, owner, path[:-1])
-    name = None if found is None else next((name for name in fields_of(found[1]) if si_factor(path[-1], name)), None)
-    if found is None or name is None:
+    found = _found({}, owner, key)
+    if found is None:
         return None
-    field = fields_of(found[1])[name]
-    return float if field.pair else None if is_end else field.numeric
+    _, table, name, _ = found
+    field = fields_of(table)[name]
+    return float if field.pair else field.numeric
+
+
+def _found(values: dict[str, Any], owner: type, key: str) -> tuple[dict[str, Any], type, str, int | None] | None:
+    """Return the table and dataclass of a key, the name of its field, and the number of an end of an interval.
+
+    A table that is missing in `values` is added. None if there is no such key.
+    """
+    path, end = key.split("."), None
+    found = _table_at(values, owner, path[:-1])
+    if found is None and path[-1] in ENDS:
+        end = ENDS.index(path.pop())
+        found = _table_at(values, owner, path[:-1])
+    name = None if found is None else next((name for name in fields_of(found[1]) if si_factor(path[-1], name)), None)
+    if found is None or name is None or (end is not None and not fields_of(found[1])[name].pair):
+        return None
+    return *found, name, end
 
 
 def _table_at(values: dict[str, Any], owner: type, path: Sequence[str]) -> tuple[dict[str, Any], type] | None:
@@ -320,16 +329,10 @@ def _table_at(values: dict[str, Any], owner: type, path: Sequence[str]) -> tuple
 
 
 def _value(literal: str) -> Any:
-    """Return a TOML value; any other text is a number such as ``.5``, or text without quotes."""
+    """Return a TOML value; any other text is text without quotes."""
     try:
-        parsed = tomllib.loads(f"value = {literal}", parse_float=Decimal)
-        if [*parsed] == ["value"]:
-            return parsed["value"]
+        return tomllib.loads(f"value = {literal}", parse_float=Decimal)["value"]
     except (ValueError, RecursionError, InvalidOperation):
-        pass
-    try:
-        return Decimal(literal) if re.fullmatch(r"[+-]?[0-9.]+(?:[eE][+-]?[0-9]{1,4})?", literal) else literal
-    except InvalidOperation:
         return literal
 
 

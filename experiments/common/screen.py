@@ -6,10 +6,11 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -80,78 +81,49 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
     if quiet:
         yield lambda _name: lambda _done: None
         return
-    if not sys.stderr.isatty():
-        estimate = _Estimate(lambda line: say(line, quiet=False))
-        yield lambda name: _progress_lines(name, estimate)
-        return
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        estimate = _Estimate(progress.console.print)
-
-        def begin(name: str) -> Callable[[float], None]:
-            task, part = progress.add_task(name, total=1.0), estimate.begin(name)
-
-            def update(done: float) -> None:
-                progress.update(task, completed=done)
-                estimate.update(part, done)
-
-            return update
-
-        yield begin
+    bars = Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
+    with contextlib.nullcontext() if bars.disable else bars:
+        yield _Report(bars).begin
 
 
-class _Estimate:
-    """The time that all bars together take, from the rate of their first seconds: told once if it is long.
+class _Report:
+    """Report the progress of bars, and once the time that all of them take together, if it is long.
 
-    The time before the first report, in which kernels are loaded or compiled, is not part of the rate.
+    The time is that of the rate after the first report: kernels are loaded or compiled before it.
     """
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        self._tell = tell
-        self._done: dict[object, float] = {}
-        self._name = ""
+    def __init__(self, bars: Progress) -> None:
+        self._bars, self._written_s = bars, time.monotonic()
+        self._done: dict[TaskID, float] = {}
         self._first: tuple[float, float] | None = None
         self._is_told = False
 
-    def begin(self, name: str) -> object:
-        """Return the key of another bar; the first one after finished bars begins a new estimate."""
+    def begin(self, name: str) -> Callable[[float], None]:
+        """Start a bar, and after finished bars a new estimate; return the function that sets the fraction done."""
         if all(done >= 1.0 for done in self._done.values()):
             self._done.clear()
             self._first, self._is_told = None, False
-        part, self._name = object(), name
-        self._done[part] = 0.0
-        return part
+        bar = self._bars.add_task(name, total=1.0)
+        self._done[bar] = 0.0
+        return partial(self._update, bar, name)
 
-    def update(self, part: object, done: float) -> float | None:
-        """Set the fraction done of a bar; return the time left, s, or None if it is not known yet."""
-        now_s, self._done[part] = time.monotonic(), done
+    def _update(self, bar: TaskID, name: str, done: float) -> None:
+        self._bars.update(bar, completed=done)
+        now_s, self._done[bar] = time.monotonic(), done
         share = sum(self._done.values()) / len(self._done)
-        if self._first is None:
-            self._first = now_s, share
-        first_s, first_share = self._first
-        if share <= first_share or now_s < first_s + ESTIMATE_AFTER_S:
-            return None
-        left_s = (1.0 - share) * (now_s - first_s) / (share - first_share)
-        if not self._is_told:
+        first_s, first_share = self._first = self._first or (now_s, share)
+        left = ""
+        if share > first_share and now_s >= first_s + ESTIMATE_AFTER_S:
+            left_s = (1.0 - share) * (now_s - first_s) / (share - first_share)
+            left = f", {duration_text(round(left_s))} left"
+            if not self._is_told and now_s - first_s + left_s > LONG_S:
+                what = f"{name}: " if len(self._done) == 1 else ""
+                self._bars.console.print(f"{what}estimated time {duration_text(round(now_s - first_s + left_s))}")
             self._is_told = True
-            if now_s - first_s + left_s > LONG_S:
-                name = f"{self._name}: " if len(self._done) == 1 else ""
-                self._tell(f"{name}estimated time {duration_text(round(now_s - first_s + left_s))}")
-        return left_s
-
-
-def _progress_lines(name: str, estimate: _Estimate) -> Callable[[float], None]:
-    part, last_s = estimate.begin(name), time.monotonic()
-
-    def progress(done: float) -> None:
-        nonlocal last_s
-        left_s = estimate.update(part, done)
-        if time.monotonic() - last_s >= LINE_EVERY_S:
-            last_s = time.monotonic()
-            left = "" if left_s is None else f", {duration_text(round(left_s))} left"
+        if self._bars.disable and now_s >= self._written_s + LINE_EVERY_S:
+            self._written_s = now_s
             say(f"{name}: {100.0 * done:.0f} %{left}", quiet=False)
-
-    return progress
 
 
 def number(value: float | None) -> str:

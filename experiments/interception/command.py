@@ -33,15 +33,6 @@ Strategies = Annotated[
         "Default: all built-in strategies.",
     ),
 ]
-NoiseName = Annotated[
-    str | None,
-    typer.Option(
-        "--noise",
-        metavar="NOISE",
-        help="Measurement noise: random, gaussian, correlated, game, or FILE.py:CLASS for a class in a Python file. "
-        "Default: that of the scenario.",
-    ),
-]
 ModelName = Annotated[
     Literal["paper", "guaranteed"] | None,
     typer.Option(
@@ -58,10 +49,6 @@ StudyModel = Annotated[
         "its default initial set.",
         show_default="guaranteed",
     ),
-]
-TieName = Annotated[
-    Literal["upper", "lower", "alternate", "random"] | None,
-    typer.Option("--tie", help="How game noise breaks ties. Default: that of the scenario."),
 ]
 RangeSensor = Annotated[
     bool | None,
@@ -107,10 +94,6 @@ class Experiment(FileOptions):
     seed: Seed = 0
     strategy: StrategyName = None
     model: ModelName = None
-    tie: TieName = None
-    sections: Annotated[
-        int | None, typer.Option(metavar="N", help="Number of sections at t = 0. Default: that of the scenario.")
-    ] = None
     remedy: Annotated[
         bool,
         typer.Option(
@@ -144,7 +127,6 @@ class Engage(FileOptions):
     range_sensor: RangeSensor = None
     strategy: StrategyName = None
     model: ModelName = None
-    tie: TieName = None
     seed: Seed = 0
     run: Annotated[int, typer.Option(metavar="K", min=0, max=MAX_RUNS - 1, help="Number of the run, from 0.")] = 0
     record: Annotated[
@@ -244,10 +226,6 @@ class Adversary(FileOptions):
             "with all measurements until then, or the miss of the simulated truth."
         ),
     ] = "any-state"
-    keep_set: Annotated[
-        bool,
-        typer.Option("--keep-set", help="Record and draw the worst engagement in which the set never became empty."),
-    ] = False
     seed: Seed = 0
     record: RecordFile = None
     times: SetTimes = None
@@ -265,18 +243,6 @@ class Replay:
     ]
     html: Html = None
     gif: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="Write an animation of the sets.")] = None
-    frames: Annotated[
-        int,
-        typer.Option(
-            metavar="N", min=2, max=1000, help="Maximum number of frames of an animation; fewer make a smaller file."
-        ),
-    ] = 40
-    width: Annotated[
-        int | None,
-        typer.Option(
-            metavar="PIXELS", min=200, max=4000, help="Width of an animation. Default: 425, or 640 for two records."
-        ),
-    ] = None
     out: Out = None
     times: SetTimes = None
     overwrite: Overwrite = False

@@ -13,7 +13,7 @@ from experiments.common.options import choice
 from experiments.common.units import duration_text, length_text
 from experiments.interception.strategies import is_own
 from experiments.interception.study import percent
-from guidance import TieRule, strategy_names
+from guidance import strategy_names
 from infoset.model import Model, SetModel
 from sim.feasibility import feasibility
 from sim.gravity import on_board_model
@@ -58,17 +58,13 @@ def with_model(scenario: Scenario, model: Model) -> Scenario:
 def scenario_with(options: Any) -> Scenario:
     """Read the scenario of a command and replace what its options set; None keeps the value of the scenario.
 
-    The command may have the options `strategy`, `model`, `tie`, `sections` and `range_sensor`. A strategy of a Python
-    file leaves that of the scenario. `InputError` if an option does not fit the scenario.
+    The command may have the options `strategy`, `model` and `range_sensor`. A strategy of a Python file leaves that of
+    the scenario. `InputError` if an option does not fit the scenario.
     """
-    strategy, model, tie, sections, range_sensor = (
-        getattr(options, name, None) for name in ("strategy", "model", "tie", "sections", "range_sensor")
-    )
+    strategy, model, range_sensor = (getattr(options, name, None) for name in ("strategy", "model", "range_sensor"))
     scenario = load_scenario(options.scenario, options.settings)
     if strategy is not None and not is_own(strategy):
         scenario = replace(scenario, strategy=choice("--strategy", strategy, strategy_names()))
-    if tie is not None:
-        scenario = replace(scenario, tie=TieRule(tie))
     if range_sensor and scenario.range_sensor is None:
         raise InputError(
             f"--range-sensor: the scenario {scenario.name} has no [range_sensor]; add that table to its file"
@@ -77,9 +73,6 @@ def scenario_with(options: Any) -> Scenario:
         scenario = replace(scenario, range_sensor=None)
     if model is not None:
         scenario = with_model(scenario, Model(model))
-    if sections is not None:
-        with input_errors("--sections"):
-            scenario = replace(scenario, information_set=replace(scenario.information_set, sections=sections))
     return scenario
 
 
@@ -103,7 +96,7 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
 def scenario_warnings(scenario: Scenario) -> list[str]:
     """Return warnings about values of a scenario that are allowed but probably not intended, one line each."""
     lines = []
-    model, thruster, target = scenario.set_model, scenario.thruster, scenario.target
+    model, target = scenario.set_model, scenario.target
     uncertainty, dispersion, speed = model.bounds, scenario.dispersion, model.closing_speed_m_s
     for prefix, unit in (("", "m"), ("v", "m_s")):
         for axis in (*model.axes, "x"):
@@ -145,26 +138,7 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         )
         if acceleration > bound and line not in lines:
             lines.append(line)
-    sensor = scenario.angle_sensor
-    exact = sensor and sensor.error_at_nominal_range_y_rad == sensor.error_at_zero_range_y_rad == 0.0
-    if exact and not uncertainty.y_m == uncertainty.vy_m_s == (0.0, 0.0):
-        lines.append(
-            "angle_sensor.error_at_nominal_range_y_rad and error_at_zero_range_y_rad are 0, and uncertainty.y_m and "
-            "vy_m_s are not both [0, 0]: a measurement leaves a single range, and the set may become empty; write "
-            "positive bounds"
-        )
     lines += _timing_warnings(scenario)
-    late = ", ".join(f"{time_s:g}" for time_s in thruster.impulses_s if time_s < (thruster.last_impulse_s or 0.0))
-    if late:
-        lines.append(
-            f"thruster.impulses_s: the impulses at {late} s before the arrival are after the cut-off "
-            f"thruster.last_impulse_s, {thruster.last_impulse_s:g} s: they are not given"
-        )
-    if thruster.budget_m_s < thruster.min_impulse_m_s:
-        lines.append(
-            f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.min_impulse_m_s, "
-            f"{thruster.min_impulse_m_s:g}: no impulse can be given"
-        )
     return lines
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from experiments.common.figure_style import new_figure
 from experiments.common.output import Output
+from sim import Campaign, Scenario
+from sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 from tests.faults.conftest import begin, ended, need_whole
 
@@ -28,6 +31,20 @@ COMMANDS = {
 def test_a_full_disk(name: str, infoset: Command, file: Path, small_disk: Path) -> None:
     assert "No space left on device" in infoset(*COMMANDS[name], "--out", small_disk / "o")[2]
     need_whole(small_disk)
+
+
+def test_a_campaign_on_a_full_disk_goes_on(infoset: Command, brief: Scenario, file: Path, small_disk: Path) -> None:
+    subprocess.run(["mount", "-o", "remount,size=200k", small_disk], check=True)
+    asked = ("campaign", file, "--model", "paper", "--runs", 1600, "--chunk", 32, "--out", small_disk / "runs", "-q")
+    err = infoset.refused(*asked)
+    assert "No space left on device; the files in the folder are complete: free some space and run again" in err
+    assert 0 < CampaignFolder.read(small_disk / "runs").finished_runs < 1500
+    need_whole(small_disk)
+    assert infoset(*asked, "--resume")[0] == 2  # still full
+    subprocess.run(["mount", "-o", "remount,size=4m", small_disk], check=True)
+    assert infoset(*asked, "--resume") == (0, "", "")
+    expected = Campaign(brief, 1600, file.parent / "whole").run()
+    assert CampaignFolder.read(small_disk / "runs").runs().equals(expected.runs())
 
 
 @pytest.mark.parametrize("name", COMMANDS)

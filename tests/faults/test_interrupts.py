@@ -70,25 +70,31 @@ def test_interrupted_at_random_moments(name: str, file: Path, tmp_path: Path) ->
         need_whole(tmp_path)
 
 
-def test_a_campaign_interrupted_ten_times_gives_the_same_bits(brief: Scenario, file: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("kind", "times"), [(signal.SIGINT, 10), (signal.SIGKILL, 6)], ids=["interrupted", "killed"])
+def test_a_campaign_stopped_many_times_gives_the_same_bits(
+    kind: signal.Signals, times: int, brief: Scenario, file: Path, tmp_path: Path
+) -> None:
+    """At random moments: before the first file, between two files, and while one is written."""
     many = ("--runs", 2000, "--chunk", 8, "--noise", "mixed", "--model", "paper")
     asked = ("campaign", file, *many, "--out", "runs", "--resume", "-q")
     chance, stored = random.Random(9), []
     shards = tmp_path / "runs" / "shards"
-    for _ in range(10):
+    for _ in range(times):
         process = begin(*asked, folder=tmp_path)
         before, deadline = len(list(shards.glob("*.parquet"))), time.monotonic() + 60.0
         while process.poll() is None and len(list(shards.glob("*.parquet"))) == before and time.monotonic() < deadline:
             time.sleep(0.005)
         time.sleep(chance.uniform(0.0, 0.5))
-        process.send_signal(signal.SIGINT)
+        process.send_signal(kind)
         left = ended(process)
-        need_whole(tmp_path / "runs")
         stored.append(CampaignFolder.read(tmp_path / "runs").finished_runs)
         if left.code == 0:
             break
-        assert left.code == 130
-        assert left.err.splitlines() == [RESUME]
+        if kind is signal.SIGINT:
+            need_whole(tmp_path / "runs")
+            assert (left.code, left.err.splitlines()) == (130, [RESUME])
+        else:
+            assert left.code == -kind
     assert stored == sorted(set(stored))
     assert ended(begin(*asked, folder=tmp_path)).code == 0
     expected = Campaign(brief, 2000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().runs()

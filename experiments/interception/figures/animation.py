@@ -27,20 +27,19 @@ _SECTIONS = 7
 def animate(
     records: Sequence[Record],
     max_frames: int = 40,
-    width_px: int | None = None,
     progress: Callable[[float], None] = lambda _done: None,
 ) -> bytes:
     """Return a GIF animation of engagements, side by side, of eight seconds and 16 colours.
 
-    Frames are evenly distributed over the steps, and take about 0.2 s of computing each. The default width of a frame
-    is 425 pixels, or 640 for two planes.
+    Frames are evenly distributed over the steps, and take about 0.2 s of computing each. A frame is 425 pixels wide, or
+    640 for two planes.
     """
     clock = Clock.of(records)
     chosen = _frame_times(records, clock, max_frames)
     traces = traces_of(records)
-    width_mm, usual_px = (120.0, 425) if len(traces) == 1 else (85.0 * len(traces), 320 * len(traces))
+    width_mm, width_px = (120.0, 425) if len(traces) == 1 else (85.0 * len(traces), 320 * len(traces))
     figure, (above, below) = subplots(135.0, 2, len(traces), width_mm=width_mm, height_ratios=[1.2, 1.0])
-    figure.set_dpi((usual_px if width_px is None else width_px) / figure.get_figwidth())
+    figure.set_dpi(width_px / figure.get_figwidth())
     for axes, trace in zip(below, traces, strict=True):
         draw_predicted_miss(axes, trace, clock)
         if clock.counts_down:

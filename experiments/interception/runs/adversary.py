@@ -43,12 +43,11 @@ def run(options: Adversary) -> None:
             begin=work.begin,
         )
         elapsed_s = perf_counter() - work.began_s
-        chosen = worst.set_kept if options.keep_set else worst.overall
+        chosen = worst.overall
         if chosen is None:
             raise InputError(
-                f"{scenario.name}: in every simulated engagement the set became empty, or the miss was not finite; "
-                f"{'omit --keep-set, or ' if options.keep_set else ''}check the units of the scenario with: infoset "
-                "scenarios check FILE"
+                f"{scenario.name}: in every simulated engagement the miss was not finite; check the units of the "
+                "scenario with: infoset scenarios check FILE"
             )
         work.save(_summary(worst, chosen, options))
         if options.record is not None or options.out is not None:
@@ -66,7 +65,6 @@ def _summary(worst: WorstMisses, chosen: WorstEngagement, options: Adversary) ->
         "objective": chosen.objective.value,
         "searched_accelerations_m_s2": chosen.max_acceleration_m_s2,
         **worst.misses(),
-        "keep_set": options.keep_set,
         "worst_any_state_miss_m": chosen.any_state_miss_m,
         "worst_miss_m": chosen.miss_m,
         **{f"worst_miss_{axis}_m": value for axis, value in chosen.lateral_miss_m.items()},

@@ -11,7 +11,6 @@ from experiments.common.output import hit_key, outcome_columns, to_csv
 from experiments.common.screen import Part, figure_files, number, number_table, quantile_notes, say, show, some_runs
 from experiments.interception.command import Experiment
 from experiments.interception.course import Courses
-from experiments.interception.published import MANY, SINGLE, printed_single_runs
 from experiments.interception.remedy import Remedy, find_remedies
 from experiments.interception.runs.shared import (
     allowance,
@@ -162,11 +161,6 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
     yield from (*others, f"{game}; infoset compare shows the worst of all tie rules")
     if allowed := allowance(scenario):
         yield allowed
-    if scenario.name in (MANY, SINGLE):
-        printed = "; ".join(
-            f"{noise} noise: miss {miss} m, impulse {fuel} m/s" for noise, (miss, fuel) in printed_single_runs().items()
-        )
-        yield f"paper (one run from z = -8 km, no range sensor): {printed}"
     yield from quantile_notes(runs, [*QUANTILES.values()])
 
 

@@ -33,7 +33,7 @@ def run(options: Replay) -> None:
         if options.gif is not None:
             from experiments.interception.figures.animation import animate
 
-            written.deliver("--gif", animate(records, options.frames, options.width, begin(options.gif.name)))
+            written.deliver("--gif", animate(records, progress=begin(options.gif.name)))
         draw_engagements(records, times_s, written, begin)
     show(engagement_parts(records), options.quiet)
     if not written.written:

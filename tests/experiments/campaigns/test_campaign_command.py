@@ -4,13 +4,11 @@ import hashlib
 import json
 import os
 import pickle
-import random
 import shlex
-import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -23,7 +21,7 @@ from experiments.interception.strategies import load_strategy
 from guidance import NoiseKind
 from infoset import Model
 from sim import Campaign, CampaignNoise, Scenario, fly_one
-from sim.storage import CampaignFolder, StorageError
+from sim.storage import CampaignFolder
 from sim.storage.codec import fingerprint
 from sim.versions import versions
 
@@ -80,7 +78,7 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
 
 
 def test_the_options_are_those_of_the_engagements(infoset: Infoset, file: Path, tmp_path: Path) -> None:
-    options = ("--noise", "game", "--strategy", "patient", "--model", "guaranteed", "--tie", "lower")
+    options = ("--noise", "game", "--strategy", "patient", "--model", "guaranteed", "--set", "tie=lower")
     asked = ("campaign", file, "--runs", 8, "--out", tmp_path / "runs", "-q", "--no-range-sensor", *options)
     assert infoset(*asked)[0] == 0
     runs = stored_runs(tmp_path / "runs")
@@ -207,30 +205,6 @@ def wait_for_shards(process: subprocess.Popen[bytes], folder: Path, number: int)
 
 @pytest.mark.thorough
 @needs_kill
-def test_killed_six_times_and_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
-    """At different moments: before the first file, between two files, and while one is written."""
-    folder, chance, stored = tmp_path / "runs", random.Random(2), list[int]()
-    for _ in range(6):
-        with subprocess.Popen(command(file, folder, 4000)) as process:
-            if stored:
-                wait_for_shards(process, folder, stored[-1] // 8 + 1)
-            time.sleep(chance.uniform(0.0, 0.5))
-            process.send_signal(signal.SIGKILL)
-        assert process.wait() == -signal.SIGKILL
-        try:
-            stored.append(CampaignFolder.read(folder).finished_runs)
-        except StorageError:  # there was no manifest yet
-            stored.append(0)
-        assert stored[-1] < 4000
-    assert len(set(stored)) == 6
-    assert stored == sorted(stored)  # what is stored is never lost
-    subprocess.run(command(file, folder, 4000), check=True)
-    expected = Campaign(with_model(brief, Model.GUARANTEED), 4000, tmp_path / "whole", noise=CampaignNoise.MIXED).run()
-    assert stored_runs(folder).equals(expected.runs())
-
-
-@pytest.mark.thorough
-@needs_kill
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="this system does not list its processes")
 def test_processes_give_the_same_bits_and_end_with_their_parent(brief: Scenario, file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "runs"
@@ -260,31 +234,3 @@ def parent(process: int) -> int:
         return int((Path("/proc") / str(process) / "stat").read_text().rpartition(")")[2].split()[1])
     except OSError:
         return 0
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 200 kB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", str(folder)]
-    if not Path("/bin/mount").exists() or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
-        pytest.skip("a small tmpfs cannot be mounted here")
-    yield folder
-    subprocess.run(["umount", folder], check=True)
-
-
-@pytest.mark.thorough
-def test_a_disk_that_fills_up(infoset: Infoset, brief: Scenario, file: Path, small_disk: Path, tmp_path: Path) -> None:
-    asked = ("campaign", file, "--runs", 1600, "--chunk", 32, "--out", small_disk / "runs", "--quiet")
-    code, out, err = infoset(*asked)
-    assert (code, out) == (2, "")
-    assert err.startswith("error: ")
-    assert "No space left on device; the files in the folder are complete: free some space and run again" in err
-    assert 0 < CampaignFolder.read(small_disk / "runs").finished_runs < 1500
-    assert not list(small_disk.rglob("*.tmp"))
-    assert infoset(*asked, "--resume")[0] == 2  # still full
-    subprocess.run(["mount", "-o", "remount,size=4m", small_disk], check=True)
-    assert infoset(*asked, "--resume") == (0, "", "")
-    expected = Campaign(with_model(brief, Model.GUARANTEED), 1600, tmp_path / "whole").run()
-    assert stored_runs(small_disk / "runs").equals(expected.runs())

@@ -18,6 +18,7 @@ from sim import Scenario
 from sim.adversary import find_worst
 from sim.storage.codec import fingerprint
 from sim.versions import versions
+from tests.built_in import scenario_text
 from tests.experiments.command_line import Command
 from tests.space import in_space
 
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.usefixtures("unrendered")
 
 KEYS = [
     *("versions", "scenario", "scenario_hash", "model", "range_sensor", "elapsed_s", "seed", "strategy", "objective"),
-    *("searched_accelerations_m_s2", "worst_of_search_set_kept_m", "worst_of_search_m", "keep_set"),
+    *("searched_accelerations_m_s2", "worst_of_search_set_kept_m", "worst_of_search_m"),
     *("worst_any_state_miss_m", "worst_miss_m", "worst_miss_z_m", "outcome", "truth_kept", "evaluations", "record"),
     *("found_from", "changes", "start", "history"),
 ]
@@ -130,14 +131,10 @@ def test_what_is_refused_before_anything_is_flown(arguments: list[str], message:
     assert Path("there.npz").read_text() == "something"
 
 
-def test_where_no_engagement_counts_it_is_said(infoset: Command, tmp_path: Path) -> None:
-    from tests.built_in import scenario_text
-
+def test_where_every_set_becomes_empty_one_search_has_no_result(infoset: Command, tmp_path: Path) -> None:
     text = scenario_text("asteroid-1997").replace("vx_km_s = [-59.0, -57.0]", "vx_km_s = [-110.1, -110.0]")
-    text = text.replace("vx_km_s = [-58.1, -57.9]", "vx_km_s = [-110.05, -110.0]")
     file = tmp_path / "fast.toml"
-    file.write_text(text)
-    message = infoset("adversary", file, "--model", "paper", "--keep-set", "--budget", 2, "-q")
-    assert message[0] == 2
-    assert "in every simulated engagement the set became empty" in message[2]
-    assert "omit --keep-set" in message[2]
+    file.write_text(text.replace("vx_km_s = [-58.1, -57.9]", "vx_km_s = [-110.05, -110.0]"))
+    found = infoset.json("adversary", file, "--model", "paper", "--budget", 2)
+    assert found["worst_of_search_set_kept_m"] is None
+    assert found["worst_of_search_m"] == found["worst_any_state_miss_m"]

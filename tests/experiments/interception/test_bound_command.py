@@ -204,12 +204,3 @@ def test_a_program_without_a_solution_is_one_message(
     code, out, err = infoset("bound", short_file, "-q")
     assert (code, out) == (2, "")
     assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")
-
-
-@pytest.mark.thorough
-def test_bound_of_the_published_scenario_in_the_guaranteed_model(infoset: Command) -> None:
-    code, out, _ = infoset("bound", "asteroid-1997", "--model", "guaranteed", "--json", "-")
-    assert code == 0
-    found = json.loads(out)
-    assert 24.0 < found["lower_bound_m"] < 25.0
-    assert all(each["worst_found_m"] > 24.0 for each in found["strategies"])

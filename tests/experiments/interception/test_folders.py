@@ -12,8 +12,9 @@ from experiments.interception.scenario_file import load_scenario
 from sim.storage.codec import fingerprint
 from tests.experiments.command_line import Command, strict
 
+TIE_AND_SECTIONS = ("--set", "tie=lower", "--set", "information_set.sections=9")
 STUDIES = {
-    "experiment": (("--runs", 2, "--tie", "lower", "--sections", 9), ["4-distributions", "corridor"], ["results.csv"]),
+    "experiment": (("--runs", 2, *TIE_AND_SECTIONS), ["4-distributions", "corridor"], ["results.csv"]),
     "compare": (
         ("--runs", 2, "--strategies", "symmetric-miss,patient", "--no-range-sensor"),
         ["comparison"],

@@ -16,7 +16,7 @@ from experiments.common.input_file import changed, to_toml
 from experiments.interception.study import miss_text
 from guidance import NoiseKind
 from infoset import Model
-from sim import Body, HitRequirement, MissCause, Scenario, simulate
+from sim import Body, HitRequirement, MissCause, Scenario, estimate_hits, simulate
 from sim.requirement import Decision, judge, parse_requirement
 from tests.experiments.command_line import Command
 
@@ -72,8 +72,11 @@ def test_a_campaign_stores_and_reports_the_causes(infoset: Command, weak: Scenar
     folder = tmp_path / "runs"
     assert infoset("campaign", tmp_path / "weak.toml", "--runs", RUNS, "--out", folder)[0] == 0
     stored = pd.read_parquet(folder / "shards")["cause"].value_counts()
-    (sample,) = infoset.json("report", folder)["samples"]
-    expected = counts(weak, NoiseKind.RANDOM)
+    found = infoset.json("report", folder)
+    (sample,), expected = found["samples"], counts(weak, NoiseKind.RANDOM)
+    hits = estimate_hits(RUNS - sum(expected.values()), RUNS)
+    assert (sample["hits"], sample["hit_lower"], sample["hit_upper"]) == (hits.hits, hits.lower, hits.upper)
+    assert all(worst["hit"] == (worst["miss_m"] <= 12.0) for worst in found["worst"])
     assert {name: sample[f"missed_{name}"] for name in expected} == expected
     assert stored[stored > 0].to_dict() == {name: count for name, count in expected.items() if count}
     _, out, _ = infoset("report", folder)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import experiments
@@ -16,7 +14,6 @@ import sim
 from experiments import find_worst, fly_one, load_scenario, lower_bound, save, simulate
 from experiments.common.errors import InputError
 from sim import Record, Results
-from sim.results import join
 from tests.built_in import scenario_text
 
 NAME = "asteroid-1997-single"
@@ -80,32 +77,6 @@ def test_results_are_saved_by_suffix(results: Results, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"results\.csv"):
         save(results, tmp_path / "results.csv")
     save(results, tmp_path / "results.csv", overwrite=True)
-
-
-def with_lateral_columns(results: Results) -> Results:
-    """Results as those of engagements in space."""
-    y = np.arange(3.0 * len(results)).reshape(3, len(results)) - 3.0
-    plane = (results.position_m, results.velocity_m_s, results.lateral_miss_m)
-    position_m, velocity_m_s, miss_m = (np.column_stack(pair) for pair in zip(y, plane, strict=True))
-    return replace(results, position_m=position_m, velocity_m_s=velocity_m_s, lateral_miss_m=miss_m)
-
-
-def test_only_results_in_space_have_the_columns_of_the_second_axis(results: Results, tmp_path: Path) -> None:
-    columns = ["start_y_m", "start_vy_m_s", "miss_y_m"]
-    assert not {*columns} & {*results.to_dict()}
-    spatial = with_lateral_columns(results)
-    assert spatial.to_dict() == {
-        **results.to_dict(),
-        "start_y_m": [-3.0, -2.0, -1.0],
-        "start_vy_m_s": [0.0, 1.0, 2.0],
-        "miss_y_m": [3.0, 4.0, 5.0],
-    }
-    taken = join([spatial.take(np.array([2])), spatial.take(np.array([0, 1]))])
-    assert taken.to_dict()["miss_y_m"] == [5.0, 3.0, 4.0]
-    assert "miss_y_m" not in join([results, results]).to_dict()
-    save(spatial, tmp_path / "results.csv")
-    (head, *_) = csv.reader((tmp_path / "results.csv").read_text().splitlines())
-    assert [name for name in head if name in columns] == columns
 
 
 def test_pandas_gets_the_columns(results: Results) -> None:

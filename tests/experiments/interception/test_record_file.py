@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import io
 import json
@@ -193,26 +192,6 @@ def test_what_is_no_record(content: bytes, tmp_path: Path) -> None:
     sizes = [1, 100, len(content) // 2, len(content) - 1, *(draw.randrange(len(content)) for _ in range(30))]
     for each in [*foreign, *(content[:size] for size in sizes)]:
         refused(each, tmp_path)
-
-
-@pytest.mark.thorough
-def test_a_flipped_bit_is_found_or_harmless(content: bytes, record: Record, tmp_path: Path) -> None:
-    draw = random.Random(1)
-    with zipfile.ZipFile(io.BytesIO(content)) as stored:
-        heads = [member.header_offset + at for member in stored.infolist() for at in range(0, 200, 29)]
-        directory = range(stored.start_dir, len(content), 53)
-    file = tmp_path / "x.npz"
-    places = [*heads, *directory, *(draw.randrange(len(content)) for _ in range(40))]
-    harmless = 0
-    for at in places:
-        flipped = bytearray(content)
-        flipped[at] ^= 1 << draw.randrange(8)
-        file.write_bytes(flipped)
-        with contextlib.suppress(InputError):
-            found = load_record(file)
-            harmless += 1
-            assert_same(found, record)
-    assert harmless < 0.5 * len(places)  # dates and attributes of the members, which nothing reads
 
 
 def remade(content: bytes, change: Change) -> bytes:

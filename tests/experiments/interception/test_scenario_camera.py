@@ -65,10 +65,6 @@ def test_measurements_after_the_last_impulse_are_warned_of() -> None:
     assert "the last impulse is 30.0224 s before it" in line
     assert not scenario_warnings(camera(camera__first_image_s="30.1", thruster__last_impulse_s="30"))
     schedule = {"thruster__impulses_s": "[60.0, 40.0, 20.0]", "thruster__last_impulse_s": "30"}
-    after_cut_off = "the impulses at 20 s before the arrival are after the cut-off"
-    for first_image_s, delay_steps, number in (("35", "0", 2), ("40.1", "0", 1), ("40.1", "2", 2)):
-        lines = scenario_warnings(
-            camera(camera__first_image_s=first_image_s, thruster__delay_steps=delay_steps, **schedule)
-        )
-        assert len(lines) == number
-        assert [after_cut_off in line for line in lines].count(True) == 1
+    for first_image_s, delay_steps, number in (("35", "0", 1), ("40.1", "0", 0), ("40.1", "2", 1)):
+        late = camera(camera__first_image_s=first_image_s, thruster__delay_steps=delay_steps, **schedule)
+        assert len(scenario_warnings(late)) == number

@@ -176,7 +176,6 @@ def test_fingerprint_is_of_the_values_not_of_the_writing() -> None:
         ("dispersion.z_km=[-1.0, 12.0]", "dispersion.z_m reaches 2000 m above uncertainty.z_m"),
         ("closing_speed_km_s=60.0", "closing_speed_m_s is 1000 m/s outside uncertainty.vx_m_s"),
         ("nominal_range_km=5801300", "nominal_range_m is 5.8013e+09 m, far outside uncertainty.x_m"),
-        ("thruster.budget_m_s=0.2", "no impulse can be given"),
     ],
 )
 def test_warning(setting: str, part: str) -> None:

@@ -7,7 +7,6 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -70,23 +69,6 @@ def test_the_json_of_an_experiment_has_its_hits(infoset: Infoset, sized: Path, t
         assert curve["hit"] == vars(expected)
         own = [row for row in rows if row["published_curve"] == str(curve["published_curve"])]
         assert [row["hit"] == "true" for row in own] == [float(row["miss_m"]) <= 10.0 for row in own]
-
-
-def test_the_json_of_campaigns_reports_and_sweeps_has_its_hits(infoset: Infoset, sized: Path) -> None:
-    code, out, _ = infoset("campaign", sized, "--runs", 6, "--noise", "mixed", "--out", "runs", "--json", "-")
-    assert code == 0
-    samples: list[Any] = json.loads(out)["samples"]
-    code, out, _ = infoset("report", "runs", "--json", "-")
-    assert json.loads(out)["samples"] == samples
-    assert all(worst["hit"] == (worst["miss_m"] <= 10.0) for worst in json.loads(out)["worst"])
-    code, out, _ = infoset("sweep", sized, "--vary", "body.radius_m=2:20:2", "--runs", 4, "--out", "s", "--json", "-")
-    assert code == 0
-    cells = json.loads(out)["cells"]
-    for sample in [*samples, *cells]:
-        assert vars(estimate_hits(sample["hits"], sample["runs"]))["upper"] == sample["hit_upper"]
-        assert sample["set_emptied"] == 0
-    small, large = (cell["hits"] for cell in cells)
-    assert small <= large
 
 
 @pytest.mark.parametrize(("radius", "word"), [(1e5, "hit"), (1e-6, "missed")])
