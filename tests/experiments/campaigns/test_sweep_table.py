@@ -112,7 +112,7 @@ def test_the_limit_of_hits_along_the_radius_is_the_quantile_of_the_miss(brief: S
 def test_the_limit_of_hits_is_that_of_a_fine_sweep(tmp_path: Path) -> None:
     """An interpolated probability gave 1.4e-5 rad, just above the last cell that meets the requirement."""
     short = ["nominal_range_km=8841.6", "uncertainty.x_km=[8831.6, 8851.6]", "dispersion.x_km=[8836.6, 8846.6]"]
-    quick = ["step_s=20", "angle_sensor.period_s=20", "thruster.max_impulse_m_s=1"]
+    quick = ["step_s=20", "camera.period_s=20", "thruster.max_impulse_m_s=1"]
     scenario, found = load_scenario("dart-2022", [*short, *quick]), []
     for count in (2, 7):
         axis = Axis("camera.pixel_error_rad", tuple(np.linspace(1.3e-5, 2.5e-5, count).tolist()))
