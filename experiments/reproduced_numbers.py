@@ -66,7 +66,6 @@ def run(options: Reproduce) -> None:
 
 
 def _count(numbers: Sequence[Comparison]) -> dict[str, int]:
-    """Return how many numbers have each verdict."""
     return {verdict.value: sum(each.verdict is verdict for each in numbers) for verdict in Verdict}
 
 

@@ -9,10 +9,19 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 
 from experiments.campaigns.run_tables import groups
-from experiments.common.figure_style import CURVE_LOOKS, HALO, INK, legend_below, letters, plain_ticks, style, subplots
+from experiments.common.figure_style import (
+    CURVE_LOOKS,
+    HALO,
+    INK,
+    TICKS,
+    legend_below,
+    letters,
+    plain_ticks,
+    style,
+    subplots,
+)
 from experiments.common.screen import some_runs
 from experiments.interception.figures.b_plane import Cloud, draw_b_plane, max_guarantee
 from experiments.interception.figures.distributions import MAX_POINTS, Sample, axis_limit, draw_samples
@@ -90,8 +99,7 @@ def _draw_quantiles(axes: Axes, sample: Floats, colour: str) -> None:
         axes.plot(found.index, found["value"], color=colour, linestyle=dashes, zorder=3.0, **point)
         axes.fill_between(found.index, found["lower"], found["upper"], color=colour, alpha=0.18, linewidth=0.0)
     axes.set(xlim=(0.9 * counts[0], 1.1 * counts[-1]), xscale="log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if sample.size < _DECADES_FROM else (1.0,)))
-    plain_ticks(axes.xaxis)
+    plain_ticks(axes.xaxis, TICKS if sample.size < _DECADES_FROM else TICKS[:1])
     bottom, top = axes.get_ylim()
     axes.set_ylim(bottom if bottom > 0.5 * top else 0.0, top)
 

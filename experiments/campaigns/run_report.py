@@ -51,7 +51,6 @@ def run(options: Report) -> None:
 
 
 def _figures(folder: CampaignFolder) -> Sequence[str]:
-    """Return the names of the figures of a campaign."""
     names = ("figure-distributions", "figure-convergence", "figure-dispersion", "figure-b-plane")
     return names if folder.manifest.scenario.is_spatial else names[:-1]
 

@@ -17,7 +17,6 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis as MatplotlibAxis
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 
 from experiments.campaigns.sweep_axes import key_label
 from experiments.campaigns.sweep_table import SweepTable, above_bound, spans_decades
@@ -28,6 +27,7 @@ from experiments.common.figure_style import (
     INK,
     LIMIT,
     LINE_LOOKS,
+    TICKS,
     WIDTH_MM,
     first_panels,
     legend_below,
@@ -99,7 +99,7 @@ def _lines(table: SweepTable, cells: pd.DataFrame, shown: Sequence[QuantileName]
             axes.set_ylim(-0.03, 1.03)
         elif spans_decades(cells[[column for column, _ in columns]].stack()):
             axes.set_yscale("log")
-            _plain_decades(axes.yaxis)
+            plain_ticks(axes.yaxis, TICKS)
         else:
             axes.set_ylim(0.0)
         if quantity == required.quantity:
@@ -187,7 +187,7 @@ def _draw_heat(figure: Figure, axes: Axes, values: Floats) -> None:
     norm = LogNorm(low, high) if high > 10.0 * low > 0.0 else Normalize(low, max(high, low + 1e-9))
     bar = figure.colorbar(_draw_cells(axes, values, cmap="Blues", norm=norm), ax=axes)
     if isinstance(norm, LogNorm):
-        _plain_decades(bar.ax.yaxis)
+        plain_ticks(bar.ax.yaxis, TICKS)
     _write_numbers(axes, values, np.ma.filled(norm(np.ma.masked_invalid(values)) > _DARK, fill_value=False))
 
 
@@ -224,12 +224,6 @@ def _name_values(one: MatplotlibAxis, axis: Axis) -> None:
     one.set_label_text(
         textwrap.fill(key_label(axis.key, f"$10^{{{power}}}$\N{NO-BREAK SPACE}" if power else ""), _LABEL_LETTERS)
     )
-
-
-def _plain_decades(one: MatplotlibAxis) -> None:
-    """Write 1, 2, 5, 10, ... at a logarithmic axis."""
-    one.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    plain_ticks(one)
 
 
 def _column(table: SweepTable, quantile: QuantileName) -> str:

@@ -83,7 +83,6 @@ def _decision(runs: pd.DataFrame, required: AnyRequirement, folder: CampaignFold
 
 
 def _radii_m(folder: CampaignFolder, table: pd.DataFrame) -> Any:
-    """Return the radius of the body in each row."""
     scenario, axes = folder.manifest.scenario, folder.manifest.axes
     if not any("body.radius_" in axis.key for axis in axes):
         return or_nan(scenario.radius_m)

@@ -15,13 +15,15 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 STYLE: list[Any] = [Path(__file__).with_name("infoset.mplstyle")]
 WIDTH_MM = 170.0
 """Width of a figure over two columns of a page."""
 _MM_PER_INCH = 25.4
+TICKS = (1.0, 2.0, 5.0)
+"""Multiples of powers of ten at a logarithmic axis."""
 
 INK = "#1a1a1a"
 TRUTH = "#08306b"
@@ -131,8 +133,13 @@ def legend_below(figure: Figure, columns: int, **more: Any) -> None:
         legend.remove()
 
 
-def plain_ticks(one: Axis) -> None:
-    """Write the ticks of a logarithmic axis as numbers, the minor ones without labels."""
+def plain_ticks(one: Axis, subs: Sequence[float] = ()) -> None:
+    """Write the ticks of a logarithmic axis as numbers, the minor ones without labels.
+
+    `subs` are the multiples of powers of ten that have a tick; without them, Matplotlib chooses.
+    """
+    if subs:
+        one.set_major_locator(LogLocator(subs=subs))
     one.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
     one.set_minor_formatter(NullFormatter())
 

@@ -56,7 +56,7 @@ def curve_scenarios(scenario: Scenario, noise: NoiseKind = NoiseKind.RANDOM) -> 
 class Comparison:
     """One strategy with one noise: results by tie rule of the game noise, or one result with another noise.
 
-    All strategies have the same runs. The properties are those of each run, shape (N,), with its worst tie rule.
+    All strategies have the same runs.
     """
 
     strategy: str
@@ -68,38 +68,16 @@ class Comparison:
         """The noise in figures."""
         return f"{self.noise} noise{', worst tie rule' if len(self.results) > 1 else ''}"
 
-    def _worst(self, column: str, over_ties: Callable[..., Any]) -> Any:
-        return over_ties(np.ma.stack([getattr(each, column) for each in self.results.values()]), axis=0)
-
-    @property
-    def miss_m(self) -> Floats:
-        """Maximum miss, m."""
-        return np.asarray(self._worst("miss_m", np.max))
-
-    @property
-    def impulse_m_s(self) -> Floats:
-        """Maximum impulse spent, m/s."""
-        return np.asarray(self._worst("impulse_m_s", np.max))
-
-    @property
-    def truth_kept(self) -> Flags:
-        """Whether the true state stayed in its section with every tie rule."""
-        return np.asarray(self._worst("truth_kept", np.all))
-
-    @property
-    def set_emptied(self) -> Flags:
-        """Whether the set became empty with a tie rule."""
-        return np.asarray(self._worst("set_emptied", np.any))
-
-    @property
-    def phi_held(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]:
-        """Whether the miss was within the guaranteed miss with every tie rule; masked without a guarantee."""
-        return np.ma.asarray(self._worst("phi_held", np.ma.all))
+    def worst(self, column: str) -> Any:
+        """Return a column of the results, shape (N,), of each run with its worst tie rule: see `_WORST`."""
+        columns = [getattr(each, column) for each in self.results.values()]
+        stack = np.ma.stack if np.ma.isMaskedArray(columns[0]) else np.stack
+        return _WORST[column](stack(columns), axis=0)
 
     @property
     def hits(self) -> HitEstimate | None:
         """Runs that hit with every tie rule; None if the body has no size."""
-        hit = self._worst("hit", np.ma.all)
+        hit = self.worst("hit")
         return estimate_hits(int(hit.sum()), len(hit)) if hit.count() else None
 
     @property
@@ -110,6 +88,11 @@ class Comparison:
         return join(results).take(worst * runs + np.arange(runs)).missed
 
 
+_WORST: Mapping[str, Callable[..., Any]] = {
+    **dict.fromkeys(("miss_m", "impulse_m_s"), np.max),
+    **dict.fromkeys(("truth_kept", "hit", "phi_held"), np.ma.all),
+    "set_emptied": np.any,
+}
 Compared = tuple[str, str, TieRule | None]
 """Strategy, noise and tie rule, None without game noise."""
 

@@ -128,7 +128,6 @@ def scenario_of(file: str | os.PathLike[str], like: Scenario, sigmas: float) -> 
 
 
 def _text(scenario: Scenario, found: Approach, like: str, sigmas: float, source: str) -> str:
-    """Return a scenario file whose comments say where its numbers come from."""
     t_km, r_km = (value / 1e3 for value in found.miss_m)
     head = f"""\
 # The approach of {source}, written by infoset scenarios from-states.

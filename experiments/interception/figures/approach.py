@@ -80,7 +80,6 @@ def draw_approach(records: Sequence[Record]) -> Figure:
 
 
 def _draw_possible(axes: Axes, record: Record) -> None:
-    """Draw the possible miss, that after an impulse that centres the set, and the miss of the true state."""
     known = complete_steps(record)
     misses, times = record.predicted_miss_m[known], Clock(counts_down=True).at(record)
     maximum = modulus(np.abs(misses).max(axis=-1).T)

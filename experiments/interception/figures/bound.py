@@ -114,7 +114,6 @@ def _direction(pair: TruthPair) -> Floats:
 
 
 def _draw_strategies(axes: Axes, bound_m: float, worst_m: Mapping[str, float]) -> None:
-    """Draw the maximum misses found, the minimum at the top, against the bound."""
     rows = sorted(worst_m.items(), key=lambda item: item[1])
     places, misses = np.arange(len(rows)), np.array([miss_m for _, miss_m in rows])
     maximum = max(bound_m, float(misses[-1]))

@@ -32,7 +32,7 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
     noises = {each.noise: each.noise_title for each in compared}
     height = len(noises) * (12.0 + 8.0 * len(names)) + 21.0
     figure, grid = subplots(height, len(noises), 2, sharex="col", sharey=True)
-    misses, impulses = [each.miss_m for each in compared], [each.impulse_m_s for each in compared]
+    misses, impulses = ([each.worst(name) for each in compared] for name in ("miss_m", "impulse_m_s"))
     edges = _logarithmic(misses), np.linspace(0.0, 1.04 * float(np.max(impulses)) or 1.0, _BINS + 1)
     for column, samples, bins in zip(grid.T, (misses, impulses), edges, strict=True):
         for axes, noise in zip(column, noises, strict=True):

@@ -68,7 +68,6 @@ def draw_corridor(curves: Sequence[Curve], courses: Sequence[Courses]) -> Figure
 
 
 def _draw_possible(axes: Axes, course: Courses) -> None:
-    """Draw quantiles of the possible miss."""
     shown = np.count_nonzero(~np.isnan(course.possible_m), axis=0) >= 0.5 * len(course.possible_m)
     times = course.before_arrival_s[shown]
     axes.set_yscale("log")
@@ -84,7 +83,6 @@ def _draw_possible(axes: Axes, course: Courses) -> None:
 
 
 def _draw_impulses(axes: Axes, course: Courses) -> None:
-    """Draw the 90 % quantile and the median of the impulses as bars."""
     maximum = float(course.impulse_m_s.max()) or 1.0
     minimum = float(course.impulse_m_s[course.impulse_m_s > 0.0].min(initial=maximum))
     bottom = 0.5 * max(minimum, 10.0**-_DECADES * maximum)

@@ -147,7 +147,6 @@ def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
 
 
 def _sensor(trace: Trace) -> BearingSensor:
-    """Return the sensor of the angle along the axis of a trace."""
     model = trace[0].scenario.set_model
     return model.axis(model.axes[trace[1]]).angle_sensor
 
@@ -170,7 +169,6 @@ def _level_moduli(row: Sequence[Axes]) -> None:
 
 
 def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, impulse_m_s: float) -> None:
-    """Draw the impulses along an axis, on axes for a maximum."""
     record, axis = trace
     maximum, times = record.scenario.thruster.max_impulse_m_s, clock.at(record)
     axes.axhline(0.0, **_ZERO)

@@ -80,7 +80,6 @@ def _summary(worst: WorstMisses, chosen: WorstEngagement, options: Adversary) ->
 
 
 def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str]]]:
-    """Return the rows of the table: title, and text of an engagement."""
     axes = [*scenario.set_model.axes, "x"]
     position, velocity = ", ".join(axes), ", ".join(f"V_{axis}" for axis in axes)
     return [

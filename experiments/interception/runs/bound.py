@@ -77,15 +77,24 @@ def run(options: Bound) -> None:
                 "scenario with: infoset scenarios check FILE"
             ) from None
         worst = _simulate(scenario, lower, strategies, options, work.begin)
-        value = GameValue.of(scenario, lower, worst)
-        work.save({**_summary(scenario, lower, nominal, worst), "value": value.summary()})
+        (reserve, reasons), best = _value(scenario, lower), _best(worst)
+        parts_m = {} if reserve is None else {name.removesuffix("_m"): part for name, part in asdict(reserve).items()}
+        value = {
+            "at_least_m": lower.bound_m,
+            "at_most_m": reserve and lower.bound_m + reserve.total_m,
+            "reserve_m": reserve and {"total": reserve.total_m, **parts_m},
+            "not_proved_because": list(reasons),
+            "best_strategy": best and best.name,
+            "best_strategy_worst_found_m": best and best.worst_m,
+        }
+        work.save({**_summary(scenario, lower, nominal, worst), "value": value})
         if options.out is not None:
             from experiments.interception.figures.bound import draw_bound
 
             worst_m = {strategy.name: strategy.worst_m for strategy in worst}
             work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))
-    parts = [*_parts(scenario, lower, nominal, worst), *value.lines(), *_notes(lower, options, worst)]
-    show(parts, options.quiet or work.written.stdout_taken)
+    parts = [*_parts(scenario, lower, nominal, worst), *_value_lines(lower.bound_m, reserve, reasons, best)]
+    show([*parts, *_notes(lower, options, worst)], options.quiet or work.written.stdout_taken)
 
 
 def _simulate(
@@ -192,62 +201,35 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
     return pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
 
 
-@dataclass(frozen=True)
-class GameValue:
-    """The minimum miss that a strategy can guarantee: its lower end, and how much greater it can be.
+def _value(scenario: Scenario, lower: LowerBound) -> tuple[ValueReserve | None, tuple[str, ...]]:
+    """Return how much greater than the bound the value of the game can be, or None and why this is not proved."""
+    reasons = why_no_value(scenario)
+    reserve = None if reasons else value_reserve(scenario, lower)
+    return (None, (reserve,)) if isinstance(reserve, str) else (reserve, reasons)
 
-    `reserve` is None for `reasons`: assumptions of the proof that the scenario does not meet. `best` is the strategy
-    whose maximum miss found is smallest; None without a search.
-    """
 
-    lower_m: float
-    reserve: ValueReserve | None
-    reasons: tuple[str, ...]
-    best: WorstOfStrategy | None
+def _best(worst: Sequence[WorstOfStrategy]) -> WorstOfStrategy | None:
+    """Return the strategy whose maximum miss found is smallest; None without a search."""
+    searched = [strategy for strategy in worst if strategy.searched.engagements]
+    return min(searched, key=lambda strategy: strategy.worst_m, default=None)
 
-    @classmethod
-    def of(cls, scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy]) -> GameValue:
-        """Return what is known of the value of a game."""
-        searched = [strategy for strategy in worst if strategy.searched.engagements]
-        best = min(searched, key=lambda strategy: strategy.worst_m, default=None)
-        reasons = why_no_value(scenario)
-        reserve = None if reasons else value_reserve(scenario, lower)
-        if isinstance(reserve, str):
-            return cls(lower.bound_m, None, (reserve,), best)
-        return cls(lower.bound_m, reserve, reasons, best)
 
-    @property
-    def parts_m(self) -> dict[str, float]:
-        """Parts of the reserve by name, m."""
-        parts = {} if self.reserve is None else asdict(self.reserve)
-        return {name.removesuffix("_m"): value for name, value in parts.items()}
-
-    def summary(self) -> dict[str, object]:
-        """Return the value as JSON."""
-        reserve = self.reserve
-        return {
-            "at_least_m": self.lower_m,
-            "at_most_m": None if reserve is None else self.lower_m + reserve.total_m,
-            "reserve_m": None if reserve is None else {"total": reserve.total_m, **self.parts_m},
-            "not_proved_because": list(self.reasons),
-            "best_strategy": None if self.best is None else self.best.name,
-            "best_strategy_worst_found_m": None if self.best is None else self.best.worst_m,
-        }
-
-    def lines(self) -> Iterator[str]:
-        """Return the lines for the screen."""
-        if self.reserve is not None:
-            parts = ", ".join(f"{name.replace('_', ' ')} {number(part)}" for name, part in self.parts_m.items())
-            yield (
-                f"the bound is the value of the game up to a reserve of {number(self.reserve.total_m)} m: no strategy "
-                f"guarantees less than {number(self.lower_m)} m, and symmetric-miss guarantees at most the reserve more"
-            )
-            yield f"reserve, m: {parts}"
-            return
-        best = self.best
-        found = f"; minimum of the maximum misses found: {number(best.worst_m)} m, of {best.name}" if best else ""
-        yield f"the value of the game is at least {number(self.lower_m)} m{found}"
-        yield f"no upper end is proved, because of: {', '.join(self.reasons)}"
+def _value_lines(
+    lower_m: float, reserve: ValueReserve | None, reasons: Sequence[str], best: WorstOfStrategy | None
+) -> Iterator[str]:
+    if reserve is not None:
+        parts = ", ".join(
+            f"{name.removesuffix('_m').replace('_', ' ')} {number(part)}" for name, part in asdict(reserve).items()
+        )
+        yield (
+            f"the bound is the value of the game up to a reserve of {number(reserve.total_m)} m: no strategy "
+            f"guarantees less than {number(lower_m)} m, and symmetric-miss guarantees at most the reserve more"
+        )
+        yield f"reserve, m: {parts}"
+        return
+    found = f"; minimum of the maximum misses found: {number(best.worst_m)} m, of {best.name}" if best else ""
+    yield f"the value of the game is at least {number(lower_m)} m{found}"
+    yield f"no upper end is proved, because of: {', '.join(reasons)}"
 
 
 def _parts(
@@ -291,7 +273,6 @@ def _parts(
 
 
 def _notes(lower: LowerBound, options: Bound, worst: Sequence[WorstOfStrategy]) -> Iterator[str]:
-    """Return lines about the columns of the tables."""
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
     if not worst:

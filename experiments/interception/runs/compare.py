@@ -93,15 +93,13 @@ def _progress(flights: Iterable[Compared], reports: Mapping[str, Progress]) -> C
 
 def _summary(comparison: Comparison) -> dict[str, object]:
     outcomes = Counter(outcome.value for results in comparison.results.values() for outcome in results.outcomes)
-    phi_held = comparison.phi_held
+    phi_held = comparison.worst("phi_held")
     return {
         "name": comparison.strategy,
         "noise": comparison.noise,
-        "miss_m": summary(comparison.miss_m),
-        "impulse_m_s": summary(comparison.impulse_m_s),
+        **{name: summary(comparison.worst(name)) for name in ("miss_m", "impulse_m_s")},
         **hit_key(comparison.hits, comparison.missed),
-        "truth_kept": int(comparison.truth_kept.sum()),
-        "set_emptied": int(comparison.set_emptied.sum()),
+        **{name: int(comparison.worst(name).sum()) for name in ("truth_kept", "set_emptied")},
         "phi_held": int(phi_held.sum()) if phi_held.count() else None,
         "outcomes": dict(outcomes),
         "ties": {
@@ -134,15 +132,15 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
     noises = list(dict.fromkeys(comparison.noise for comparison in compared))
     for comparison in sorted(compared, key=lambda each: noises.index(each.noise)):
         head = (comparison.noise, comparison.strategy)
-        table.add_row(*head, "miss, m", *map(number, summary(comparison.miss_m).values()))
-        table.add_row("", "", "impulse, m/s", *map(number, summary(comparison.impulse_m_s).values()))
-        counts, hits = set_counts(comparison.truth_kept, comparison.set_emptied), comparison.hits
+        table.add_row(*head, "miss, m", *map(number, summary(comparison.worst("miss_m")).values()))
+        table.add_row("", "", "impulse, m/s", *map(number, summary(comparison.worst("impulse_m_s")).values()))
+        counts, hits = set_counts(*map(comparison.worst, ("truth_kept", "set_emptied"))), comparison.hits
         total += counts
         shares = [f"{count} ({percent(count / counts.runs)})" for count in (counts.truth_kept, counts.set_emptied)]
         if hits is not None:
             shares += [f"{hits.hits} ({percent(hits.probability)})", f"{percent(hits.lower)} to {percent(hits.upper)}"]
         sets.add_row(*head, *shares)
-    runs = len(compared[0].miss_m)
+    runs = len(compared[0].worst("miss_m"))
     ties = f"; game noise: {TIES}" if NoiseKind.GAME.value in noises else ""
     yield f"{scenario_title(scenario)}: quantiles of {some_runs(runs)}{ties}"
     yield table
@@ -162,7 +160,7 @@ def _by_noise(compared: Sequence[Comparison], noises: Sequence[str]) -> Table:
     """Return a table of the 90 % quantile of the miss by strategy and noise, with the ratio of its extremes."""
     table = number_table("strategy", *noises, "maximum / minimum")
     for name in dict.fromkeys(comparison.strategy for comparison in compared):
-        values = [summary(each.miss_m)["p90"] for each in compared if each.strategy == name]
+        values = [summary(each.worst("miss_m"))["p90"] for each in compared if each.strategy == name]
         known = [value for value in values if value is not None]
         ratio = max(known) / min(known) if known and min(known) > 0.0 else None
         table.add_row(name, *map(number, (*values, ratio)))
@@ -173,7 +171,7 @@ def _best(compared: Sequence[Comparison], noises: Sequence[str]) -> str:
     """Return a line with the strategies whose 90 % quantile of the miss is near the least one, for each noise."""
     near = {}
     for noise in noises:
-        quantiles = {each.strategy: np.quantile(each.miss_m, 0.9) for each in compared if each.noise == noise}
+        quantiles = {each.strategy: np.quantile(each.worst("miss_m"), 0.9) for each in compared if each.noise == noise}
         near[noise] = [name for name, value in quantiles.items() if value <= (1.0 + NEAR) * min(quantiles.values())]
     always = [name for name in near[noises[0]] if all(name in names for names in near.values())]
     within = f"within {NEAR:.0%} of the least in these runs"

@@ -96,7 +96,6 @@ def steps_csv(records: Sequence[Record]) -> str:
 
 
 def _step_rows(record: Record) -> list[dict[str, Cell]]:
-    """Return the numbers of each step by name."""
     unknown = np.full((record.steps, len(record.scenario.set_model.axes)), np.nan)
     columns = {
         "time_s": record.time_s,
