@@ -81,7 +81,7 @@ def test_the_limit_of_two_keys_is_a_line() -> None:
         assert crossing == pytest.approx(row["interpolated"], rel=1e-6)
     assert form[:, 0].max() < drawn[:, 0].max()
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names[-2:] == ["limit by interpolation of the quantiles", "closed form: worst errors, no later images"]
+    assert names[-2:] == ["limit, interpolated between cells", "closed form: worst errors, no later images"]
     table.rows["requirement"] = "undecided"
     few = draw_sweep(table, SHOWN, "game")
-    assert "limit by interpolation of the quantiles" not in [text.get_text() for text in few.legends[0].get_texts()]
+    assert "limit, interpolated between cells" not in [text.get_text() for text in few.legends[0].get_texts()]
