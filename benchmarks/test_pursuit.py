@@ -1,4 +1,4 @@
-"""The orbital pursuit-evasion game: without and with an initial guess, as a map, and compared with SciPy.
+"""The orbital pursuit-evasion game: without and with an initial guess, and compared with SciPy.
 
 Times are processor times, the shortest of many rounds, so that other work on the machine has little effect.
 """
@@ -17,15 +17,13 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from experiments.common.input_file import load_problem
-from rendezvous.pursuit_evasion import Game, Player, PointStatus, Solution, capture_map, solve
+from rendezvous.pursuit_evasion import Game, Solution, solve
 from rendezvous.pursuit_evasion.game import scaled_craft, units_of
-from rendezvous.two_body import OrbitalElements
 
 Floats = NDArray[np.float64]
 Check = Callable[[str, float, float, str], None]
 
-COLD_MS, MAP_S, TIMES_FASTER = 50.0, 8.0, 20.0
-PHASES, INCLINATIONS = 101, 21
+COLD_MS, TIMES_FASTER = 50.0, 20.0
 
 
 @pytest.fixture(scope="module")
@@ -60,22 +58,6 @@ def seconds(work: Callable[[], object], rounds: int) -> float:
 def test_cold(benchmark: BenchmarkFixture, game: Game, under: Check) -> None:
     benchmark.pedantic(solve, args=(game,), rounds=30, warmup_rounds=2)
     under("pursuit, game of the slides without a guess", 1e3 * best_s(benchmark), COLD_MS, "ms")
-
-
-@pytest.mark.benchmark(group="pursuit-map", timer=time.process_time)
-def test_map(benchmark: BenchmarkFixture, game: Game, under: Check) -> None:
-    mu = game.gravity.parameter_m3_s2
-
-    def game_at(phase_deg: float, inclination_deg: float) -> Game:
-        angles = (math.radians(degrees) for degrees in (inclination_deg, 79.0, 0.0, 318.0 + phase_deg))
-        position, velocity = OrbitalElements(42166e3, 0.00016, *angles).state(mu)
-        evader = Player(tuple(position), tuple(velocity), 2000.0, 200.0, 10.0, 350.0)
-        return Game(game.gravity, game.pursuer, evader)
-
-    columns, rows = np.linspace(-30.0, 30.0, PHASES), np.linspace(0.2, 2.2, INCLINATIONS)
-    captures = benchmark.pedantic(capture_map, args=(game_at, columns, rows), rounds=2, warmup_rounds=0)
-    assert captures.count(PointStatus.FOLLOWED) + captures.count(PointStatus.NEIGHBOUR) == PHASES * INCLINATIONS
-    under(f"pursuit, a map of {PHASES * INCLINATIONS} points", best_s(benchmark), MAP_S, "s")
 
 
 def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Floats:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from experiments.interception.scenario_file import load_scenario
     from experiments.pareto.figures import draw_trajectories
     from experiments.pursuit.figures import draw_distance
-    from experiments.pursuit.map_figure import draw_map
 
 _NAMES = {
     "common.input_file": ("load_problem",),
@@ -32,14 +31,12 @@ _NAMES = {
     "interception.figures.sets": ("draw_sets",),
     "pareto.figures": ("draw_trajectories",),
     "pursuit.figures": ("draw_distance",),
-    "pursuit.map_figure": ("draw_map",),
 }
 """Public names by module."""
 
 __all__ = [
     "draw_bound",
     "draw_distance",
-    "draw_map",
     "draw_process",
     "draw_sets",
     "draw_trajectories",

@@ -65,9 +65,8 @@ class Pursuit(FileOptions):
 class PursuitMap(FileOptions):
     """Solve a pursuit game on a grid of two parameters.
 
-    A parameter is phase_deg (lead of the evader), thrust_ratio, or any key of the file. The solution of a
-    point starts from those of its neighbours; some points are solved from scratch as a check. A point without a
-    certified solution has no capture time. Without --out, --json or --csv no file is written.
+    A parameter is phase_deg (lead of the evader), thrust_ratio, or any key of the file. A point without a certified
+    solution has no capture time. Without --out, --json or --csv no file is written.
     """
 
     problem: ProblemName = "geo-pursuit"
@@ -87,7 +86,7 @@ class PursuitMap(FileOptions):
         bool,
         typer.Option(
             "--certify",
-            help="Solve every point from scratch, and follow other branches where a branch of solutions folds (slow).",
+            help="Follow other branches where a branch of solutions folds (slow).",
         ),
     ] = False
     csv: Csv = None

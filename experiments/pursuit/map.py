@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -11,26 +12,23 @@ from numpy.typing import NDArray
 
 from experiments.common.errors import InputError, shown
 from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
-from experiments.common.output import Cell, to_csv
+from experiments.common.output import to_csv
 from experiments.common.problem_command import ProblemCommand
 from experiments.common.screen import BeginProgress
 from experiments.common.units import M_PER_KM, S_PER_HOUR
 from experiments.pursuit.command import PursuitMap
 from experiments.pursuit.file import PursuitProblem
-from rendezvous.pursuit_evasion import STATUSES, CaptureMap, Game, PointStatus, capture_map
+from infoset.arrays import Floats
+from rendezvous.pursuit_evasion import Game, Verdict, solve
 from rendezvous.two_body import OrbitalElements
+
+Masked = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 
 MAX_POINTS = 100_000
 RATIOS = ("phase_deg", "thrust_ratio")
 """Parameters besides the keys of a file: lead of the evader in true longitude, its thrust by the pursuer's."""
-STATUS_WORDS = {
-    PointStatus.FOLLOWED: "solved from scratch",
-    PointStatus.NEIGHBOUR: "continued from a neighbour",
-    PointStatus.NOT_CERTIFIED: "not certified",
-    PointStatus.ESCAPES: "escape",
-    PointStatus.PROPELLANT_EXHAUSTED: "propellant exhausted",
-    PointStatus.NO_GAME: "no game",
-}
+NO_GAME = "no-game"
+"""Verdict of parameters that define no game, for example equal positions."""
 
 
 @dataclass(frozen=True)
@@ -38,17 +36,25 @@ class Axis:
     """A parameter of the map and its values, in the unit of its name."""
 
     parameter: str
-    values: NDArray[np.float64]
+    values: Floats
 
 
 @dataclass(frozen=True)
 class MapReport:
-    """Results of one command."""
+    """Results of one command, shape (rows, columns); times and closing speeds are masked without a capture."""
 
     problem: PursuitProblem
     x: Axis
     y: Axis
-    solved: CaptureMap
+    verdict: NDArray[np.str_]
+    capture_s: Masked
+    closing_speed_m_s: Masked
+
+    @property
+    def summary(self) -> str:
+        """The number of points of each verdict."""
+        counts = Counter(self.verdict.ravel().tolist()).most_common()
+        return f"{self.verdict.size} points: {', '.join(f'{count} {verdict}' for verdict, count in counts)}"
 
 
 def solve_map(problem: PursuitProblem, options: PursuitMap, begin: BeginProgress) -> MapReport:
@@ -56,37 +62,42 @@ def solve_map(problem: PursuitProblem, options: PursuitMap, begin: BeginProgress
     x, y = read_axis("--x", options.columns), read_axis("--y", options.rows)
     if x.parameter == y.parameter:
         raise InputError(f"--y: {y.parameter} is also the parameter of --x; choose another")
+    if "phase_deg" in (x.parameter, y.parameter) and None in (problem.pursuer.orbit, problem.evader.orbit):
+        raise InputError("phase_deg: both players must have the table orbit; vary other keys instead")
     if len(x.values) * len(y.values) > MAX_POINTS:
         raise InputError(f"--x and --y: there are more than {MAX_POINTS} points; choose fewer")
-    solved = capture_map(
-        lambda column, row: game_at(problem, {x.parameter: column, y.parameter: row}),
-        x.values,
-        y.values,
-        follow_all=options.certify,
-        progress=begin("map"),
-    )
-    return MapReport(problem, x, y, solved)
+    progress, rows = begin("map"), []
+    for row in y.values.tolist():
+        values = [{x.parameter: column, y.parameter: row} for column in x.values.tolist()]
+        rows.append([_solved(problem, each, options.certify) for each in values])
+        progress(len(rows) / len(y.values))
+    verdicts, times, speeds = (np.array([[point[i] for point in points] for points in rows]) for i in range(3))
+    return MapReport(problem, x, y, verdicts, np.ma.masked_invalid(times), np.ma.masked_invalid(speeds))
+
+
+def _solved(problem: PursuitProblem, values: Mapping[str, float], change_branch: bool) -> tuple[str, float, float]:
+    """Return the verdict of a point, the time of capture and the closing speed."""
+    try:
+        game = game_at(problem, values)
+    except (InputError, ValueError):
+        return NO_GAME, math.nan, math.nan
+    solution = solve(game, change_branch=change_branch)
+    if solution.capture is None or solution.verdict is not Verdict.CAPTURED:
+        return solution.verdict.value, math.nan, math.nan
+    return solution.verdict.value, solution.capture.time_s, solution.capture.closing_speed_m_s
 
 
 def game_at(problem: PursuitProblem, values: Mapping[str, float]) -> Game:
     """Return the game with other values of parameters, those of `RATIOS` last.
 
-    Raises
-    ------
-    ValueError
-        If the values define no game.
-    InputError
-        If `phase_deg` is varied, and a player has no orbit.
+    Raise `ValueError` or `InputError` if they define no game.
     """
     keys = {key: value for key, value in values.items() if key not in RATIOS}
-    try:
-        problem = changed(problem, keys, problem.name) if keys else problem
-    except InputError as error:
-        raise ValueError(str(error)) from None
+    problem = changed(problem, keys, problem.name) if keys else problem
     pursuer, evader = problem.pursuer, problem.evader
     if "phase_deg" in values:
-        if pursuer.orbit is None or evader.orbit is None:
-            raise InputError("phase_deg: both players must have the table orbit; vary other keys instead")
+        assert pursuer.orbit is not None
+        assert evader.orbit is not None
         lead_rad = _true_longitude_rad(pursuer.orbit) - _true_longitude_rad(evader.orbit)
         anomaly_rad = evader.orbit.true_anomaly_rad + lead_rad + math.radians(values["phase_deg"])
         evader = replace(evader, orbit=replace(evader.orbit, true_anomaly_rad=anomaly_rad))
@@ -121,49 +132,30 @@ def read_axis(option: str, text: str) -> Axis:
 
 def report_json(report: MapReport) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
-    solved = report.solved
     return {
         "x": report.x,
         "y": report.y,
-        "points": solved.status.size,
-        "counts": {status.value: solved.count(status) for status in PointStatus},
-        "solved_from_nothing": solved.solved_from_nothing,
-        "capture_time_s": solved.capture_s,
-        "closing_speed_km_s": solved.closing_speed_m_s / M_PER_KM,
-        "status": [[STATUSES[status] for status in row] for row in solved.status],
+        "counts": Counter(report.verdict.ravel().tolist()),
+        "capture_time_s": report.capture_s,
+        "closing_speed_km_s": report.closing_speed_m_s / M_PER_KM,
+        "verdict": report.verdict,
     }
 
 
 def report_csv(report: MapReport) -> str:
     """Return a line for each point as CSV."""
-    x, y, solved = report.x, report.y, report.solved
-    times, speeds = solved.capture_s.tolist(), (solved.closing_speed_m_s / M_PER_KM).tolist()
-    rows: list[list[Cell]] = [
-        [float(column), float(row), times[j][i], speeds[j][i], STATUSES[solved.status[j, i]].value]
-        for j, row in enumerate(y.values)
-        for i, column in enumerate(x.values)
-    ]
-    return to_csv([x.parameter, y.parameter, "capture_time_s", "closing_speed_km_s", "status"], rows)
-
-
-def counted(solved: CaptureMap) -> str:
-    """Return the number of points of each status, for the terminal and the figure."""
-    counts = {words: solved.count(status) for status, words in STATUS_WORDS.items()}
-    return ", ".join(f"{count} {words}" for words, count in counts.items() if count)
+    grid = np.meshgrid(report.x.values, report.y.values)
+    parts = (*grid, report.capture_s, report.closing_speed_m_s / M_PER_KM, report.verdict)
+    columns = [report.x.parameter, report.y.parameter, "capture_time_s", "closing_speed_km_s", "verdict"]
+    return to_csv(columns, [*zip(*(part.ravel().tolist() for part in parts), strict=True)])
 
 
 def report_lines(report: MapReport) -> Iterator[str]:
-    """Yield the numbers of points by status and the range of capture times, for the screen."""
-    solved = report.solved
-    yield f"{report.problem.name}: {solved.status.size} points: {counted(solved)}"
-    if solved.capture_s.count():
-        low, high = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))
-        yield f"capture times from {low:.4f} to {high:.4f} h"
-    if solved.count(PointStatus.NEIGHBOUR):
-        yield (
-            "points continued from a neighbour are local saddle points: earlier captures are not excluded there; "
-            "--certify solves every point from scratch"
-        )
+    """Yield the numbers of points by verdict and the range of capture times, for the screen."""
+    yield f"{report.problem.name}: {report.summary}"
+    hours = report.capture_s.compressed() / S_PER_HOUR
+    if len(hours):
+        yield f"capture times from {hours.min():.4f} to {hours.max():.4f} h"
 
 
 COMMAND = ProblemCommand(

@@ -1,4 +1,4 @@
-"""The orbital pursuit-evasion game with free final time: solution, certificate, feedback and maps.
+"""The orbital pursuit-evasion game with free final time: solution, certificate and feedback.
 
 Game and conditions are those of Wang Yanxin's slides (Bauman University), after Shen and Casalino, Journal of Guidance,
 Control, and Dynamics 41(8), 2018, p. 1823, with misprints corrected. The method of solution and the certificate are
@@ -8,16 +8,13 @@ not from these sources.
 from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
 from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, fly, fly_many
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
-from rendezvous.pursuit_evasion.maps import STATUSES, CaptureMap, PointStatus, capture_map
 from rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Steering
 
 __all__ = [
-    "STATUSES",
     "Capture",
-    "CaptureMap",
     "Certificate",
     "Deviation",
     "DistanceCurve",
@@ -31,7 +28,6 @@ __all__ = [
     "Player",
     "PlayerEnd",
     "PlayerHistory",
-    "PointStatus",
     "Policy",
     "RandomSteering",
     "Route",
@@ -39,7 +35,6 @@ __all__ = [
     "Steering",
     "Units",
     "Verdict",
-    "capture_map",
     "certify",
     "fly",
     "fly_many",

@@ -9,6 +9,7 @@ import pytest
 from rendezvous.pursuit_evasion import Policy
 from rendezvous.pursuit_evasion._branch import follow
 from tests.experiments.command_line import Command
+from tests.experiments.pursuit.test_file import with_state
 
 SMALL_MAP = ["--x", "phase_deg=-9:-6:4", "--y", "evader.thrust_N=10:20:2"]
 
@@ -88,19 +89,23 @@ def test_feedback(infoset: Command) -> None:
 def test_a_map(infoset: Command) -> None:
     code, out, _ = infoset("pursuit-map", *SMALL_MAP, "--csv", "x.csv")
     assert code == 0
-    assert "8 points: " in out
-    assert "4 escape" in out
+    assert "8 points: 4 captured, 4 escapes" in out
     found = infoset.json("pursuit-map", *SMALL_MAP)
     assert found["x"] == {"parameter": "phase_deg", "values": [-9.0, -8.0, -7.0, -6.0]}
-    assert found["capture_time_s"][0][0] == pytest.approx(45343.620266, rel=1e-7)
+    assert found["capture_time_s"][0][0] == pytest.approx(45343.620266, rel=1e-8)
     assert found["capture_time_s"][1] == [None] * 4
-    assert found["status"][1] == ["escapes"] * 4
-    assert found["counts"]["escapes"] == 4
+    assert found["verdict"] == [["captured"] * 4, ["escapes"] * 4]
+    assert found["counts"] == {"captured": 4, "escapes": 4}
     lines = Path("x.csv").read_text().splitlines()
-    assert lines[0] == "phase_deg,evader.thrust_N,capture_time_s,closing_speed_km_s,status"
+    assert lines[0] == "phase_deg,evader.thrust_N,capture_time_s,closing_speed_km_s,verdict"
     assert float(lines[1].split(",")[2]) == found["capture_time_s"][0][0]
     assert len(lines) == 9
     assert lines[-1].endswith(",,,escapes")
+
+
+def test_points_of_a_map_that_are_no_game(infoset: Command) -> None:
+    found = infoset.json("pursuit-map", "--x", "phase_deg=-9:-8:2", "--y", "evader.mass_kg=900:2000:2")
+    assert found["verdict"] == [["no-game"] * 2, ["captured"] * 2]
 
 
 @pytest.mark.parametrize(
@@ -108,10 +113,12 @@ def test_a_map(infoset: Command) -> None:
     [
         (["pursuit", "--runs", "5"], "need a policy of the evader"),
         (["pursuit-map", "--x", "phase=-1:1:3"], "did you mean phase_deg"),
+        (["pursuit-map", "state.toml"], "phase_deg: both players must have the table orbit"),
         (["pursuit-map", "--x", "phase_deg=1:-1:3"], "KEY=FROM:TO:N"),
         (["pursuit-map", "--y", "phase_deg=-1:1:3"], "is also the parameter of --x"),
         (["pursuit-map", "--x", "phase_deg=-1:1:2000", "--y", "thrust_ratio=0:1:2000"], "more than 100000 points"),
     ],
 )
 def test_wrong_options_are_refused(arguments: list[str], told: str, infoset: Command) -> None:
+    Path("state.toml").write_text(with_state())
     assert told in infoset.refused(*arguments)

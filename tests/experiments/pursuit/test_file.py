@@ -74,9 +74,5 @@ def test_what_maps_vary() -> None:
     # The evader of the slides is 9 degrees behind the pursuer: 79 + 309 against 47 + 350.
     same = game_at(problem, {"phase_deg": -9.0}).evader
     assert same.position_m == pytest.approx(problem.game.evader.position_m, rel=1e-12)
-    with pytest.raises(ValueError, match="dry_mass_kg: must be less than mass_kg"):
+    with pytest.raises(InputError, match="dry_mass_kg: must be less than mass_kg"):
         game_at(problem, {"evader.mass_kg": 900.0})
-    with pytest.raises(ValueError, match="within the capture radius"):
-        game_at(problem, {"capture_radius_km": 7000.0})
-    with pytest.raises(InputError, match="phase_deg: both players must have the table orbit"):
-        game_at(read_text(PursuitProblem, with_state(), "mine"), {"phase_deg": 1.0})
