@@ -1,4 +1,4 @@
-"""Figures of an encounter: trajectories (the figure of the paper), controls, the Pareto set and front, costs."""
+"""Figures of an encounter: trajectories (the figure of the paper), controls, the Pareto set and front."""
 
 from __future__ import annotations
 
@@ -58,7 +58,6 @@ def draw_all(report: Report) -> Iterator[Figure]:
     yield draw_trajectories(solution)
     yield draw_controls(solution, report.problem.max_control_m_s2)
     yield draw_front(solution, report.selections, report.sweep)
-    yield draw_costs(solution)
 
 
 @style()
@@ -66,7 +65,8 @@ def draw_trajectories(solution: EncounterSolution) -> Figure:
     """Draw the trajectories in space and in three planes."""
     figure = new_figure(150.0)
     panels = figure.subplot_mosaic("ab;cd", per_subplot_kw={"b": {"projection": "3d"}})
-    paths = [solution.plan(index).sample(_POINTS).state[:, :3] for index in range(len(solution.costs))]
+    plans = map(solution.plan, range(len(solution.costs)))
+    paths = [plan.state(plan.times(_POINTS))[:, :3] for plan in plans]
     unit, per_m = length_unit(max(float(np.abs(path).max()) for path in paths))
     meeting = solution.meeting_state()[:3] * per_m
     titles = [f"{title}, {unit}" for title in AXIS_TITLES]
@@ -89,10 +89,11 @@ def draw_controls(solution: EncounterSolution, bound_m_s2: float | None = None) 
     figure, grid = subplots(120.0, 2, 2, sharex=True)
     panels = [*grid.flat]
     for index, name in enumerate(_names(solution)):
-        samples = solution.plan(index).sample(_POINTS)
-        for axes, values in zip(panels, samples.control_m_s2.T, strict=False):
-            axes.plot(samples.time_s, values, **_look(index, marker="none", label=name))
-        panels[3].plot(samples.time_s, np.linalg.norm(samples.control_m_s2, axis=1), **_look(index, marker="none"))
+        plan = solution.plan(index)
+        times = plan.times(_POINTS)
+        control = plan.control(times)
+        for axes, values in zip(panels, (*control.T, np.linalg.norm(control, axis=1)), strict=True):
+            axes.plot(times, values, **_look(index, marker="none", label=name))
     if bound_m_s2 is not None:
         panels[3].axhline(bound_m_s2, label="bound of the control", **BOUND)
     for axes, quantity in zip(panels, (*component_titles("u"), "$|u|$"), strict=True):
@@ -196,18 +197,3 @@ def _draw_sweep(axes: Axes, solution: EncounterSolution, sweep: DurationSweep) -
     axes.axvline(solution.encounter.meeting_s, label="time of the meeting in (a) and (b)", **EVENT)
     axes.set(yscale="log", xlabel="time of the meeting, s", ylabel=f"$J^2$ and group loss, {_COST}")
     axes.margins(x=0.0)
-
-
-@style()
-def draw_costs(solution: EncounterSolution) -> Figure:
-    """Draw the costs of the meeting as bars."""
-    figure, ((axes,),) = subplots(80.0)
-    names, ideal = _names(solution), [cost.ideal_cost_squared for cost in solution.costs]
-    axes.bar(names, ideal, 0.55, color=SET_EDGE, label="cheapest meeting of the craft, $J^{*2}$")
-    hatched = SET | {"hatch": "///", "label": "excess of the common meeting"}
-    axes.bar(names, solution.excess(), 0.55, bottom=ideal, **hatched)
-    axes.tick_params(axis="x", rotation=0 if len(names) <= len(LINE_LOOKS) else 90)
-    axes.set_ylabel(f"$J^2$, {_COST}")
-    axes.grid(axis="x", visible=False)
-    legend_below(figure, 2)
-    return figure

@@ -124,10 +124,11 @@ def _coalitions_json(coalitions: Coalitions | None, names: list[str]) -> dict[st
 
 def trajectories(report: Report) -> str:
     """Return the trajectories as CSV."""
-    plans = [report.solution.plan(index).sample(SAMPLES) for index in range(len(report.solution.costs))]
+    plans = map(report.solution.plan, range(len(report.solution.costs)))
     tracks = [
-        ([cost.craft.name], [plan.time_s, plan.state, plan.control_m_s2])
-        for cost, plan in zip(report.solution.costs, plans, strict=True)
+        ([plan.craft.name], [times, plan.state(times), plan.control(times)])
+        for plan in plans
+        for times in [plan.times(SAMPLES)]
     ]
     return trajectories_csv(["craft"], tracks)
 

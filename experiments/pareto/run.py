@@ -107,6 +107,6 @@ COMMAND = ProblemCommand(
     lines=report_lines,
     to_html=pareto_page,
     figures="experiments.pareto.figures",
-    figure_names=("figure-trajectories", "figure-controls", "figure-front", "figure-costs"),
+    figure_names=("figure-trajectories", "figure-controls", "figure-front"),
 )
 run = COMMAND.run

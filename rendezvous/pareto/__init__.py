@@ -11,13 +11,12 @@ from rendezvous.pareto.feasibility import (
     total_impulse,
 )
 from rendezvous.pareto.front import ParetoSet, distances, pareto_set, simplex_weights
-from rendezvous.pareto.selections import NotOptimalError, min_sum_of_costs, minimax_excess, nearest_to
+from rendezvous.pareto.selections import min_sum_of_costs, minimax_excess, nearest_to
 from rendezvous.pareto.solution import (
     CraftCost,
     DurationSweep,
     EncounterSolution,
     Plan,
-    PlanSamples,
     solve_encounter,
     sweep_meeting_time,
     weighted_point,
@@ -36,10 +35,8 @@ __all__ = [
     "EncounterSolution",
     "Feasibility",
     "Meeting",
-    "NotOptimalError",
     "ParetoSet",
     "Plan",
-    "PlanSamples",
     "analyse_coalitions",
     "check_bound",
     "distances",

@@ -12,15 +12,6 @@ from rendezvous._arrays import Floats
 from rendezvous.pareto.encounter import Craft, Encounter
 
 
-@dataclass(frozen=True)
-class PlanSamples:
-    """A flight sampled at k times: `state`, shape (k, 6), in m and m/s, and the control u, shape (k, 3)."""
-
-    time_s: Floats
-    state: Floats
-    control_m_s2: Floats
-
-
 @dataclass(frozen=True, eq=False)
 class Plan:
     """The minimum-energy flight of one craft from its start to the meeting, where its `costate`, shape (6,), is."""
@@ -40,10 +31,9 @@ class Plan:
         forced = np.einsum("...ab,...b->...a", segment.gramian, self._costate_at(times))
         return np.asarray(segment.transition @ self.craft.state + forced)
 
-    def sample(self, count: int) -> PlanSamples:
-        """Return the flight at `count` >= 2 equally spaced times, both ends included."""
-        times = np.linspace(self.craft.start_s, self.meeting_s, count)
-        return PlanSamples(times, self.state(times), self.control(times))
+    def times(self, count: int) -> Floats:
+        """Return `count` >= 2 equally spaced times, s, both ends included."""
+        return np.linspace(self.craft.start_s, self.meeting_s, count)
 
     def effects(self, time_s: Floats) -> Floats:
         """Return Phi(T, t) B(t), shape (k, 6, 3), the effect of a unit control for a second on the terminal state."""

@@ -114,7 +114,8 @@ def test_live_numbers_of_a_meeting(open_page: Open, pages: dict[str, str], repor
             assert values[f"J² of {cost.craft.name}"] == pytest.approx(whole, rel=SIX_DIGITS)
             assert values[f"excess of {cost.craft.name}"] == pytest.approx(excess, rel=SIX_DIGITS)
         for index, each in enumerate(page.evaluate("panels[0].view.tracks.map(({ points }) => points)")):
-            flown = solution.plan(index, point).sample(121).state[:, :3]
+            plan = solution.plan(index, point)
+            flown = plan.state(plan.times(121))[:, :3]
             np.testing.assert_allclose(each, flown, rtol=1e-9, atol=1e-9 * np.abs(flown).max())
 
     check()

@@ -98,6 +98,11 @@ def test_a_preferred_meeting_that_is_none(infoset: Command, preferred: str) -> N
     assert "for example --prefer x_m=0,z_m=0" in err
 
 
+def test_a_preferred_meeting_of_craft_that_start_apart(infoset: Command) -> None:
+    err = infoset.refused("pareto", "--set", "craft.1.start_s=5", "--prefer", "x_m=0,z_m=50")
+    assert "known only for craft that start at the same time" in err
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
