@@ -23,7 +23,7 @@ from rendezvous.reachability import (
     discretised,
     motion_of,
 )
-from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerHempel
+from rendezvous.relative_motion import CollocatedMotion, EllipticOrbit
 from rendezvous.two_body import OrbitalElements
 
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
@@ -188,7 +188,7 @@ class Rendezvous:
         )
 
     @cached_property
-    def motion(self) -> ConstantMotion | TschaunerHempel:
+    def motion(self) -> CollocatedMotion:
         """The linear model."""
         return motion_of(self.ellipse, self.model)
 

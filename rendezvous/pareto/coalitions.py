@@ -88,7 +88,12 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
             worth[members] = _worth(solution, members, weights)
             regret = max(float(common[list(members)].sum()) - worth[members], 0.0)
             coalitions.append(Coalition(members, worth[members], regret))
-    shapley = np.array([_shapley(craft, count, worth) for craft in range(count)])
+    shapley = np.zeros(count)
+    for members, value in worth.items():
+        for craft in members:
+            others = tuple(member for member in members if member != craft)
+            orders = factorial(len(others)) * factorial(count - len(members))
+            shapley[craft] += orders / factorial(count) * (value - worth[others])
     # Equal ideals are equal up to rounding only.
     rounding = _ROUNDING * sum(weights * [cost.effort_base @ cost.effort_base for cost in solution.costs])
     core = Core.EMPTY if worth[tuple(range(count))] > rounding else Core.ZERO
@@ -101,13 +106,3 @@ def _worth(solution: EncounterSolution, members: tuple[int, ...], weights: Float
         return 0.0
     point = weighted_point(costs, weights[list(members)])
     return float(sum(weights[member] * cost.excess(point) for member, cost in zip(members, costs, strict=True)))
-
-
-def _shapley(craft: int, count: int, worth: dict[tuple[int, ...], float]) -> float:
-    others = [other for other in range(count) if other != craft]
-    total = 0.0
-    for size in range(count):
-        share = factorial(size) * factorial(count - size - 1) / factorial(count)
-        for members in combinations(others, size):
-            total += share * (worth[tuple(sorted((*members, craft)))] - worth[members])
-    return total

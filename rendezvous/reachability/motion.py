@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
-from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerHempel
+from rendezvous.relative_motion import CollocatedMotion, EllipticOrbit, TimeVaryingMotion, TschaunerHempel
 
 _RELATIVE = 1e-12
 _ABSOLUTE = 1e-9
@@ -23,52 +23,42 @@ class MotionModel(Enum):
     TIME_VARYING = "time-varying"
 
 
-def motion_of(orbit: EllipticOrbit, model: MotionModel) -> ConstantMotion | TschaunerHempel:
+def motion_of(orbit: EllipticOrbit, model: MotionModel) -> CollocatedMotion:
     """Return the linear motion about an `orbit` by a `model`, in Hill's axes.
 
     Equation (2) of Shorikov and Goranov (2021), who use the frozen model.
     """
-    return orbit.frozen(0.0) if model is MotionModel.FROZEN else TschaunerHempel(orbit)
+    if model is MotionModel.FROZEN:
+        return TimeVaryingMotion(lambda times: orbit.dynamics(np.zeros_like(times)))
+    return TschaunerHempel(orbit)
 
 
 def discretised(
-    motion: ConstantMotion | TschaunerHempel, periods: int, period_s: float, acceleration_m_s2: float
+    motion: CollocatedMotion, periods: int, period_s: float, acceleration_m_s2: float
 ) -> tuple[Floats, Floats]:
     """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t), exact for controls held over a period.
 
     A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6, 3), is in m and m/s
     for a unit control, of acceleration `acceleration_m_s2`.
 
-    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
+    Equation (3).
     """
-    starts = _starts(motion, periods, period_s)
-    transition = motion.transition(starts, starts + period_s)
-    control = acceleration_m_s2 * motion.held_input(starts, starts + period_s)
-    return _repeated(transition, periods), _repeated(control, periods)
+    starts = period_s * np.arange(periods)
+    segment = motion.segment(starts, starts + period_s)
+    return segment.transition, acceleration_m_s2 * segment.held
 
 
 def between_periods(
-    motion: ConstantMotion | TschaunerHempel, periods: int, period_s: float, acceleration_m_s2: float, instants: int
+    motion: CollocatedMotion, periods: int, period_s: float, acceleration_m_s2: float, instants: int
 ) -> Floats:
     """Return the matrices of states within the periods, x = matrix (x(t), u(t)), shape (periods, instants, 6, 9).
 
     `motion`, `periods`, `period_s` and `acceleration_m_s2` are those of `discretised`; `instants` are evenly spaced
     within a period.
     """
-    starts = _starts(motion, periods, period_s)[:, None]
-    ends = starts + period_s * np.arange(1, instants + 1) / (instants + 1)
-    moved, held = motion.transition(starts, ends), motion.held_input(starts, ends)
-    return _repeated(np.concatenate([moved, acceleration_m_s2 * held], axis=-1), periods)
-
-
-def _starts(motion: ConstantMotion | TschaunerHempel, periods: int, period_s: float) -> Floats:
-    """Return the starts of all periods, or of the first one if A is constant."""
-    return period_s * np.arange(1.0 if isinstance(motion, ConstantMotion) else periods)
-
-
-def _repeated(matrices: Floats, periods: int) -> Floats:
-    """Repeat the matrices of one period, where A is constant."""
-    return np.repeat(matrices, periods, axis=0) if len(matrices) < periods else matrices
+    starts = period_s * np.arange(periods)[:, None]
+    segment = motion.segment(starts, starts + period_s * np.arange(1, instants + 1) / (instants + 1))
+    return np.concatenate([segment.transition, acceleration_m_s2 * segment.held], axis=-1)
 
 
 @dataclass(frozen=True)

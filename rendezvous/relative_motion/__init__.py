@@ -5,15 +5,14 @@ along the orbit's normal, so that z = x cross y. The origin follows the referenc
 """
 
 from rendezvous.relative_motion.clohessy_wiltshire import ClohessyWiltshire
-from rendezvous.relative_motion.constant import ConstantMotion
 from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
 from rendezvous.relative_motion.linear_motion import LinearMotion, Segment
-from rendezvous.relative_motion.time_varying import TimeVaryingMotion
+from rendezvous.relative_motion.time_varying import CollocatedMotion, TimeVaryingMotion
 from rendezvous.relative_motion.tschauner_hempel import TschaunerHempel
 
 __all__ = [
     "ClohessyWiltshire",
-    "ConstantMotion",
+    "CollocatedMotion",
     "EllipticOrbit",
     "LinearMotion",
     "Segment",

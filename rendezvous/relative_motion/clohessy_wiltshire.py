@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
 from rendezvous._compile import compiled
-from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
+from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, even_breaks
 
 SERIES_BELOW_RAD = 1.0
 QUADRATURE_BELOW_RAD = 2.0
@@ -49,10 +49,14 @@ class ClohessyWiltshire(LinearMotion):
         Below two radians, where the closed forms cancel, by Gauss and Legendre's rule, beyond by the closed forms. Each
         entry is within 1e-14 of its size up to 50 radians.
         """
-        durations = checked_durations(start_s, end_s)
+        durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
         matrices = np.zeros((durations.size, 6, 6))
         fill_gramians(self.rate_rad_s, durations.ravel(), NODES, WEIGHTS, matrices)
         return matrices.reshape(*durations.shape, 6, 6)
+
+    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
+        """Transition and Gramian together; end >= start."""
+        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s))
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian apart at most."""

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
-from rendezvous.relative_motion.constant import ConstantMotion
 
 _MAX_STEPS = 60
 
@@ -89,10 +88,6 @@ class EllipticOrbit:
         matrix[..., 4, 0], matrix[..., 4, 1], matrix[..., 4, 3] = -w_dot, w**2 - gravity, -2.0 * w
         matrix[..., 5, 2] = -gravity
         return matrix
-
-    def frozen(self, time_s: float) -> ConstantMotion:
-        """Return the motion whose constant matrix is A at a time."""
-        return ConstantMotion(self.dynamics(time_s))
 
     def _eccentric_of_true(self, true_rad: float) -> float:
         e = self.eccentricity

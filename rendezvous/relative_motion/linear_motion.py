@@ -35,28 +35,20 @@ class LinearMotion(ABC):
         """A(t), shape (..., 6, 6)."""
 
     @abstractmethod
-    def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
-
-    @abstractmethod
-    def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
+    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
+        """Transition and Gramian together; end >= start."""
 
     @abstractmethod
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, between which the motion turns by about a radian at most."""
 
-    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition and Gramian together; end >= start."""
-        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s))
+    def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
+        return self.segment(start_s, end_s).transition
 
-
-def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-    """Return end - start, s; raise `ValueError` if it is negative."""
-    durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
-    if (durations < 0.0).any():
-        raise ValueError(f"the end is {-durations.min():g} s before the start; a Gramian needs start <= end")
-    return durations
+    def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
+        return self.segment(start_s, end_s).gramian
 
 
 def state_scales(durations: Floats) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
-from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, checked_durations, state_scales
+from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, state_scales
 
 OfTime = Callable[[Floats], Floats]
 
@@ -22,8 +22,8 @@ MAX_BREAKS = 200_000
 
 
 @dataclass(frozen=True)
-class _Solution(Segment):
-    """Segments, and the effect of a held control, shape (..., 6, 3)."""
+class HeldSegment(Segment):
+    """Motion between two times, with the effect at the end of a unit control held from the start, shape (..., 6, 3)."""
 
     held: Floats
 
@@ -43,29 +43,11 @@ class CollocatedMotion(LinearMotion):
         """
         return end_s - (end_s - start_s) * position, (end_s - start_s) * np.ones_like(position)
 
-    def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
-        return self._solved(start_s, end_s).transition
-
-    def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Gramian, shape (..., 6, 6); end >= start."""
-        checked_durations(start_s, end_s)
-        return self._solved(start_s, end_s).gramian
-
-    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition and Gramian together; end >= start."""
-        checked_durations(start_s, end_s)
-        return self._solved(start_s, end_s)
-
-    def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
-        checked_durations(start_s, end_s)
-        return self._solved(start_s, end_s).held
-
-    def _solved(self, start_s: ArrayLike, end_s: ArrayLike) -> _Solution:
+    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> HeldSegment:
+        """Transition, Gramian and the effect of a held control together; end >= start, except for the transition."""
         starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
         solution, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
-        return _Solution(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
+        return HeldSegment(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,13 +85,13 @@ class TimeVaryingMotion(CollocatedMotion):
         return np.unique(np.concatenate(settled))
 
 
-def _refined(motion: CollocatedMotion, starts: Floats, ends: Floats) -> _Solution:
+def _refined(motion: CollocatedMotion, starts: Floats, ends: Floats) -> HeldSegment:
     """Double the panels until two solutions agree, or differ by rounding only; many intervals in parts."""
     panels = _first_panels(motion, starts, ends)
     if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
         half = len(starts) // 2
         parts = [_refined(motion, starts[part], ends[part]) for part in (slice(None, half), slice(half, None))]
-        return _Solution(
+        return HeldSegment(
             *(np.concatenate(arrays) for arrays in zip(*(vars(part).values() for part in parts), strict=True))
         )
     coarse, apart = _collocated(motion, starts, ends, panels), np.inf
@@ -150,7 +132,7 @@ def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
     return 0.5 * (nodes + 1.0), 0.5 * weights, 0.5 * integrals @ np.linalg.inv(values)
 
 
-def _collocated(motion: CollocatedMotion, starts: Floats, ends: Floats, panels: int) -> _Solution:
+def _collocated(motion: CollocatedMotion, starts: Floats, ends: Floats, panels: int) -> HeldSegment:
     """Solve on equal panels of the clock, which runs backwards; states are divided by (T, T, T, 1, 1, 1)."""
     nodes, weights, integrals = _gauss_collocation()
     durations = ends - starts
@@ -176,14 +158,14 @@ def _collocated(motion: CollocatedMotion, starts: Floats, ends: Floats, panels: 
         held = held + np.einsum("nk,nkai->nai", spans[:, panel], turned)
         power = power @ np.swapaxes(last[:, panel], -1, -2)
     outer = scale[:, :, None] * scale[:, None, :]
-    return _Solution(
+    return HeldSegment(
         power * (scale[:, :, None] / scale[:, None, :]),
         gramian * outer,
         held * scale[:, :, None],
     )
 
 
-def _difference(first: _Solution, second: _Solution, durations: Floats) -> float:
+def _difference(first: HeldSegment, second: HeldSegment, durations: Floats) -> float:
     """Maximum difference of two solutions, relative to each part, in states divided by (T, T, T, 1, 1, 1)."""
     if not len(durations):
         return 0.0

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from experiments.common.hill_axes import to_paper
+from rendezvous.reachability import MotionModel, motion_of
 from rendezvous.relative_motion import (
     ClohessyWiltshire,
-    ConstantMotion,
+    CollocatedMotion,
     EllipticOrbit,
     LinearMotion,
     TimeVaryingMotion,
@@ -78,17 +79,9 @@ def test_matrices_satisfy_their_differential_equations(name: str, duration: floa
     np.testing.assert_allclose(found.transition * weight, transition * weight, rtol=0.0, atol=2e-10 * size)
     spread = np.sqrt(np.outer(np.diag(gramian), np.diag(gramian)))
     np.testing.assert_allclose(found.gramian / spread, gramian / spread, rtol=0.0, atol=2e-10)
-    if isinstance(motion, TschaunerHempel | TimeVaryingMotion):
-        effect, wanted = motion.held_input(start, start + duration) / scale[:, None], held / scale[:, None]
+    if isinstance(motion, CollocatedMotion):
+        effect, wanted = motion.segment(start, start + duration).held / scale[:, None], held / scale[:, None]
         np.testing.assert_allclose(effect, wanted, rtol=0.0, atol=2e-10 * float(np.abs(wanted).max()))
-
-
-def test_a_frozen_motion_is_the_exponential_of_its_matrix() -> None:
-    motion = ConstantMotion(ClohessyWiltshire(RATE).dynamics(0.0))
-    np.testing.assert_allclose(motion.transition(0.0, 600.0), ClohessyWiltshire(RATE).transition(0.0, 600.0), atol=1e-9)
-    assert motion.transition(5.0, 5.0) == pytest.approx(np.eye(6), abs=0.0)
-    held = integrated(ClohessyWiltshire(RATE), 0.0, 600.0)[2]
-    np.testing.assert_allclose(motion.held_input(0.0, 600.0), held, rtol=1e-9, atol=1e-6)
 
 
 def test_the_published_gramian() -> None:
@@ -118,10 +111,8 @@ def test_keplers_equation(eccentricity: float, mean: float) -> None:
 def test_an_orbit_of_a_size() -> None:
     orbit = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
     # Shorikov and Goranov (2021), identified from their tables: frozen at perigee, a period of 180 s, 0.15 m/s^2.
-    frozen = orbit.frozen(0.0)
-    matrix, effect = (
-        in_paper_axes(each) for each in (frozen.transition(0.0, 180.0), 0.15 * frozen.held_input(0.0, 180.0))
-    )
+    frozen = motion_of(orbit, MotionModel.FROZEN).segment(0.0, 180.0)
+    matrix, effect = (in_paper_axes(each) for each in (frozen.transition, 0.15 * frozen.held))
     row = [1.000880159508, 2.552748205224e-3, 0.0, 177.7169731072, 25.08284792087, 0.0]
     np.testing.assert_allclose(matrix[0], row, rtol=1e-12, atol=1e-18)
     assert matrix[2, 2] == pytest.approx(0.9911552814183, rel=1e-12)
