@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
 from scipy.optimize import linprog
-from scipy.sparse import coo_array
+from scipy.sparse import block_array, csr_array, eye_array, kron
 
 from infoset.geometry.polytope import HIGHS
-from rendezvous._arrays import Floats
+from rendezvous._arrays import Floats, Places
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
@@ -50,25 +50,15 @@ class FeedbackPlan:
         """A bound on the terminal norm."""
         return float(np.linalg.norm(np.maximum(np.abs(self.lower[-1]), np.abs(self.upper[-1]))))
 
-    def run(self, moves: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the states, shape (T + 1, n), and controls, shape (T, m), under a disturbance.
-
-        `moves`, shape (T, q), are the values of w, each within 1.
-        """
-        w = np.asarray(moves, dtype=float)
-        controls = self.nominal + np.einsum("tsmq,sq->tm", self.gains, w)
-        states = [self.problem.initial]
-        for t in range(self.problem.periods):
-            pushed = self.disturbance[t] @ w[t]
-            states.append(self.problem.transition[t] @ states[-1] + self.problem.control[t] @ controls[t] + pushed)
-        return np.array(states), controls
-
 
 def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
     """Return the effect of each disturbance at each time, without feedback, shape (T + 1, T, n, q).
 
-    That of w(s) at t is A(t - 1) ... A(s + 1) disturbance[s], zero for s >= t.
+    That of w(s) at t is A(t - 1) ... A(s + 1) disturbance[s], zero for s >= t. Raise `ValueError` if the problem has
+    constraints within periods.
     """
+    if problem.between is not None:
+        raise ValueError("disturbances need constraints at whole periods only")
     periods = problem.periods
     effect = np.zeros((periods + 1, periods, *disturbance.shape[1:]))
     for t in range(periods):
@@ -84,7 +74,6 @@ def tightened(problem: ReachabilityProblem, disturbance: Floats) -> Reachability
     `disturbance` of shape (T, n, q); states of the new problem are those without disturbance. Each constraint is
     tightened by the support of the accumulated disturbance along its normal, which is exact.
     """
-    _check(problem, disturbance)
     effect = accumulated(problem, disturbance)
     normals, offsets, names = _all_constraints(problem)
     taken = np.abs(np.einsum("kn,tsnq->tksq", normals, effect)).sum(axis=(2, 3))
@@ -108,7 +97,6 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     ValueError
         If there are too many periods, or thrust is in a ball.
     """
-    _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:
         raise ValueError("feedback from disturbances needs thrust in a box")
     if problem.periods > MAX_PERIODS_WITH_FEEDBACK:
@@ -116,15 +104,26 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
             f"a plan with feedback from disturbances can have at most {MAX_PERIODS_WITH_FEEDBACK} periods, found "
             f"{problem.periods}"
         )
-    return _Program(problem, disturbance).solve()
-
-
-def _check(problem: ReachabilityProblem, disturbance: Floats) -> None:
-    shape = (problem.periods, problem.states)
-    if disturbance.ndim != 3 or disturbance.shape[:2] != shape or not np.isfinite(disturbance).all():
-        raise ValueError(f"the disturbance must be finite, of shape ({shape[0]}, {shape[1]}, q)")
-    if problem.between is not None:
-        raise ValueError("disturbances need constraints at whole periods only")
+    cost, matrix, limits = _program(problem, accumulated(problem, disturbance))
+    optimum = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs-ipm", options=HIGHS)
+    if optimum.status == 2:
+        raise NoRobustPlanError(
+            "no plan with affine feedback keeps the constraints under every disturbance; reduce the disturbance, "
+            "or relax the bounds"
+        )
+    if optimum.status != 0:
+        raise NoSolutionError(f"HiGHS: {optimum.message}")
+    ConeProgram(cost).keep(matrix, limits).checked(optimum.x, -optimum.ineqlin.marginals)
+    (periods, n, m), q, (at, earlier) = problem.control.shape, disturbance.shape[2], _pairs(problem)
+    nominal, own, _ = np.split(optimum.x, np.cumsum([periods * m, q * len(at) * m]))
+    nominal, gains = nominal.reshape(periods, m) * problem.control_bounds, np.zeros((periods, periods, m, q))
+    gains[at, earlier] = np.moveaxis(own.reshape(q, len(at), m), 0, -1) * problem.control_bounds[:, None]
+    centre, total = problem.run(nominal), np.zeros((periods + 1, periods, n, q))
+    for t in range(periods):  # the effect of w(s) at t, directly and through the controls
+        total[t + 1] = problem.transition[t] @ total[t] + problem.control[t] @ gains[t]
+        total[t + 1, t] += disturbance[t]
+    spread = np.abs(total).sum(axis=(1, 3))
+    return FeedbackPlan(problem, disturbance, nominal, gains, centre - spread, centre + spread)
 
 
 def _all_constraints(problem: ReachabilityProblem) -> tuple[Floats, Floats, tuple[str, ...]]:
@@ -137,133 +136,57 @@ def _all_constraints(problem: ReachabilityProblem) -> tuple[Floats, Floats, tupl
     return np.vstack([unit, -unit, normals]), np.hstack([bounds, offsets]), tuple(names)
 
 
-class _Program:
-    """The linear program of a plan: variables are nominal controls, gains, and absolute values.
+def _pairs(problem: ReachabilityProblem) -> tuple[Places, Places]:
+    """Return the times t and s < t of all gains."""
+    return np.tril_indices(problem.periods, -1)
 
-    Controls are divided by their bounds. `gain_at` are the variables of the gains of (t, s, control, disturbance).
+
+def _program(problem: ReachabilityProblem, effect: Floats) -> tuple[Floats, csr_array, Floats]:
+    """Return the cost, the rows and the limits of the linear program of a plan.
+
+    Its variables are the nominal controls; the gains of all (t, s), by component of w; absolute values of the effect of
+    each w(s) on each constraint, and of each gain, by component; and the maximum terminal states. Controls are divided
+    by their bounds, and constraints by their sizes.
     """
-
-    def __init__(self, problem: ReachabilityProblem, disturbance: Floats) -> None:
-        self.problem, self.disturbance, self.effect = problem, disturbance, accumulated(problem, disturbance)
-        self.periods, self.states, self.group = problem.periods, problem.states, problem.controls
-        self.width = disturbance.shape[2]
-        gains = [(t, *rest) for t in range(self.periods) for rest in np.ndindex(t, self.group, self.width)]
-        self.gain_at = {gain: self.periods * self.group + index for index, gain in enumerate(gains)}
-        self.begin = self.size = self.periods * self.group + len(gains)
-        self.rows: list[dict[int, float]] = []
-        self.limits: list[float] = []
-        # x(t) = free[t] + response[t] of all controls.
-        self.free = problem.run(np.zeros((self.periods, self.group)))
-        self.response = np.zeros((self.periods + 1, self.states, self.periods, self.group))
-        for t in range(self.periods):
-            self.response[t + 1] = np.einsum("ij,jsm->ism", problem.transition[t], self.response[t])
-            self.response[t + 1][:, t] += problem.control[t] * problem.control_bounds
-
-    def solve(self) -> FeedbackPlan:
-        """Build and solve it."""
-        problem = self.problem
-        scale = problem.state_bounds
-        normals, offsets, _ = _all_constraints(problem)
-        n = self.states
-        margins = {}
-        for t in range(1, self.periods + 1):
-            for i in range(n):
-                margins[t, i] = self._spread(np.eye(n)[i] / scale[i], t)
-                self._keep(np.eye(n)[i] / scale[i], t, offsets[t, i] / scale[i], margins[t, i])
-                self._keep(-np.eye(n)[i] / scale[i], t, offsets[t, n + i] / scale[i], margins[t, i])
-            for k in range(2 * n, len(normals)):
-                if np.isfinite(offsets[t, k]):
-                    size = float(np.abs(normals[k]) @ scale)
-                    row = normals[k] / size
-                    self._keep(row, t, offsets[t, k] / size, self._spread(row, t))
-        self._bound_controls()
-        maximum = [self._new() for _ in range(n)]
-        for i in range(n):
-            row = np.eye(n)[i] / scale[i]
-            for sign in (1.0, -1.0):
-                entries, constant = self._nominal(sign * row, self.periods)
-                entries |= margins[self.periods, i]
-                entries[maximum[i]] = -1.0
-                self._add(entries, -constant)
-        cost = np.zeros(self.size)
-        cost[self.begin :] = _TIDY  # of equally good plans, the one with small gains
-        cost[maximum] = 1.0
-        entries_at = [(r, c, v) for r, entries in enumerate(self.rows) for c, v in entries.items()]
-        r, c, v = zip(*entries_at, strict=True)
-        matrix = coo_array((v, (r, c)), shape=(len(self.rows), self.size)).tocsr()
-        optimum = linprog(cost, A_ub=matrix, b_ub=self.limits, bounds=(None, None), method="highs-ipm", options=HIGHS)
-        if optimum.status == 2:
-            raise NoRobustPlanError(
-                "no plan with affine feedback keeps the constraints under every disturbance; reduce the disturbance, "
-                "or relax the bounds"
-            )
-        if optimum.status != 0:
-            raise NoSolutionError(f"HiGHS: {optimum.message}")
-        ConeProgram(cost).keep(matrix, np.array(self.limits)).checked(optimum.x, -optimum.ineqlin.marginals)
-        return self._plan(optimum.x)
-
-    def _plan(self, solution: Floats) -> FeedbackPlan:
-        problem, reach = self.problem, self.problem.control_bounds
-        nominal = solution[: self.periods * self.group].reshape(self.periods, self.group) * reach
-        gains = np.zeros((self.periods, self.periods, self.group, self.width))
-        for (t, s, j, q), index in self.gain_at.items():
-            gains[t, s, j, q] = solution[index] * reach[j]
-        centre = problem.run(nominal)
-        # Effect of w(s) at t, directly and through the controls.
-        total = np.zeros_like(self.effect)
-        for t in range(self.periods):
-            total[t + 1] = problem.transition[t] @ total[t] + problem.control[t] @ gains[t]
-            total[t + 1, t] += self.disturbance[t]
-        spread = np.abs(total).sum(axis=(1, 3))
-        return FeedbackPlan(problem, self.disturbance, nominal, gains, centre - spread, centre + spread)
-
-    def _new(self) -> int:
-        self.size += 1
-        return int(self.size - 1)
-
-    def _add(self, entries: dict[int, float], limit: float) -> None:
-        self.rows.append(entries)
-        self.limits.append(limit)
-
-    def _absolute(self, entries: dict[int, float], constant: float) -> int:
-        """Add a variable that is at least |entries + constant|."""
-        index = self._new()
-        self._add({**entries, index: -1.0}, -constant)
-        self._add({**{c: -v for c, v in entries.items()}, index: -1.0}, constant)
-        return index
-
-    def _spread(self, row: Floats, time: int) -> dict[int, float]:
-        """Return variables whose sum is the maximum effect of disturbances on row . x(time)."""
-        margins: dict[int, float] = {}
-        turned = np.einsum("n,nsm->sm", row, self.response[time])
-        for s in range(time):
-            for q in range(self.width):
-                entries = {
-                    self.gain_at[t, s, j, q]: float(turned[t, j])
-                    for t in range(s + 1, time)
-                    for j in range(self.group)
-                    if turned[t, j] != 0.0
-                }
-                constant = float(row @ self.effect[time, s, :, q])
-                if entries or constant != 0.0:
-                    margins[self._absolute(entries, constant)] = 1.0
-        return margins
-
-    def _nominal(self, row: Floats, time: int) -> tuple[dict[int, float], float]:
-        turned = np.einsum("n,nsm->sm", row, self.response[time]).ravel()
-        return {int(c): float(turned[c]) for c in np.flatnonzero(turned)}, float(row @ self.free[time])
-
-    def _keep(self, row: Floats, time: int, limit: float, spread: dict[int, float]) -> None:
-        entries, constant = self._nominal(row, time)
-        self._add({**entries, **spread}, limit - constant)
-
-    def _bound_controls(self) -> None:
-        for t in range(self.periods):
-            for j in range(self.group):
-                spread = {
-                    self._absolute({self.gain_at[t, s, j, q]: 1.0}, 0.0): 1.0
-                    for s in range(t)
-                    for q in range(self.width)
-                }
-                for sign in (1.0, -1.0):
-                    self._add({t * self.group + j: sign, **spread}, 1.0)
+    (periods, n, m), q, (at, earlier) = problem.control.shape, effect.shape[3], _pairs(problem)
+    pairs = len(at)
+    # x(t) by the nominal controls, and the effect of w(s) on x(t) by the gains of one component.
+    response, through = np.zeros((periods + 1, n, periods * m)), np.zeros((periods + 1, periods, n, pairs * m))
+    for t in range(periods):
+        push = problem.control[t] * problem.control_bounds
+        response[t + 1], through[t + 1] = problem.transition[t] @ response[t], problem.transition[t] @ through[t]
+        response[t + 1, :, t * m : (t + 1) * m] += push
+        for pair in np.flatnonzero(at == t):
+            through[t + 1, earlier[pair], :, pair * m : (pair + 1) * m] += push
+    normals, offsets, _ = _all_constraints(problem)
+    sizes = np.abs(normals) @ problem.state_bounds
+    rows, ends = normals / sizes[:, None], offsets / sizes
+    times, kinds = np.nonzero(np.isfinite(ends) & (np.arange(periods + 1) > 0)[:, None])
+    nominal = np.einsum("cn,cnu->cu", rows[kinds], response[times])
+    coasting = np.einsum("cn,cn->c", rows[kinds], problem.run(np.zeros((periods, m)))[times])
+    # Both bounds on a state have the same absolute values.
+    by_gains, fixed = (np.einsum("kn,tsn...->tks...", rows[n:], part) for part in (through, effect))
+    kept = (by_gains.any(axis=-1) | fixed.any(axis=-1)) & np.isfinite(ends[:, n:, None])
+    at_time, of_kind, _ = np.nonzero(kept)
+    sums = (at_time == times[:, None]) & (of_kind == np.where(kinds < n, kinds, kinds - n)[:, None])
+    gains_at = np.kron(at == np.arange(periods)[:, None], np.eye(m))
+    spread = np.kron(np.ones(q), block_diag(sums, gains_at))
+    spread_states, spread_controls = spread[: len(times)], spread[len(times) :]
+    inner = kron(np.eye(q), csr_array(np.vstack([by_gains[kept], np.eye(pairs * m)])))
+    constant = np.vstack([fixed[kept], np.zeros((pairs * m, q))]).T.ravel()
+    last, unit, ones = (times == periods) & (kinds < 2 * n), np.eye(periods * m), np.ones(periods * m)
+    matrix = block_array(
+        [
+            [nominal, None, spread_states, None],
+            [unit, None, spread_controls, None],
+            [-unit, None, spread_controls, None],
+            [nominal[last], None, spread_states[last], -np.tile(np.eye(n), (2, 1))],
+            [None, inner, -eye_array(len(constant)), None],
+            [None, -inner, -eye_array(len(constant)), None],
+        ],
+        format="csr",
+    )
+    limits = np.concatenate([ends[times, kinds] - coasting, ones, ones, -coasting[last], -constant, constant])
+    # Of equally good plans, the one with small gains.
+    cost = np.repeat([0.0, _TIDY, 1.0], [periods * m + inner.shape[1], len(constant), n])
+    return cost, matrix, limits
