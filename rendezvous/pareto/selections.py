@@ -84,8 +84,12 @@ def minimax_excess(solution: EncounterSolution) -> Floats:
 def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     """Return the Pareto-optimal free values of a `solution` nearest to `preferred` ones, shape (f,), in the norm of M.
 
-    An exact projection onto the convex hull of the ideals. `ValueError` is raised if the M of two craft differ by more
-    than a factor, because the set is then curved.
+    An exact projection onto the convex hull of the ideals.
+
+    Raises
+    ------
+    ValueError
+        If the M of two craft differ by more than a factor: the set is then curved.
     """
     matrices = np.array([cost.matrix for cost in solution.costs])
     unit = matrices / np.trace(matrices, axis1=1, axis2=2)[:, None, None]

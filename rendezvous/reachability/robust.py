@@ -96,6 +96,8 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
         If no plan with affine feedback satisfies the constraints.
     ValueError
         If there are too many periods, or thrust is in a ball.
+    NoSolutionError
+        If the linear program was not solved.
     """
     if problem.thrust is ThrustShape.BALL:
         raise ValueError("feedback from disturbances needs thrust in a box")
