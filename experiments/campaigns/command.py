@@ -26,14 +26,6 @@ Required = Annotated[
         "miss_m p99<10.",
     ),
 ]
-Shown = Annotated[
-    str | None,
-    typer.Option(
-        metavar="QUANTILES",
-        help='Quantiles to draw, separated by commas, for example "miss_m p99,impulse_m_s p90". '
-        "Default: p50 and p99 of the miss and of the impulse.",
-    ),
-]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +150,6 @@ class Sweep(Flight):
             metavar="N", min=1, max=MAX_RUNS, help="Maximum number of runs of a cell with --until. Default: 2000."
         ),
     ] = None
-    show: Shown = None
     guarantee: Annotated[
         bool, typer.Option("--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed.")
     ] = False
@@ -172,10 +163,9 @@ class Report(FileOptions):
     runs, correlation of the miss with the initial state, and the ten worst runs, each with the command that simulates
     it again; with --out, figures of the distributions, of the convergence of the quantiles, and of the miss against the
     initial state. For a sweep: the values that meet the requirement; with --out, the table and the figures. --require
-    and --show are for sweeps. Without --out or --json no file is written.
+    is for sweeps. Without --out or --json no file is written.
     """
 
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep.")]
     require: Required = None
-    show: Shown = None
     csv: Csv = None

@@ -19,7 +19,7 @@ from experiments.campaigns.run_tables import (
     summary_parts,
     worst_runs,
 )
-from experiments.campaigns.sweep_report import TABLE, SweepReport, default_requirement, figure_names, quantile_options
+from experiments.campaigns.sweep_report import TABLE, SweepReport, default_requirement, figure_names, read_requirement
 from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
@@ -72,8 +72,7 @@ def _read(options: Report) -> CampaignFolder:
 def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
     scenario = folder.manifest.scenario
     sized = bool(folder.runs(["hit"])["hit"].count())
-    default = folder.manifest.require or default_requirement(has_size=sized)
-    required, shown = quantile_options(options.require, options.show, default)
+    required = read_requirement(options.require, folder.manifest.require or default_requirement(has_size=sized))
     if required.quantity in ("hit", "cause") and not sized:
         raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")
     if required.quantity == "guaranteed_miss_m" and scenario.set_model.is_guaranteed and not folder.manifest.guarantee:
@@ -81,7 +80,7 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> I
             f"--require {required}: this sweep was simulated without the bound Phi; simulate it in a new folder with "
             "infoset sweep --guarantee, or give a bound of miss_m"
         )
-    report = SweepReport(folder, sweep_table(folder, required, shown), shown)
+    report = SweepReport(folder, sweep_table(folder, required))
     written.save("report.json", to_json(report.to_json()), "--json")
     written.deliver("--csv", report.table.rows.to_csv(index=False))
     report.save(written)
@@ -89,9 +88,8 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> I
 
 
 def _report_campaign(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
-    for option, value in (("--require", options.require), ("--show", options.show)):
-        if value is not None:
-            raise InputError(f"{option}: is only for a sweep, and {folder.path} is a campaign; omit it")
+    if options.require is not None:
+        raise InputError(f"--require: is only for a sweep, and {folder.path} is a campaign; omit it")
     runs = folder.runs()
     table = summary(folder, runs)
     related, worst = correlations(folder, runs), worst_runs(folder, runs, _scenario_file(folder, options.out))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from experiments.campaigns.command import Sweep as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_report import SweepReport, default_requirement, quantile_options
+from experiments.campaigns.sweep_report import SweepReport, default_requirement, read_requirement
 from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
@@ -25,13 +25,12 @@ def run(options: Options) -> None:
         axes = sweep_axes(",".join(options.vary), scenario)
         cells = sweep_cells(scenario, axes)
         sized = cells[0].body is not None
-        required, shown = quantile_options(options.require, options.show, default_requirement(has_size=sized))
+        required = read_requirement(options.require, default_requirement(has_size=sized))
         if required.quantity in ("hit", "cause") and not sized:
             raise InputError(
                 f"--require {required}: the scenario {scenario.name} has no [body]; set its radius, for example "
                 "--set body.radius_m=80"
             )
-        guarantee = options.guarantee or "guaranteed_miss_m" in {quantile.quantity for quantile in shown}
         swept = Campaign(
             scenario,
             options.runs,
@@ -41,14 +40,14 @@ def run(options: Options) -> None:
             seed=options.seed,
             noise=noise_of(options),
             strategy=own_strategy(options.strategy),
-            guarantee=guarantee,
+            guarantee=options.guarantee or required.quantity == "guaranteed_miss_m",
             chunk=options.chunk,
             until=required if options.until else None,
             max_runs=_max_runs(options),
             require=required,
         )
         flown = fly(swept, options, notes)
-        report = SweepReport(flown.folder, sweep_table(flown.folder, required, shown), shown)
+        report = SweepReport(flown.folder, sweep_table(flown.folder, required))
         summary = to_json(report.to_json(flown.elapsed_s))
         written.enter(options.out, "shards")
         written.save(SCENARIO_FILE, to_toml(scenario))

@@ -23,7 +23,7 @@ from sim.storage import CampaignFolder
 
 TABLE = "sweep.parquet"
 SHOWN = tuple(QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99))
-SHOWN_WITH_HITS = (SHOWN[0], SHOWN[1], SHOWN[3])
+"""Quantiles in figures, after the required one."""
 MAX_ROWS = 100
 """Maximum number of cells that are printed for each noise."""
 _FIXED = "a fixed number of runs"
@@ -37,11 +37,10 @@ def figure_names(noises: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class SweepReport:
-    """The stored runs of a sweep, the decisions about a requirement, and the quantiles that the figure shows."""
+    """The stored runs of a sweep, and the decisions about a requirement."""
 
     folder: CampaignFolder
     table: SweepTable
-    shown: Sequence[QuantileName]
 
     @property
     def is_drawn(self) -> bool:
@@ -76,8 +75,12 @@ class SweepReport:
         if self.is_drawn and written.folder is not None:
             from experiments.campaigns.sweep_figures import draw_sweep
 
+            required = self.table.required
+            shown = [*SHOWN[:2], SHOWN[3]]
+            if isinstance(required, Requirement):
+                shown = [*dict.fromkeys((required.quantile, *SHOWN))]
             for noise, name in zip(self.table.noises, figure_names(self.table.noises), strict=True):
-                written.figure(name, draw_sweep(self.table, self.shown, noise))
+                written.figure(name, draw_sweep(self.table, shown, noise))
 
     def parts(self) -> Iterator[Part]:
         """Yield the decision of every cell, and the limits of the values that meet the requirement, for the screen."""
@@ -159,17 +162,10 @@ class SweepReport:
         return lines + campaign_notes(self.folder)
 
 
-def quantile_options(
-    require: str | None, show: str | None, default: str
-) -> tuple[AnyRequirement, tuple[QuantileName, ...]]:
-    """Read the values of --require and --show; a required quantile is always the first of those shown."""
+def read_requirement(text: str | None, default: str) -> AnyRequirement:
+    """Read the value of --require."""
     with input_errors("--require"):
-        required = parse_requirement(default if require is None else require)
-    default_shown = SHOWN if isinstance(required, Requirement) else SHOWN_WITH_HITS
-    with input_errors("--show"):
-        chosen = default_shown if show is None else tuple(QuantileName.parse(text) for text in show.split(","))
-    first = (required.quantile,) if isinstance(required, Requirement) else ()
-    return required, tuple(dict.fromkeys((*first, *chosen)))
+        return parse_requirement(text or default)
 
 
 def default_requirement(*, has_size: bool) -> str:

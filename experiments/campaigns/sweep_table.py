@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ import pandas as pd
 from experiments.campaigns.run_tables import COLUMNS, LEVELS, groups, noises_of, or_nan, summary
 from experiments.campaigns.sweep_axes import sweep_cells, tied_keys
 from infoset.arrays import Floats
-from sim import QuantileName, Requirement
+from sim import Requirement
 from sim.closed_form import possible_miss_of
 from sim.requirement import AnyRequirement, Decision, judge
 from sim.statistics import shows
@@ -56,10 +56,11 @@ class SweepTable:
         return self.rows[self.rows["noise"] == noise]
 
 
-def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Sequence[QuantileName] = ()) -> SweepTable:
-    """Return the table of a sweep, finished or not, with the levels `LEVELS` and those of some more quantiles."""
+def sweep_table(folder: CampaignFolder, required: AnyRequirement) -> SweepTable:
+    """Return the table of a sweep, finished or not, with the levels `LEVELS` and that of the required quantile."""
     runs = folder.runs(COLUMNS)
-    table = summary(folder, runs, sorted({*LEVELS, *(quantile.level for quantile in quantiles)}))
+    more = {required.quantile.level} if isinstance(required, Requirement) else set[float]()
+    table = summary(folder, runs, sorted({*LEVELS} | more))
     decisions = pd.DataFrame([_decision(chosen, required, folder) for _, _, chosen in groups(folder, runs)])
     decisions = decisions.astype({"required_known": "Int64", "runs_needed": "Int64"})
     axes, noises = folder.manifest.axes, noises_of(folder)

@@ -13,12 +13,6 @@ import typer
 from experiments.common.errors import InputError, nearest, shown
 
 
-def _page_path(path: Path | None) -> Path | None:
-    if path is not None and path.suffix != ".html":
-        raise typer.BadParameter(f"{path} must end in .html")
-    return path
-
-
 def _silence_the_compile_notice(quiet: bool) -> bool:
     logging.getLogger("infoset.kernels").setLevel(logging.ERROR if quiet else logging.NOTSET)
     return quiet
@@ -56,7 +50,6 @@ Html = Annotated[
     typer.Option(
         "--html",
         metavar="FILE.html",
-        callback=_page_path,
         help="Write an interactive page: one file that opens in any browser, offline.",
     ),
 ]

@@ -94,19 +94,12 @@ class Header:
     format: Literal["infoset-record-3"] = "infoset-record-3"
 
 
-def record_path(option: str, path: Path) -> Path:
-    """Return a path, the value of an option, if it ends in ``.npz``; raise `InputError` otherwise."""
-    if path.suffix != ".npz":
-        raise InputError(f"{option}: {path} must end in .npz; for example {option} flight.npz")
-    return path
-
-
 def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write the record of an engagement as an `.npz` file, completely or not at all.
 
     `InputError` if the file cannot be written, or exists already.
     """
-    file = record_path("record", Path(path))
+    file = Path(path)
     header = Header(
         **{name: getattr(record, name) for name in _OF_HEADER},
         outcome=record.result.outcomes[0],

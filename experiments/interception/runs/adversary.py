@@ -12,7 +12,6 @@ from experiments.common.errors import InputError
 from experiments.common.screen import Part, figure_files, number, number_table, show
 from experiments.common.units import M_PER_KM
 from experiments.interception.command import Adversary
-from experiments.interception.record_file import record_path
 from experiments.interception.runs.engage import steps_csv
 from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, read_times, save_records
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, work_of
@@ -27,8 +26,6 @@ RECORD = "record-worst.npz"
 
 def run(options: Adversary) -> None:
     """Search, write the files and print the table."""
-    if options.record is not None:
-        record_path("--record", options.record)
     scenario, notes = study_scenario(options)
     own = own_strategy(options.strategy)
     times_s = read_times(options.times, options.out)

@@ -11,7 +11,6 @@ import numpy as np
 from experiments.common.output import Cell, outcome_columns, to_csv
 from experiments.common.screen import figure_files, show
 from experiments.interception.command import Engage
-from experiments.interception.record_file import record_path
 from experiments.interception.runs.engagement_table import (
     FIGURES,
     draw_engagements,
@@ -45,7 +44,7 @@ def run(options: Engage) -> None:
         scenario = replace(scenario, noise=NoiseKind(chosen))
     record_files = {}
     if options.record is not None:
-        file = record_path("--record", options.record)
+        file = options.record
         record_files = {
             noise: file.with_name(f"{file.stem}-{noise}{file.suffix}") if both else file for noise in noises
         }

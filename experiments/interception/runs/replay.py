@@ -21,8 +21,6 @@ def run(options: Replay) -> None:
     if len(options.records) > MAX_RECORDS:
         raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
     times_s = read_times(options.times, options.out)
-    if options.gif is not None and options.gif.suffix != ".gif":
-        raise InputError(f"--gif: {options.gif} must end in .gif; for example --gif flight.gif")
     with (
         output_of(options, figure_files(*FIGURES), {"--gif": options.gif}) as written,
         progress_bar(options.quiet) as begin,

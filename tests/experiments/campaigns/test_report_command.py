@@ -70,7 +70,6 @@ def test_a_report_of_files_alone(infoset: Command, brief: Scenario, folder: Path
         (["empty"], "contains no runs yet"),
         (["broken"], "is not a readable manifest"),
         (["runs", "--require", "miss_m p90<10"], "--require: is only for a sweep"),
-        (["runs", "--show", "miss_m p50"], "--show: is only for a sweep"),
     ],
 )
 def test_what_cannot_be_reported(

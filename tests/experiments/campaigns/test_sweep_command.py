@@ -98,7 +98,6 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Command, swept: 
         (["--vary", "thruster.max_impulse_m_s=0.01:5:3"], "brief with thruster.max_impulse_m_s = 0.01"),
         (["--require", "miss_m 10"], "--require: must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY"),
         (["--require", "hit>=0.95"], "has no [body]; set its radius, for example --set body.radius_m=80"),
-        (["--show", "miss_m p99,fuel p50"], "--show: there is no quantity fuel"),
         (["--max-runs", 30], "--max-runs is the limit of --until; add --until decided"),
         (["--until", "decided", "--max-runs", 9], "--max-runs: must be at least --runs, 10, found 9"),
     ],
