@@ -126,6 +126,17 @@ class _Report:
             say(f"{name}: {100.0 * done:.0f} %{left}", quiet=False)
 
 
+def parts_of(progress: Callable[[float], None], count: int) -> list[Callable[[float], None]]:
+    """Return functions that set the fractions done of equal parts of a bar."""
+    done = [0.0] * count
+
+    def update(part: int, share: float) -> None:
+        done[part] = share
+        progress(sum(done) / count)
+
+    return [partial(update, part) for part in range(count)]
+
+
 def number(value: float | None) -> str:
     """Return a number with three significant digits, from 100 to 1e9 with one decimal, for tables."""
     if value is None:

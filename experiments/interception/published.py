@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 
 from experiments.common.printed_numbers import Ours, Progress, read_paper
+from experiments.common.screen import parts_of
+from experiments.interception.runs.shared import simulate_all
 from experiments.interception.scenario_file import load_scenario
 from experiments.interception.study import curve_scenarios
 from guidance import NoiseKind, TieRule
 from infoset import Recovery
 from infoset.arrays import Floats
-from sim import Results, Scenario, simulate
+from sim import Results
+from sim.parallel import Task
 
 PAPER = "interception"
 SINGLE, MANY = "asteroid-1997-single", "asteroid-1997"
@@ -25,26 +27,33 @@ RUNS = 200
 
 
 def compute(progress: Progress) -> dict[str, Sequence[Ours | float]]:
-    """Compute the numbers by source."""
-    single, many = load_scenario(SINGLE), load_scenario(MANY)
-    ours = {ONE_RUN: _single(replace(single, range_sensor=None), lambda done: progress(0.3 * done))}
-    return {**ours, **_figure_4(many, lambda done: progress(0.3 + 0.7 * done))}
+    """Compute the numbers by source; for the game of one run, with each tie rule that does not draw."""
+    single, many = replace(load_scenario(SINGLE), range_sensor=None), load_scenario(MANY)
+    # The published procedure: a set that became empty stays lost.
+    lost = replace(many, information_set=replace(many.information_set, recovery=Recovery.NONE))
+    curves = [(number, flown) for number, flown in curve_scenarios(many) if flown.range_sensor is None]
+    curves += [(number, flown) for number, flown in curve_scenarios(lost) if flown.range_sensor is not None]
+    ties = [replace(single, noise=NoiseKind.GAME, tie=tie) for tie in TieRule if tie is not TieRule.RANDOM]
+    runs = [(single, RUNS), *((tie, 1) for tie in ties), *((flown, RUNS) for _, flown in curves)]
+    results = simulate_all(
+        [
+            Task(scenario, range(count), 0, guarantee=False, progress=report)
+            for (scenario, count), report in zip(runs, parts_of(progress, len(runs)), strict=True)
+        ]
+    )
+    both = results[:1], results[1 : 1 + len(ties)]
+    one_run = [_median(values) for found in both for values in zip(*map(_values, found), strict=True)]
+    figure_4 = {
+        f"figure 4, curve {number}": [*np.quantile(found.miss_m, (0.5, 0.9)), np.quantile(found.impulse_m_s, 0.5)]
+        for (number, _), found in zip(curves, results[1 + len(ties) :], strict=True)
+    }
+    return {ONE_RUN: one_run, **figure_4}
 
 
 def printed_single_runs() -> dict[str, tuple[float, float]]:
     """Return the printed miss (m) and impulse (m/s) by noise."""
     values = [number.value for number in read_paper(PAPER).tables[ONE_RUN]]
     return {"random": (values[0], values[1]), "game": (values[2], values[3])}
-
-
-def _single(scenario: Scenario, progress: Progress) -> list[Ours]:
-    """Return medians for random errors, and for the game with each tie rule that does not draw: one run each."""
-    game = replace(scenario, noise=NoiseKind.GAME)
-    random = simulate(scenario, RUNS, guarantee=False, progress=lambda done: progress(0.5 * done))
-    ties = [tie for tie in TieRule if tie is not TieRule.RANDOM]
-    games = [simulate(replace(game, tie=tie), 1, guarantee=False) for tie in ties]
-    progress(1.0)
-    return [_median(values) for flown in ([random], games) for values in zip(*map(_values, flown), strict=True)]
 
 
 def _values(results: Results) -> tuple[Floats, Floats]:
@@ -55,26 +64,3 @@ def _median(runs: Sequence[Floats]) -> Ours:
     """Return the median of the medians, with the extremes of the 5 and 95 % quantiles."""
     low, middle, high = np.array([np.quantile(values, (0.05, 0.5, 0.95)) for values in runs]).T
     return Ours(float(np.median(middle)), spread=(float(low.min()), float(high.max())))
-
-
-def _figure_4(scenario: Scenario, progress: Progress) -> dict[str, list[float]]:
-    # The published procedure: a set that became empty stays lost.
-    lost = replace(scenario, information_set=replace(scenario.information_set, recovery=Recovery.NONE))
-    plain = {number: flown for number, flown in curve_scenarios(scenario) if flown.range_sensor is None}
-    ranging = {number: flown for number, flown in curve_scenarios(lost) if flown.range_sensor is not None}
-    done = dict.fromkeys((1, 2, 3, 4), 0.0)
-
-    def fly(number: int) -> Results:
-        def report(share: float) -> None:
-            done[number] = share
-            progress(sum(done.values()) / len(done))
-
-        return simulate({**plain, **ranging}[number], RUNS, guarantee=False, progress=report)
-
-    # The slowest first; kernels release the interpreter.
-    with ThreadPoolExecutor(2) as pool:
-        flown = zip((4, 3, 2, 1), pool.map(fly, (4, 3, 2, 1)), strict=True)
-    return {
-        f"figure 4, curve {number}": [*np.quantile(results.miss_m, (0.5, 0.9)), np.quantile(results.impulse_m_s, 0.5)]
-        for number, results in flown
-    }

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.errors import InputError
-from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, show
+from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, parts_of, show
 from experiments.common.units import M_PER_KM
 from experiments.interception.command import Bound
-from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, work_of
+from experiments.interception.runs.shared import WorstMisses, find_worst_misses, need_finite, work_of
 from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import chosen_strategies
 from experiments.interception.study import max_guarantee_m
@@ -105,25 +105,21 @@ def _simulate(
     begin: BeginProgress,
 ) -> list[WorstOfStrategy]:
     worst = []
-    report = begin("strategies")
-    for index, (name, own) in enumerate(strategies.items()):
+    reports = parts_of(begin("strategies"), len(strategies))
+    for report, (name, own) in zip(reports, strategies.items(), strict=True):
         flown = scenario if own is not None else replace(scenario, strategy=name)
         flights = [(pair, fly_pair(flown, pair, own)) for pair in lower.pairs]
         for _, flight in flights:
             need_finite(flight.results)
         searched = WorstMisses(None, None)
         if options.budget > 0:
-            part = _part_of(report, index, len(strategies))
-            searched = find_worst_misses(flown, own, budget=options.budget, seed=options.seed, begin=part)
-        report((index + 1) / len(strategies))
+            searched = find_worst_misses(
+                flown, own, budget=options.budget, seed=options.seed, begin=lambda _name, report=report: report
+            )
+        report(1.0)
         records = tuple(engagement.record(own) for engagement in searched.engagements)
         worst.append(WorstOfStrategy(name, tuple(flights), searched, records))
     return worst
-
-
-def _part_of(report: Progress, index: int, parts: int) -> BeginProgress:
-    """Return the progress of one of several equal parts."""
-    return lambda _name: lambda done: report((index + done) / parts)
 
 
 def _nominal(scenario: Scenario) -> TruthPair:

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from rich.table import Table
 
 from experiments.common.output import Cell, hit_key, to_csv
-from experiments.common.screen import Part, figure_files, number, number_table, quantile_notes, show, some_runs
+from experiments.common.screen import (
+    Part,
+    figure_files,
+    number,
+    number_table,
+    parts_of,
+    quantile_notes,
+    show,
+    some_runs,
+)
 from experiments.interception.command import Compare
-from experiments.interception.runs.shared import Progress, b_plane_figures, simulate_all, work_of
+from experiments.interception.runs.shared import b_plane_figures, simulate_all, work_of
 from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import chosen_noises, chosen_strategies
 from experiments.interception.study import (
     QUANTILES,
-    Compared,
     Comparison,
     SetCounts,
     compared_scenarios,
@@ -47,17 +55,17 @@ def run(options: Compare) -> None:
     strategies, noises = chosen_strategies(scenario, options.strategies), chosen_noises(options.noise)
     figures = [FIGURE, *b_plane_figures(scenario, noises)]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)], notes=notes) as work:
-        reports = {name: work.begin(name) for name in strategies}
         wanted = compared_scenarios(scenario, strategies, noises)
-        progress_of = _progress(wanted, reports)
+        each = len(wanted) // len(strategies)
+        reports = [report for name in strategies for report in parts_of(work.begin(name), each)]
         tasks = [
             Task(
                 *(flown, range(options.runs), options.seed),
                 noise=noises[flight[1]],
                 strategy=strategies[flight[0]],
-                progress=progress_of(flight),
+                progress=report,
             )
-            for flight, flown in wanted.items()
+            for (flight, flown), report in zip(wanted.items(), reports, strict=True)
         ]
         compared = comparisons(dict(zip(wanted, simulate_all(tasks), strict=True)))
         work.save(
@@ -74,21 +82,6 @@ def run(options: Compare) -> None:
 
             work.written.draw(figures, draw_compared(scenario, compared), work.begin("figure"))
     show(_parts(scenario, compared), options.quiet or work.written.stdout_taken)
-
-
-def _progress(flights: Iterable[Compared], reports: Mapping[str, Progress]) -> Callable[[Compared], Progress]:
-    """Return the progress of a flight, which is shown for all flights of its strategy together."""
-    done = dict.fromkeys(flights, 0.0)
-
-    def progress_of(flight: Compared) -> Progress:
-        def progress(share: float) -> None:
-            done[flight] = share
-            shares = [each for (name, *_), each in done.items() if name == flight[0]]
-            reports[flight[0]](sum(shares) / len(shares))
-
-        return progress
-
-    return progress_of
 
 
 def _summary(comparison: Comparison) -> dict[str, object]:
