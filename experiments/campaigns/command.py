@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from experiments.common.options import Csv, FileOptions, Json, Overwrite, Quiet, Seed, Settings
-from experiments.interception.command import MAX_RUNS, RangeSensor, ScenarioName, StrategyName, StudyModel
+from experiments.interception.command import MAX_RUNS, ModelName, NoiseName, RangeSensor, ScenarioName, StrategyName
 
 MAX_WORKERS = 1024
 MAX_AT_ONCE = 1_000_000
@@ -36,17 +36,10 @@ class Flight:
     settings: Settings = None
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs.")]
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")]
-    noise: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NOISE",
-            help="Measurement noise: random, gaussian, correlated, game, mixed (random in even runs, game in odd "
-            "runs), or FILE.py:CLASS for a class in a Python file. Default: that of the scenario.",
-        ),
-    ] = None
+    noise: NoiseName = None
     seed: Seed = 0
     strategy: StrategyName = None
-    model: StudyModel = None
+    model: ModelName = None
     range_sensor: RangeSensor = None
     json: Json = None
     overwrite: Overwrite = False
@@ -89,6 +82,7 @@ class Campaign(Flight):
     The runs are stored in DIR in shards (files of many runs). A shard is written as soon as its runs are complete.
     After any interruption, the same command with --resume continues the campaign; with a greater --runs it extends the
     campaign. The numbers depend only on the scenario, the seed and the run, not on workers, shards or interruptions.
+    With --noise mixed, even runs have random noise and odd ones game noise.
     Run K with a noise is the same engagement as in: infoset engage DIR/scenario.toml --noise NOISE --seed SEED --run K.
     To see the results: infoset report DIR.
     """

@@ -33,21 +33,21 @@ Strategies = Annotated[
         "Default: all built-in strategies.",
     ),
 ]
+NoiseName = Annotated[
+    str | None,
+    typer.Option(
+        "--noise",
+        metavar="NOISE",
+        help="Measurement noise: random, gaussian, correlated, game, or FILE.py:CLASS for a class in a Python file. "
+        "Default: that of the scenario.",
+    ),
+]
 ModelName = Annotated[
     Literal["paper", "guaranteed"] | None,
     typer.Option(
         "--model",
-        help="Model of the information set. Default: that of the scenario. A model other than the scenario's starts "
-        "from its default initial set.",
-    ),
-]
-StudyModel = Annotated[
-    Literal["paper", "guaranteed"] | None,
-    typer.Option(
-        "--model",
-        help="Model of the information set, whatever the scenario file says. A model other than the file's starts from "
-        "its default initial set.",
-        show_default="guaranteed",
+        help="Model of the information set. Default: that of the scenario in the commands experiment and engage, "
+        "otherwise guaranteed. Another model than the scenario's starts from its default initial set.",
     ),
 ]
 RangeSensor = Annotated[
@@ -76,21 +76,15 @@ class Experiment(FileOptions):
     """Simulate many runs with random noise and with game noise.
 
     There are four cases (curves): random or game noise, without or with the range sensor. Game noise is measurement
-    errors chosen against the guidance; --noise replaces the random noise. Run K starts from the same state in all four
-    cases, and is the same engagement as in: infoset engage --run K. Without --out, --json or --csv no file is written.
+    errors chosen against the guidance; --noise replaces the random noise, and may not be game. Run K starts from the
+    same state in all four cases, and is the same engagement as in: infoset engage --run K. Without --out, --json or
+    --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs of each case.")] = 50
-    noise: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NOISE",
-            help="Noise of curves 1 and 2: random, gaussian, correlated, or FILE.py:CLASS for a class in a Python "
-            "file. Default: that of the scenario, random if it is game.",
-        ),
-    ] = None
+    noise: NoiseName = None
     seed: Seed = 0
     strategy: StrategyName = None
     model: ModelName = None
@@ -110,31 +104,20 @@ class Experiment(FileOptions):
 class Engage(FileOptions):
     """Simulate one engagement.
 
-    With --noise both, there is one with each kind of noise. Run K has exactly the same numbers as run K of infoset
-    experiment with the same seed. Without --out, --json, --csv or --record no file is written.
+    With --noise both, there is one with random and one with game noise, and --record FILE.npz writes FILE-random.npz
+    and FILE-game.npz. Run K has exactly the same numbers as run K of infoset experiment with the same seed. Without
+    --out, --json, --csv or --record no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
-    noise: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NOISE",
-            help="Measurement noise: random, gaussian, correlated, game, both (random and game), or FILE.py:CLASS for "
-            "a class in a Python file. Default: that of the scenario.",
-        ),
-    ] = None
+    noise: NoiseName = None
     range_sensor: RangeSensor = None
     strategy: StrategyName = None
     model: ModelName = None
     seed: Seed = 0
     run: Annotated[int, typer.Option(metavar="K", min=0, max=MAX_RUNS - 1, help="Number of the run, from 0.")] = 0
-    record: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.npz", help="Write the record; with --noise both, FILE-random.npz and FILE-game.npz."
-        ),
-    ] = None
+    record: RecordFile = None
     times: SetTimes = None
     csv: Csv = None
 
@@ -164,7 +147,7 @@ class Compare(FileOptions):
         int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of runs for each strategy and noise.")
     ] = 50
     seed: Seed = 0
-    model: StudyModel = None
+    model: ModelName = None
     range_sensor: RangeSensor = None
     csv: Csv = None
 
@@ -185,7 +168,7 @@ class Bound(FileOptions):
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     strategies: Strategies = None
-    model: StudyModel = None
+    model: ModelName = None
     budget: Annotated[
         int,
         typer.Option(
@@ -214,7 +197,7 @@ class Adversary(FileOptions):
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     strategy: StrategyName = None
-    model: StudyModel = None
+    model: ModelName = None
     range_sensor: RangeSensor = None
     budget: Annotated[
         int, typer.Option(metavar="N", min=1, max=MAX_RUNS, help="Number of engagements in a search.")

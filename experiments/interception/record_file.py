@@ -40,18 +40,17 @@ Arrays = dict[str, NDArray[Any]]
 
 
 class Member(NamedTuple):
-    """Declaration of an array: its shape and type, whether values may be unknown, and their minimum."""
+    """Declaration of an array: its shape and type, and whether values may be unknown."""
 
     shape: tuple[str | int, ...]
     dtype: str = "<f8"
     nullable: bool = False
-    minimum: float = -MAXIMUM
 
 
 _MEASURED = {f"measured_{kind.quantity}": kind for kind in SENSORS}
 _OF_STEPS = {
-    "time_s": Member(("steps",), minimum=0.0),
-    "true_range_m": Member(("steps",), minimum=0.0),
+    "time_s": Member(("steps",)),
+    "true_range_m": Member(("steps",)),
     "truth_margin_m": Member(("steps",), nullable=True),
     **dict.fromkeys(("true_angle_rad", "true_rate_rad_s", "impulse_m_s"), Member(("steps", "axes"))),
     "predicted_miss_m": Member(("steps", "axes", 2), nullable=True),
@@ -67,9 +66,7 @@ MEMBERS = {
     "header": Member(("bytes",), "|u1"),
     **_OF_STEPS,
     **{
-        name: Member(("steps", "axes"), nullable=True)
-        if kind.is_lateral
-        else Member(("steps",), nullable=True, minimum=0.0)
+        name: Member(("steps", "axes") if kind.is_lateral else ("steps",), nullable=True)
         for name, kind in _MEASURED.items()
     },
     **{
@@ -182,8 +179,8 @@ def _check(arrays: Arrays, axes: int) -> None:
             raise ValueError(f"{name} is {values.dtype.str} of shape {values.shape}, not {member.dtype} of {shape}")
         if values.dtype.kind == "f":
             known = values[~np.isnan(values)] if member.nullable else values
-            if not ((known >= member.minimum) & (known <= MAXIMUM)).all():
-                raise ValueError(f"{name} has a number outside {member.minimum:g} to {MAXIMUM:g}")
+            if not (np.abs(known) <= MAXIMUM).all():
+                raise ValueError(f"{name} has a number beyond {MAXIMUM:g}")
     if steps == 0 or (np.diff(arrays["time_s"]) <= 0.0).any():
         raise ValueError("time_s does not increase")
     if arrays["result_velocity_m_s"][0, -1] >= 0.0:

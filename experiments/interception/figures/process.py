@@ -80,8 +80,8 @@ def draw_process(records: Sequence[Record]) -> Figure:
         _level_errors(angles, traces_of(records))
         _level_moduli(rates)
     else:
-        _level(angles, traces_of(records), "angle", "mrad")
-        _level(rates, traces_of(records), "rate", "µrad/s")
+        _level(angles, traces_of(records), "angle")
+        _level(rates, traces_of(records), "rate")
     for axes in impulses:
         axes.set_ylim(-1.2 * impulse_m_s, 1.2 * impulse_m_s)
     level_predicted_miss(misses)
@@ -203,8 +203,8 @@ def level_predicted_miss(row: Sequence[Axes]) -> None:
         axes.set_ylim(-2.0 * maximum, 2.0 * maximum)
 
 
-def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str, unit: str) -> None:
-    """Give axes of a row the same limits, those of the first part of the way, and say what a curve beyond reaches."""
+def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str) -> None:
+    """Give axes of a row the same limits, those of the first part of the way."""
     values = []
     for trace in traces:
         ranges = trace[0].true_range_m
@@ -213,11 +213,5 @@ def _level(row: Sequence[Axes], traces: Sequence[Trace], sensor: str, unit: str)
     far = np.concatenate(values)
     margin = 0.12 * float(np.ptp(far)) or 0.1 * float(np.abs(far).max()) or 1.0
     low, high = float(far.min()) - margin, float(far.max()) + margin
-    for axes, trace in zip(row, traces, strict=True):
+    for axes in row:
         axes.set_ylim(low, high)
-        true = _true(trace, sensor)
-        worst = true[np.abs(true - 0.5 * (low + high)).argmax()]
-        text = f"{1e-3 * worst:.3g} {unit.replace('µ', 'm')}" if abs(worst) >= 1e3 else f"{worst:.3g} {unit}"
-        note = "" if low <= worst <= high else f"reaches {text}".replace("-", "\N{MINUS SIGN}")
-        # Every axes has a title, so that the rows of two records are at the same height.
-        axes.set_title("\n".join(filter(None, [axes.get_title(), note])) or " ", fontsize="small")

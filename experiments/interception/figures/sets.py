@@ -22,7 +22,6 @@ from sim import Record
 
 TRUTH_MARK = "true (ω, α)"
 MEASUREMENT_MARK = "measured α, drawn at the true ω"
-FAR_MARK = "measured α, beyond the axes"
 SECTIONS_MARK = "sections of the set, the nearest dark"
 _TRUTH: dict[str, Any] = {"marker": "x", "color": INK, "markersize": 7.0, "markeredgewidth": 1.6, "linestyle": "none"}
 _SQUARE: dict[str, Any] = {"marker": "s", "color": INK, "markerfacecolor": "white", "markersize": 5.5}
@@ -198,10 +197,8 @@ def _number(tick: float, _place: int, factor: float) -> str:
 
 
 def _draw_measurement(axes: Axes, plane: Plane) -> None:
-    """Draw the measured angle as a square, or beyond the limits of the axes as a triangle at their edge."""
+    """Draw the measured angle as a square, which is not seen if it is far from the set."""
     if plane.measured_rad is not None:
-        (bottom, top), angle = axes.get_ylim(), plane.measured_rad * 1e3
-        look, label = _SQUARE, MEASUREMENT_MARK
-        if not bottom <= angle <= top:
-            look, label = _SQUARE | {"marker": "^" if angle > top else "v", "clip_on": False}, FAR_MARK
-        axes.plot(plane.true[0], np.clip(angle, bottom, top), zorder=5, label=label, linestyle="none", **look)
+        axes.plot(
+            plane.true[0], plane.measured_rad * 1e3, zorder=5, label=MEASUREMENT_MARK, linestyle="none", **_SQUARE
+        )
