@@ -6,7 +6,6 @@ import contextlib
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
-from dataclasses import dataclass
 from functools import partial
 
 from experiments.campaigns.cluster import workers_of
@@ -45,17 +44,11 @@ def noise_of(options: Flight) -> CampaignNoise | OwnNoise | None:
     return CampaignNoise(chosen) if isinstance(chosen, str) else chosen
 
 
-@dataclass(frozen=True)
-class Flown:
-    """A simulated campaign or sweep, the warnings about its scenarios, and the time of this session."""
+def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> tuple[CampaignFolder, list[str], float]:
+    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr.
 
-    folder: CampaignFolder
-    warnings: list[str]
-    elapsed_s: float
-
-
-def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
-    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr."""
+    Return the folder, the warnings about the scenarios, and the time of this session, s.
+    """
     need_free(options.out, resume=options.resume)
     scenarios = campaign.cells or (campaign.scenario,)
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
@@ -71,7 +64,7 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
         folder = campaign.run(
             executor, workers=workers, resume=options.resume, progress=begin("campaign"), within_chunks=True
         )
-    return Flown(folder, warnings, time.perf_counter() - began_s)
+    return folder, warnings, time.perf_counter() - began_s
 
 
 @contextlib.contextmanager

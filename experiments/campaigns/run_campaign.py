@@ -34,19 +34,19 @@ def run(options: Options) -> None:
             chunk=options.chunk,
             until=rule,
         )
-        flown = fly(campaign, options, model_notes)
-        stored, manifest = flown.folder, flown.folder.manifest
+        stored, warnings, elapsed_s = fly(campaign, options, model_notes)
+        manifest = stored.manifest
         table = summary(stored, stored.runs(COLUMNS))
         results = {
             **heading(stored),
-            **({"warnings": flown.warnings} if flown.warnings else {}),
-            "elapsed_s": flown.elapsed_s,
+            **({"warnings": warnings} if warnings else {}),
+            "elapsed_s": elapsed_s,
             "samples": records(table.drop(columns="cell")),
         }
         stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
         parts = [
             study_title(manifest.scenario, manifest.strategy, manifest.seed),
-            f"{some_runs(stored.finished_runs)}{stopped}, {duration_text(flown.elapsed_s)}; "
+            f"{some_runs(stored.finished_runs)}{stopped}, {duration_text(elapsed_s)}; "
             f"quantiles with {'' if stopped else '95 % '}confidence limits",
             *summary_parts(stored, table),
         ]

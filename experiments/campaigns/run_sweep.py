@@ -46,9 +46,9 @@ def run(options: Options) -> None:
             max_runs=_max_runs(options),
             require=required,
         )
-        flown = fly(swept, options, notes)
-        report = SweepReport(flown.folder, sweep_table(flown.folder, required))
-        summary = to_json(report.to_json(flown.elapsed_s))
+        folder, _, elapsed_s = fly(swept, options, notes)
+        report = SweepReport(folder, sweep_table(folder, required))
+        summary = to_json(report.to_json(elapsed_s))
         written.enter(options.out, "shards")
         written.save(SCENARIO_FILE, to_toml(scenario))
         report.save(written)
@@ -64,8 +64,4 @@ def _max_runs(options: Options) -> int | None:
         if options.max_runs is not None:
             raise InputError("--max-runs is the limit of --until; add --until decided, or omit it")
         return None
-    if options.max_runs is not None and options.max_runs < options.runs:
-        raise InputError(
-            f"--max-runs: must be at least --runs, {options.runs}, found {options.max_runs}; give a greater number"
-        )
-    return max(MAX_RUNS_A_CELL, options.runs) if options.max_runs is None else options.max_runs
+    return max(options.max_runs or MAX_RUNS_A_CELL, options.runs)

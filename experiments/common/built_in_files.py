@@ -31,8 +31,6 @@ PROBLEMS = {
     "trajectory": ProblemKind("scenarios from-states", "interception.trajectory_file", "Trajectory"),
 }
 """Kinds of problems by the `kind` of their files."""
-_SCENARIO_TABLES = {"uncertainty", "dispersion", "angle_sensor", "camera", "thruster", "information_set"}
-"""A file without a kind that has two of these tables is taken for a scenario."""
 
 
 class BuiltIn(NamedTuple):
@@ -79,11 +77,9 @@ def built_in(name: str, kinds: Collection[str]) -> BuiltIn:
 
 
 def kind_of(document: Mapping[str, Any]) -> str | None:
-    """Return the kind of a parsed file: `SCENARIO`, a kind of problem, or None."""
+    """Return the kind of problem of a parsed file; None if it has none, as a scenario."""
     kind = document.get("kind")
-    if isinstance(kind, str) and kind in PROBLEMS:
-        return kind
-    return SCENARIO if kind is None and len(_SCENARIO_TABLES & document.keys()) >= 2 else None
+    return kind if isinstance(kind, str) and kind in PROBLEMS else None
 
 
 def taken_by(kind: str, file: str = "FILE") -> str:

@@ -85,8 +85,6 @@ def load_problem(name_or_path: str | os.PathLike[str], settings: Sequence[str] |
     """
     text, source = source_of(name_or_path, PROBLEMS)
     kind = kind_of(parse(text, source))
-    if kind == SCENARIO:
-        raise InputError(f"{source}: {taken_by(kind)}")
     if kind is None:
         raise InputError(f"{source}: kind: must be one of {', '.join(PROBLEMS)}; write it above the first table")
     owner: type = getattr(import_module(f"experiments.{PROBLEMS[kind].module}"), PROBLEMS[kind].owner)

@@ -39,16 +39,13 @@ def own_strategy(text: str | None, option: str = "--strategy") -> Strategy | Non
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
     """Return the strategies of ``--strategies`` by name, with the strategy of a Python file, None for a built-in one.
 
-    None is all built-in strategies. `InputError` if there is no such strategy, or one is named twice.
+    None is all built-in strategies. `InputError` if there is no such strategy.
     """
     valid = strategy_names()
     chosen: dict[str, Strategy | None] = {}
     for text in valid if names is None else [part.strip() for part in names.split(",")]:
         own = own_strategy(text, "--strategies")
-        name = choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)
-        if name in chosen:
-            raise InputError(f"--strategies: {name} is named twice; name each strategy once")
-        chosen[name] = own
+        chosen[choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)] = own
     return chosen
 
 
@@ -63,16 +60,13 @@ def chosen_noise(text: str, names: Sequence[str] = NOISES) -> str | OwnNoise:
 def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
     """Return the noises of a list by name, with the noise of a Python file, None for a built-in one; `all` is four.
 
-    `InputError` if there is no such noise, or one is named twice.
+    `InputError` if there is no such noise.
     """
     chosen: dict[str, NoiseSource | None] = {}
     parts = [part.strip() for part in names.split(",")]
     for text in [*(NOISES if "all" in parts else ()), *(part for part in parts if part != "all")]:
         noise = chosen_noise(text)
-        name, own = (noise, None) if isinstance(noise, str) else (noise.name, noise)
-        if name in chosen:
-            raise InputError(f"--noise: {name} is named twice; name each noise once")
-        chosen[name] = own
+        chosen |= {noise: None} if isinstance(noise, str) else {noise.name: noise}
     return chosen
 
 

@@ -28,7 +28,7 @@ def run(options: Adversary) -> None:
     """Search, write the files and print the table."""
     scenario, notes = study_scenario(options)
     own = own_strategy(options.strategy)
-    times_s = read_times(options.times, options.out)
+    times_s = read_times(options.times)
     names = ("steps.csv", RECORD, *figure_files(*FIGURES))
     with work_of(options, scenario, names, {"--record": options.record}, notes) as work:
         worst = find_worst_misses(

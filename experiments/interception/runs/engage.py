@@ -31,7 +31,7 @@ def run(options: Engage) -> None:
     """Simulate one or two engagements, write the files and print the table."""
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
-    times_s = read_times(options.times, options.out)
+    times_s = read_times(options.times)
     both = options.noise == "both"
     chosen = chosen_noise(options.noise or scenario.noise.value, [*NOISES, "both"])
     wanted: dict[str, NoiseSource | str] = (

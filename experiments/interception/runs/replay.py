@@ -20,7 +20,7 @@ def run(options: Replay) -> None:
     """Read the records, write the files and print the table."""
     if len(options.records) > MAX_RECORDS:
         raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
-    times_s = read_times(options.times, options.out)
+    times_s = read_times(options.times)
     with (
         output_of(options, figure_files(*FIGURES), {"--gif": options.gif}) as written,
         progress_bar(options.quiet) as begin,

@@ -59,5 +59,4 @@ def test_an_animation_has_a_picture_a_moment(record: Record, tmp_path: Path) -> 
 def test_figure_3_at_other_times(file: Path, tmp_path: Path, infoset: Command) -> None:
     assert infoset("replay", file, "--out", "sets", "--times", "2, 40,60,90", "-q")[0] == 0
     assert (tmp_path / "sets" / "figure-3-sets.png").is_file()
-    for times, part in (("1,x", "could not convert"), ("-1", "times must be"), ("1," * 12 + "1", "at most 12")):
-        assert f"--times: {part}" in infoset.refused("replay", file, "--out", "no", "--times", times)
+    assert "--times: could not convert" in infoset.refused("replay", file, "--out", "no", "--times", "1,x")
