@@ -23,7 +23,7 @@ from experiments.common.figure_style import (
     subplots,
 )
 from experiments.common.screen import some_runs
-from experiments.interception.figures.b_plane import Cloud, draw_b_plane, max_guarantee
+from experiments.interception.figures.b_plane import Cloud, draw_b_plane
 from experiments.interception.figures.distributions import MAX_POINTS, Sample, axis_limit, draw_samples
 from infoset.arrays import Floats
 from sim import estimate_quantiles
@@ -57,7 +57,7 @@ def draw_all(folder: CampaignFolder, runs: pd.DataFrame) -> Iterator[Figure]:
         samples.append(
             Sample(title, _look(noise), miss_m, impulse_m_s, bounds_m.dropna().to_numpy(), f"{noise} noise: {bound}")
         )
-        most_m = max_guarantee(bounds_m.fillna(np.inf).tolist()) if guaranteed else None
+        most_m = float(bounds_m.max()) if guaranteed and bounds_m.notna().all() else None
         has_axes = scenario.b_plane_t_rad is not None
         across_m = chosen[["b_dot_t_m", "b_dot_r_m"] if has_axes else ["miss_y_m", "miss_z_m"]].to_numpy()
         clouds.append(Cloud(f"{noise} noise, {some_runs(len(chosen))}", across_m, miss_m, most_m, has_axes))

@@ -19,7 +19,7 @@ from enum import Enum
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import ValidationError
 
@@ -298,21 +298,9 @@ def _found(values: dict[str, Any], owner: type, key: str) -> tuple[dict[str, Any
 
     A table that is missing in `values` is added. None if there is no such key.
     """
-    path, end = key.split("."), None
-    found = _table_at(values, owner, path[:-1])
-    if found is None and path[-1] in ENDS:
-        end = ENDS.index(path.pop())
-        found = _table_at(values, owner, path[:-1])
-    name = None if found is None else next((name for name in fields_of(found[1]) if si_factor(path[-1], name)), None)
-    if found is None or name is None or (end is not None and not fields_of(found[1])[name].pair):
-        return None
-    return *found, name, end
-
-
-def _table_at(values: dict[str, Any], owner: type, path: Sequence[str]) -> tuple[dict[str, Any], type] | None:
-    """Return a table and its dataclass, adding it if it is missing; None if there is no such table."""
-    table: Any = values
-    for part in path:
+    path, table = key.split("."), cast(Any, values)
+    end = ENDS.index(path.pop()) if len(path) > 1 and path[-1] in ENDS else None
+    for part in path[:-1]:
         if isinstance(table, list):
             number = int(part) if part.isdecimal() and len(part) < 6 else 0
             if not 1 <= number <= len(table):
@@ -323,7 +311,10 @@ def _table_at(values: dict[str, Any], owner: type, path: Sequence[str]) -> tuple
             if field is None or field.table is None or not isinstance(table, dict):
                 return None
             owner, table = field.table, table.setdefault(part, [] if field.many else {})
-    return (table, owner) if isinstance(table, dict) else None
+    name = next((name for name in fields_of(owner) if si_factor(path[-1], name)), None)
+    if not isinstance(table, dict) or name is None or (end is not None and not fields_of(owner)[name].pair):
+        return None
+    return table, owner, name, end
 
 
 def _value(literal: str) -> Any:

@@ -22,6 +22,7 @@ from experiments.interception.course import (
     true_predicted_misses,
 )
 from experiments.interception.record_file import replayed
+from experiments.interception.study import max_guarantee_m
 from guidance.thruster import modulus
 from infoset import Section
 from infoset.arrays import Flags, Floats
@@ -81,7 +82,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
         "arrival_s": scenario.nominal_arrival_s,
         "min_to_go_s": min_to_go_s(scenario),
         "marks": [[name, duration_text(time), time] for name, time in marks(scenario).items()],
-        "guaranteed_miss_m": record.result.guaranteed_miss_m.tolist()[0] if record.result.guarantees else None,
+        "guaranteed_miss_m": max_guarantee_m(record.result),
         "closing_speed_m_s": model.closing_speed_m_s,
         "range_error_relative": scenario.range_sensor.relative_error if scenario.range_sensor is not None else None,
         "rate_error_rad_s": scenario.rate_sensor.error_rad_s if scenario.rate_sensor is not None else None,

@@ -38,6 +38,7 @@ from experiments.interception.figures.shared import (
     draw_levels,
     name_events,
 )
+from experiments.interception.study import max_guarantee_m
 from guidance.thruster import modulus
 from sim import Record
 
@@ -85,7 +86,7 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     maximum = modulus(np.abs(misses).max(axis=-1).T)
     centred = modulus(0.5 * (misses[..., 1] - misses[..., 0]).T)
     true = modulus(true_predicted_misses(record).T)
-    levels = [level for level in (_guaranteed_m(record), record.scenario.radius_m) if level]
+    levels = [level for level in (max_guarantee_m(record.result), record.scenario.radius_m) if level]
     top = max([*maximum, *true, *levels])
     bottom = max(min([*centred, *true, *levels]), _MIN_SHOWN * min([*centred, top]), 1e-6)
     axes.set(yscale="log", ylim=(0.5 * bottom, 2.0 * top), ylabel="miss, m")
@@ -95,12 +96,7 @@ def _draw_possible(axes: Axes, record: Record) -> None:
     axes.plot(times, true, **_TRUE)
     if len(known):
         draw_end(axes, times[known[-1]], maximum[-1], record.scenario)
-    draw_levels(axes, _guaranteed_m(record), record.scenario.radius_m)
-
-
-def _guaranteed_m(record: Record) -> float | None:
-    (bound,) = record.result.guaranteed_miss_m.tolist()
-    return bound if record.result.guarantees else None
+    draw_levels(axes, max_guarantee_m(record.result), record.scenario.radius_m)
 
 
 def _draw_moduli(axes: Axes, record: Record) -> None:
@@ -116,7 +112,7 @@ def _draw_b_plane(axes: Axes, record: Record) -> None:
     """Draw the B-plane: the box of possible misses at the last decision, and the path of the true predicted miss."""
     known = complete_steps(record)
     end = record.result.lateral_miss_m[0]
-    guaranteed, radius = _guaranteed_m(record), record.scenario.radius_m
+    guaranteed, radius = max_guarantee_m(record.result), record.scenario.radius_m
     sizes = [float(np.abs(end).max()), guaranteed or 0.0]
     if len(known):
         y, z = record.predicted_miss_m[known[-1]]

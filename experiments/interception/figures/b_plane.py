@@ -27,6 +27,7 @@ from experiments.common.figure_style import (
 from experiments.common.screen import number, some_runs
 from experiments.interception.figures.distributions import axis_limit
 from experiments.interception.figures.shared import MAX_VECTORS, draw_body, ring
+from experiments.interception.study import max_guarantee_m
 from infoset.arrays import Floats
 from sim import Results
 from sim.statistics import shows
@@ -81,16 +82,9 @@ def cloud(title: str, samples: Sequence[Results]) -> Cloud:
     has_axes = samples[0].b_plane_t_rad is not None
     across = np.array([results.b_plane_m if has_axes else results.lateral_miss_m for results in samples])
     worst, runs = misses.argmax(axis=0), np.arange(misses.shape[1])
-    bounds = [
-        float(bound) for results in samples if results.guarantees for bound in results.guaranteed_miss_m.filled(np.inf)
-    ]
-    return Cloud(title, across[worst, runs], misses[worst, runs], max_guarantee(bounds), has_axes)
-
-
-def max_guarantee(bounds_m: Sequence[float]) -> float | None:
-    """Return the maximum of the guaranteed misses of runs; infinity stands for a run without a guarantee."""
-    maximum = max(bounds_m, default=np.inf)
-    return maximum if np.isfinite(maximum) else None
+    bounds = [bound for bound in map(max_guarantee_m, samples) if bound is not None]
+    most_m = max(bounds) if len(bounds) == len(samples) else None
+    return Cloud(title, across[worst, runs], misses[worst, runs], most_m, has_axes)
 
 
 def ellipse(across_m: Floats, level: float, within_m: float = np.inf) -> Floats | None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.errors import InputError
-from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, parts_of, show
+from experiments.common.screen import Part, figure_files, number, number_table, parts_of, show
 from experiments.common.units import M_PER_KM
 from experiments.interception.command import Bound
-from experiments.interception.runs.shared import WorstMisses, find_worst_misses, need_finite, work_of
+from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, work_of
 from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import chosen_strategies
 from experiments.interception.study import max_guarantee_m
@@ -76,7 +76,11 @@ def run(options: Bound) -> None:
                 f"{scenario.name}: a linear program of the bound has no solution ({error}); check the units of the "
                 "scenario with: infoset scenarios check FILE"
             ) from None
-        worst = _simulate(scenario, lower, strategies, options, work.begin)
+        reports = parts_of(work.begin("strategies"), len(strategies))
+        worst = [
+            _simulate(scenario, lower, name, own, options, report)
+            for (name, own), report in zip(strategies.items(), reports, strict=True)
+        ]
         (reserve, reasons), best = _value(scenario, lower), _best(worst)
         parts_m = {} if reserve is None else {name.removesuffix("_m"): part for name, part in asdict(reserve).items()}
         value = {
@@ -98,28 +102,18 @@ def run(options: Bound) -> None:
 
 
 def _simulate(
-    scenario: Scenario,
-    lower: LowerBound,
-    strategies: Mapping[str, Strategy | None],
-    options: Bound,
-    begin: BeginProgress,
-) -> list[WorstOfStrategy]:
-    worst = []
-    reports = parts_of(begin("strategies"), len(strategies))
-    for report, (name, own) in zip(reports, strategies.items(), strict=True):
-        flown = scenario if own is not None else replace(scenario, strategy=name)
-        flights = [(pair, fly_pair(flown, pair, own)) for pair in lower.pairs]
-        for _, flight in flights:
-            need_finite(flight.results)
-        searched = WorstMisses(None, None)
-        if options.budget > 0:
-            searched = find_worst_misses(
-                flown, own, budget=options.budget, seed=options.seed, begin=lambda _name, report=report: report
-            )
-        report(1.0)
-        records = tuple(engagement.record(own) for engagement in searched.engagements)
-        worst.append(WorstOfStrategy(name, tuple(flights), searched, records))
-    return worst
+    scenario: Scenario, lower: LowerBound, name: str, own: Strategy | None, options: Bound, report: Progress
+) -> WorstOfStrategy:
+    flown = scenario if own is not None else replace(scenario, strategy=name)
+    flights = [(pair, fly_pair(flown, pair, own)) for pair in lower.pairs]
+    for _, flight in flights:
+        need_finite(flight.results)
+    searched = WorstMisses(None, None)
+    if options.budget > 0:
+        searched = find_worst_misses(flown, own, budget=options.budget, seed=options.seed, begin=lambda _name: report)
+    report(1.0)
+    records = tuple(engagement.record(own) for engagement in searched.engagements)
+    return WorstOfStrategy(name, tuple(flights), searched, records)
 
 
 def _nominal(scenario: Scenario) -> TruthPair:

@@ -8,7 +8,6 @@ from pathlib import Path
 from experiments.common.errors import input_errors
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
-from experiments.interception.published import SINGLE, printed_single_runs
 from experiments.interception.record_file import write_record
 from experiments.interception.runs.shared import allowance, bound_name
 from sim import Record
@@ -38,10 +37,6 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
             "strategy": record.strategy,
         }
         columns.append((f"{record.noise_name}{meter}", values))
-        printed = printed_single_runs()
-        if record.scenario.name == SINGLE and record.scenario.range_sensor is None and record.noise_name in printed:
-            miss_m, impulse_m_s = printed[record.noise_name]
-            columns.append(("paper", {"miss, m": number(miss_m), "impulse, m/s": number(impulse_m_s)}))
     table = number_table("", *(title for title, _ in columns))
     for name in columns[0][1]:
         table.add_row(name, *(values.get(name, "") for _, values in columns))

@@ -57,11 +57,7 @@ class Work:
     def save(self, results: Mapping[str, object]) -> None:
         """Write the scenario, and results as JSON after the keys that all commands share."""
         self.written.save("scenario.toml", to_toml(self.scenario))
-        self.written.save("results.json", to_json({**self.head(), **results}), "--json")
-
-    def head(self) -> dict[str, object]:
-        """Return the keys that the results of all commands share."""
-        return {
+        head = {
             "versions": versions(),
             "scenario": self.scenario.name,
             "scenario_hash": fingerprint(self.scenario),
@@ -70,6 +66,7 @@ class Work:
             "range_sensor": self.scenario.range_sensor is not None,
             "elapsed_s": perf_counter() - self.began_s,
         }
+        self.written.save("results.json", to_json({**head, **results}), "--json")
 
 
 @contextlib.contextmanager
