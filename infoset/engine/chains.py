@@ -28,7 +28,7 @@ import numpy as np
 
 from infoset._compile import FALSE, allocation_free, constants, inlined
 from infoset.arrays import Floats
-from infoset.geometry import polygon, polygon_hull
+from infoset.geometry import polygon, polygon_reduction
 from infoset.geometry.polygon_exact import two_product, two_sum
 
 EPSILON = float(np.finfo(np.float64).eps)
@@ -468,11 +468,11 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
     count = ZERO
     for i in range(longer.begin, longer.end):
         v, m = read(longer, rings, i)
-        count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
+        count = polygon.append(points, polygon_reduction.drop_turned(points, count, 1, v, m), v, m)
     most = REDUCED - min(in_right, in_left)
-    count, done = polygon_hull.drop_inner_edges(points, count, most, points[CAPACITY + 2 :])
+    count, done = polygon_reduction.drop_inner_edges(points, count, most, points[CAPACITY + 2 :])
     if not done:
-        count = polygon_hull.box_around(points, count, sign, tau)
+        count = polygon_reduction.box_around(points, count, sign, tau)
     for i in range(count):
         write(longer, rings, i, points[i, 0], points[i, 1])
         # |V| of a new vertex may exceed the previous bound.

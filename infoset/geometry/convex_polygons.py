@@ -30,17 +30,16 @@ class ConvexPolygons(PolygonArrays):
     Parameters
     ----------
     vertices : array_like, shape (..., V, 2)
-        The first `counts` rows are the vertices in order around the polygon: one for a point, two for a segment, none
-        for the empty set; the others are padding. `polygon` returns those of a single polygon without padding.
-        Clockwise rings are reversed.
+        The polygon is the convex hull of the first `counts` rows; the others are padding. As an attribute, these rows
+        are the vertices counter-clockwise: one for a point, two for a segment, none for the empty set. `polygon`
+        returns those of a single polygon without padding.
     counts : array_like of int, shape (...)
-        Number of vertices. `from_vertices` needs none.
+        Number of points; as an attribute, of vertices.
 
     Raises
     ------
     ValueError
-        If shapes disagree, or a ring is not convex by more than rounding (64 ulp of the coordinates); `from_vertices`
-        does not tolerate rounding.
+        If shapes disagree.
 
     Notes
     -----
@@ -104,7 +103,7 @@ class ConvexPolygons(PolygonArrays):
 
     def _matrices(self, matrix: ArrayLike) -> Floats:
         """Return a matrix for each polygon, shape (B, 2, 2)."""
-        return self._spread(finite_values("matrix", matrix, "...", "m", "n"), "matrix", (2, 2))
+        return self._spread(finite_values("matrix", matrix, "...", 2, 2), "matrix", (2, 2))
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
         """Return {matrix p + offset}; a matrix of shape (m, 2), m not 2, maps a single polygon to a `Polytope` in R^m.
@@ -185,7 +184,7 @@ class ConvexPolygons(PolygonArrays):
         points = np.concatenate([one.vertices, two.vertices], axis=-2)
         order = np.argsort(~np.concatenate([one._used(), two._used()], axis=-1), axis=-1, kind="stable")
         points = np.take_along_axis(points, order[..., None], axis=-2)
-        return ConvexPolygons.unchecked(points, one.counts + two.counts)._make(0, kernels.exact_hull)
+        return ConvexPolygons.unchecked(points, one.counts + two.counts)._make(0, kernels.hull)
 
     def project(self, axes: ArrayLike) -> Any:
         """Return the projection on an axis (0 or 1) as intervals: minimum and maximum values, shape (...).
@@ -265,10 +264,8 @@ class ConvexPolygons(PolygonArrays):
 
         O(n). Exact for a tolerance of 0: rounding does not affect the answer.
         """
-        not_negative("tolerance", tolerance)
         one, points = self._and_vectors(point, "point")
-        values = one._measure(kernels.holds, points)
-        return np.asarray((values[..., 0] > 0.0) | (values[..., 1] >= -tolerance if tolerance else False))
+        return np.asarray(one._measure(kernels.nearest, points)[..., 2] <= not_negative("tolerance", tolerance))
 
     def is_subset(self, other: ConvexPolygons, tolerance: float = 0.0) -> Flags:
         """Return whether all points of the set are in the other one, or within a distance of it, shape (...).
@@ -276,10 +273,12 @@ class ConvexPolygons(PolygonArrays):
         O(n m). Exact for a tolerance of 0: rounding does not affect the answer. Sets that were computed are subsets
         only up to rounding in general.
         """
+        return np.asarray(self._excess(other) <= not_negative("tolerance", tolerance))
+
+    def _excess(self, other: ConvexPolygons) -> Floats:
+        """Return the maximum distance of a point of the set from the other one, shape (...); 0 only for a subset."""
         one, two = self._with(other)
-        not_negative("tolerance", tolerance)
-        values = one._measure(kernels.is_subset, *two._flat())
-        return np.asarray((values[..., 0] > 0.0) | ((values[..., 1] <= tolerance) if tolerance else False))
+        return one._measure(kernels.excess, *two._flat())[..., 0]
 
     def equals(self, other: ConvexPolygons, tolerance: float = 0.0) -> Flags:
         """Return whether each set is a subset of the other one, with the tolerance of `is_subset`. O(n m)."""
@@ -287,13 +286,13 @@ class ConvexPolygons(PolygonArrays):
 
     def area(self) -> Floats:
         """Return the area, shape (...). O(n); rounded relative to the squared diameter at most."""
-        return self._measure(kernels.size)[..., 0]
+        return self._measure(kernels.moments)[..., 0]
 
     volume = area
 
     def centroid(self) -> Floats:
         """Return the centroid, shape (..., 2); the middle of a segment. O(n); it is in the set, to rounding."""
-        return self._known(self._measure(kernels.centroid)[..., :2], "centroid")
+        return self._known(self._measure(kernels.moments)[..., 1:], "centroid")
 
     def chebyshev_centre(self) -> tuple[Floats, Floats]:
         """Return the centres, shape (..., 2), and the radii, shape (...), of largest discs in the polygons.
@@ -312,7 +311,7 @@ class ConvexPolygons(PolygonArrays):
 
     def diameter(self) -> Floats:
         """Return the maximum distance between two points, shape (...); 0 for the empty set. O(n^2), rounded."""
-        return self._measure(kernels.size)[..., 1]
+        return self._measure(kernels.diameter)[..., 0]
 
     def distance(self, other: ConvexPolygons | ArrayLike) -> Floats:
         """Return the distance from other sets or points, shape (...); inf if a set is empty.
@@ -336,12 +335,7 @@ class ConvexPolygons(PolygonArrays):
 
     def hausdorff_distance(self, other: ConvexPolygons) -> Floats:
         """Return the Hausdorff distance, shape (...); inf between an empty and a nonempty set. O(n m), rounded."""
-        one, two = self._with(other)
-        both = (
-            one._measure(kernels.is_subset, *two._flat())[..., 1],
-            two._measure(kernels.is_subset, *one._flat())[..., 1],
-        )
-        return np.asarray(np.maximum(*both))
+        return np.asarray(np.maximum(self._excess(other), other._excess(self)))
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
         """Return at least one point distributed uniformly over each set, shape (..., count, 2).

@@ -196,14 +196,6 @@ def extremes(points: Points, count: int, normal_x: float, normal_y: float) -> tu
     return bottom, top
 
 
-@inlined
-def translate(points: Points, count: int, x: float, y: float) -> None:
-    """Move by (x, y), in place. O(count)."""
-    for i in range(count):
-        points[i, 0] += x
-        points[i, 1] += y
-
-
 @compiled
 def map_linearly(points: Points, count: int, xx: float, xy: float, yx: float, yy: float, out: Points) -> int:
     """Write the image under the matrix [[xx, xy], [yx, yy]]; a singular one gives a segment or a point. O(count)."""
@@ -256,50 +248,47 @@ def put(out: Points, i: int, x: float, y: float) -> None:
 
 
 @compiled
-def area(points: Points, count: int) -> float:
-    """Area; zero for a point, a segment and the empty set. O(count)."""
-    twice = 0.0
-    for i in range(1, count - 1):
-        twice += max(0.0, fan_area(points, i))
-    return 0.5 * twice
-
-
-@compiled
 def fan_area(points: Points, i: int) -> float:
-    """Twice the signed area of the triangle of vertices 0, i and i + 1."""
-    return cross(
+    """Twice the area of the triangle of vertices 0, i and i + 1; zero if rounding makes it negative."""
+    double = cross(
         points[i, 0] - points[0, 0],
         points[i, 1] - points[0, 1],
         points[i + 1, 0] - points[0, 0],
         points[i + 1, 1] - points[0, 1],
     )
+    return max(0.0, double)
 
 
 @compiled
-def centroid(points: Points, count: int) -> tuple[float, float]:
-    """Return the centroid of a nonempty polygon; the middle of a segment or of a set without area. O(count).
+def moments(points: Points, count: int) -> tuple[float, float, float]:
+    """Return the area and the centroid (x, y) of a nonempty polygon; the middle of a set without area. O(count).
 
-    It is a convex combination of the centroids of a triangle fan, so that it lies in the hull.
+    The centroid is a convex combination of the centroids of a triangle fan, so that it lies in the hull.
     """
     weight = 0.0
     x = 0.0
     y = 0.0
     for i in range(1, count - 1):
-        triangle = max(0.0, fan_area(points, i))
+        triangle = fan_area(points, i)
         weight += triangle
         x += triangle * ((points[i, 0] - points[0, 0]) + (points[i + 1, 0] - points[0, 0])) / 3.0
         y += triangle * ((points[i, 1] - points[0, 1]) + (points[i + 1, 1] - points[0, 1])) / 3.0
     if weight > 0.0:
-        return points[0, 0] + x / weight, points[0, 1] + y / weight
-    far = 0
-    far_distance = 0.0
-    for i in range(1, count):
-        distance = math.hypot(points[i, 0] - points[0, 0], points[i, 1] - points[0, 1])
-        if distance > far_distance:
-            far = i
-            far_distance = distance
-    other = support_index(points, count, points[0, 0] - points[far, 0], points[0, 1] - points[far, 1])
-    return 0.5 * (points[far, 0] + points[other, 0]), 0.5 * (points[far, 1] + points[other, 1])
+        return 0.5 * weight, points[0, 0] + x / weight, points[0, 1] + y / weight
+    _, i, j = farthest_pair(points, count)
+    return 0.0, 0.5 * (points[i, 0] + points[j, 0]), 0.5 * (points[i, 1] + points[j, 1])
+
+
+@compiled
+def farthest_pair(points: Points, count: int) -> tuple[float, int, int]:
+    """Return the maximum distance between two vertices, and their numbers. O(count^2)."""
+    maximum, first, last = 0.0, 0, 0
+    for i in range(count):
+        for j in range(i):
+            distance = math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1])
+            if distance > maximum:
+                maximum, first, last = distance, i, j
+    return maximum, first, last
 
 
 @inlined

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 _ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
-"""Depth of a reflex vertex, relative to the coordinates, that rounding explains."""
+"""Rounding of an area, relative to the products of coordinates and widths in it."""
 
 
 class PolygonArrays:
@@ -37,40 +37,19 @@ class PolygonArrays:
     counts: Integers
 
     def __init__(self, vertices: ArrayLike, counts: ArrayLike) -> None:
-        checked = self._checked(vertices, counts)._turned(_ROUNDING)
-        self.vertices, self.counts = checked.vertices, checked.counts
-
-    @classmethod
-    def _checked(cls, vertices: ArrayLike, counts: ArrayLike) -> Self:
-        """Return copies of the arrays after checks of shapes and numbers."""
-        numbers = real_values("counts", counts)
-        if not np.isfinite(numbers).all() or (numbers != np.floor(numbers)).any():
-            raise ValueError(f"counts must be whole numbers: got {shown(counts)}")
-        polygons = cls.unchecked(real_values("vertices", vertices).copy(), numbers.astype(np.int64))
-        room = polygons.vertices.shape[-2] if polygons.vertices.ndim > 1 else 0
-        if polygons.vertices.shape != (*polygons.counts.shape, room, 2):
+        points, numbers = real_values("vertices", vertices), real_values("counts", counts)
+        room = points.shape[-2] if points.ndim > 1 else 0
+        if points.shape != (*numbers.shape, room, 2):
             raise ValueError(
                 f"vertices of shape (..., V, 2) and counts of shape (...) are needed: "
-                f"got {polygons.vertices.shape} and {polygons.counts.shape}"
+                f"got {points.shape} and {numbers.shape}"
             )
-        if (polygons.counts < 0).any() or (polygons.counts > room).any():
-            raise ValueError(f"counts must lie between 0 and {room}, the room for vertices")
-        need_finite("vertices", polygons.vertices[polygons._used()])
-        return polygons
-
-    def _turned(self, depth: float) -> Self:
-        """Reverse clockwise rings, in place; refuse a ring with a reflex vertex deeper than `depth`, relative to it."""
-        vertices, counts = self._flat()
-        values = np.zeros((counts.size, 3))
-        kernels.check_rings(vertices, counts, values)
-        refused = np.flatnonzero((values[:, 0] >= 0) & (values[:, 1] > depth))
-        if refused.size:
-            member = refused[0]
-            vertex, turned = int(values[member, 0]), values[member, 2] < 0.0
-            x, y = vertices[member, -vertex % counts[member] if turned else vertex]
-            of = f" of polygon {tuple(map(int, np.unravel_index(member, self.shape)))}" if self.shape else ""
-            raise ValueError(f"the ring is not convex: vertex {vertex}{of}, ({x:.17g}, {y:.17g}), is reflex")
-        return self
+        if not ((numbers >= 0) & (numbers <= room) & (numbers == np.floor(numbers))).all():
+            raise ValueError(f"counts must be whole numbers from 0 to {room}, the room for vertices")
+        given = self.unchecked(points, numbers.astype(np.int64))
+        need_finite("vertices", points[given._used()])
+        hull = given._make(0, kernels.hull)
+        self.vertices, self.counts = hull.vertices, hull.counts
 
     @classmethod
     def unchecked(cls, vertices: Floats, counts: Integers) -> Self:
@@ -80,11 +59,11 @@ class PolygonArrays:
         return self
 
     @classmethod
-    def from_vertices(cls, rings: ArrayLike, counts: ArrayLike | None = None) -> Self:
+    def from_vertices(cls, rings: ArrayLike) -> Self:
         """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the polygon. O(n).
 
-        Rings of different lengths are a list of arrays of shape (n, 2), or have `counts` vertices, shape (...). A ring
-        may repeat vertices, also its first at the end, and have vertices along a side.
+        Rings of different lengths are a list of arrays of shape (n, 2). A ring may repeat vertices, also its first at
+        the end, and have vertices along a side.
 
         Raises
         ------
@@ -92,20 +71,30 @@ class PolygonArrays:
             If a ring is not convex; the message has the first reflex vertex. This is decided exactly. `from_points`
             takes the convex hull of any points instead.
         """
-        if isinstance(rings, list | tuple) and counts is None and len({np.shape(ring) for ring in rings}) > 1:
+        if isinstance(rings, list | tuple) and len({np.shape(ring) for ring in rings}) > 1:
             return cls.stack([cls.from_vertices(ring) for ring in rings])
-        vertices = finite_values("rings", rings, "...", "k", 2) if counts is None else real_values("rings", rings)
-        sizes = np.full(vertices.shape[:-2], vertices.shape[-2]) if counts is None else counts
-        polygons = cls._checked(vertices, sizes)
-        kernels.drop_repeats(*polygons._flat())
-        return polygons._turned(0.0)._make(0, kernels.exact_hull)
+        vertices = finite_values("rings", rings, "...", "k", 2)
+        polygons = cls.unchecked(vertices.copy(), np.full(vertices.shape[:-2], vertices.shape[-2]))
+        corners, counts = polygons._flat()
+        reflex = np.empty(polygons.shape, dtype=np.int64)
+        kernels.drop_repeats(corners, counts)
+        kernels.reflex_vertices(corners, counts, reflex.reshape(-1))
+        if (reflex >= 0).any():
+            index = np.argwhere(reflex >= 0)[0].tolist()
+            vertex = reflex[tuple(index)]
+            x, y = polygons.vertices[*index, vertex]
+            raise ValueError(
+                f"the ring is not convex: vertex {vertex}{f' of polygon {index}' if index else ''}, "
+                f"({x:.17g}, {y:.17g}), is reflex"
+            )
+        return polygons._make(0, kernels.hull)
 
     @classmethod
     def from_points(cls, points: ArrayLike) -> Self:
         """Return the convex hull of points, shape (n, 2) or (..., n, 2); no points give the empty set.
 
         Different numbers of points are a list of arrays of shape (n, 2), as in `from_vertices`. O(n) for sorted points,
-        O(n^2) at worst. Vertices are points; points that protrude by less than rounding are dropped.
+        O(n^2) at worst. Exact: vertices are points, and rounding does not decide which.
         """
         if isinstance(points, list | tuple) and len({np.shape(one) for one in points}) > 1:
             return cls.stack([cls.from_points(one) for one in points])
@@ -130,15 +119,12 @@ class PolygonArrays:
             raise ValueError("a set without constraints is unbounded")
         table = np.empty((*shape, 3))
         table[..., :2], table[..., 2] = rows, limits
-        table = table.reshape(-1, shape[-1], 3)
-        out = np.zeros((len(table), shape[-1] + 4, 2))
-        made = np.zeros(len(table), dtype=np.int64)
-        kernels.intersect_rows(table, out, made)
-        if (made < 0).any():
-            index = tuple(map(int, np.unravel_index(int((made < 0).argmax()), shape[:-1])))
+        lines = table.reshape(-1, shape[-1], 3, 1)
+        sets = cls.empty(shape[:-1])._make(shape[-1] + 4, kernels.intersect_lines, lines)
+        if (sets.counts < 0).any():
+            index = np.argwhere(sets.counts < 0)[0].tolist()
             raise ValueError(f"the set{f' {index}' if index else ''} is unbounded")
-        room = int(made.max(initial=0))
-        return cls.unchecked(out[:, :room].reshape(*shape[:-1], room, 2), made.reshape(shape[:-1]))
+        return sets
 
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
@@ -186,7 +172,7 @@ class PolygonArrays:
         Raises
         ------
         ValueError
-            If a geometry is not convex by more than rounding (64 ulp of the coordinates), or is of another type.
+            If a geometry is not convex by more than rounding, or is of another type.
         """
         if isinstance(geometry, Sequence | np.ndarray) and not isinstance(geometry, str):
             return cls.stack([cls.from_shapely(one) for one in geometry])
@@ -196,9 +182,13 @@ class PolygonArrays:
         has_hole = kind == "Polygon" and len(geometry.interiors) > 0
         if kind not in ("Point", "LineString", "Polygon") or has_hole or (kind == "LineString" and len(vertices) > 2):
             raise ValueError(f"a Point, a single segment or a Polygon without a hole is needed: got {shown(geometry)}")
-        count = np.array([len(vertices)])
-        kernels.drop_repeats(vertices[None], count)
-        return cls(vertices, count[0])._make(0, kernels.exact_hull)
+        hull = cls.from_points(vertices)
+        if kind == "Polygon" and len(vertices):
+            rounding = _ROUNDING * np.abs(vertices).max(axis=0) @ np.ptp(vertices, axis=0)[::-1]
+            missing = abs(geometry.convex_hull.area - geometry.area)
+            if missing > rounding:
+                raise ValueError(f"the Polygon is not convex: its area and that of its hull differ by {missing:g}")
+        return hull
 
     def to_shapely(self) -> BaseGeometry:
         """Return a single polygon as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
@@ -320,8 +310,6 @@ class PolygonArrays:
         shape = (*self.shape, *last)
         if values.shape != shape:
             try:
-                if values.shape[values.ndim - len(last) :] != last:
-                    raise ValueError
                 values = np.broadcast_to(values, shape)
             except ValueError:
                 raise ValueError(

@@ -11,48 +11,26 @@ import numpy as np
 
 from infoset._compile import compiled
 from infoset.arrays import Floats, Integers
-from infoset.geometry import polygon, polygon_distance, polygon_exact, polygon_hull, polygon_lines, polygon_sum
-
-
-@compiled
-def reverse(vertices: Floats, count: int) -> None:
-    """Reverse the order of vertices, in place; the first one stays."""
-    for i in range(1, (count + 1) // 2):
-        for axis in range(2):
-            one = vertices[i, axis]
-            vertices[i, axis] = vertices[count - i, axis]
-            vertices[count - i, axis] = one
-
-
-@compiled
-def check_rings(vertices: Floats, counts: Integers, out: Floats) -> None:
-    """Turn clockwise rings, in place; write the reflex vertex (-1: none), its depth, and how each turned."""
-    for i in range(counts.size):
-        out[i, 0] = -1.0
-        if counts[i] > 2:
-            turns, reflex, depth = polygon_exact.corner(vertices[i], counts[i])
-            out[i, 0], out[i, 1], out[i, 2] = reflex, depth, turns
-            if turns < 0:
-                reverse(vertices[i], counts[i])
+from infoset.geometry import polygon, polygon_distance, polygon_exact, polygon_lines, polygon_reduction, polygon_sum
 
 
 @compiled
 def drop_repeats(vertices: Floats, counts: Integers) -> None:
     """Remove repeated vertices, also the one that closes a ring, in place."""
     for i in range(counts.size):
-        counts[i] = polygon_hull.drop_repeats(vertices[i], counts[i])
+        counts[i] = polygon_exact.drop_repeats(vertices[i], counts[i])
+
+
+@compiled
+def reflex_vertices(vertices: Floats, counts: Integers, reflex: Integers) -> None:
+    """First vertex at which each ring is not convex, or -1."""
+    for i in range(counts.size):
+        reflex[i] = polygon_exact.reflex_vertex(vertices[i], counts[i])
 
 
 @compiled
 def hull(vertices: Floats, counts: Integers, out: Floats, made: Integers) -> None:
-    """Convex hulls of points, with vertices that protrude by more than rounding."""
-    for i in range(counts.size):
-        made[i] = polygon_hull.hull(vertices[i], counts[i], out[i])
-
-
-@compiled
-def exact_hull(vertices: Floats, counts: Integers, out: Floats, made: Integers) -> None:
-    """Convex hulls of points, exactly decided."""
+    """Convex hulls of points."""
     for i in range(counts.size):
         made[i] = polygon_exact.hull(vertices[i], counts[i], out[i])
 
@@ -138,10 +116,10 @@ def intersect(
 
 
 @compiled
-def intersect_rows(rows: Floats, out: Floats, made: Integers) -> None:
-    """Intersections of half-planes, shape (B, k, 3)."""
-    for i in range(made.size):
-        made[i] = polygon_lines.intersect_rows(rows[i], out[i])
+def intersect_lines(vertices: Floats, counts: Integers, out: Floats, made: Integers, lines: Floats) -> None:
+    """Intersections of half-planes, shape (B, k, 3, 1), of any number in place of these polygons."""
+    for i in range(counts.size):
+        made[i] = polygon_lines.intersect_lines(lines[i], out[i])
 
 
 @compiled
@@ -149,7 +127,7 @@ def reduce_outward(vertices: Floats, counts: Integers, out: Floats, made: Intege
     """Outer polygons of few vertices."""
     for i in range(counts.size):
         polygon.copy(vertices[i], counts[i], out[i])
-        made[i] = polygon_hull.reduce_outward(out[i], counts[i], cap)
+        made[i] = polygon_reduction.reduce_outward(out[i], counts[i], cap)
 
 
 @compiled
@@ -174,26 +152,10 @@ def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Fl
 
 
 @compiled
-def holds(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> None:
-    """Whether points are in polygons, exactly decided, as 1 or 0; and signed distances from the boundaries."""
+def excess(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
+    """Maximum distances of a vertex from the other polygons."""
     for i in range(counts.size):
-        points, count = polygon_exact.tidy(vertices[i], counts[i])
-        out[i, 0] = polygon_exact.holds(points, count, point[i, 0], point[i, 1])
-        out[i, 1] = polygon.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
-
-
-@compiled
-def is_subset(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
-    """Whether all vertices are in the other polygons, exactly decided, and the maximum distance of one from them."""
-    for i in range(counts.size):
-        out[i, 0] = 1.0
-        if counts[i] == 0:
-            continue
-        if other_counts[i] == 0:
-            out[i, 0], out[i, 1] = 0.0, np.inf
-            continue
-        out[i, 1] = polygon_distance.farthest(vertices[i], counts[i], other[i], other_counts[i])
-        out[i, 0] = out[i, 1] == 0.0
+        out[i, 0] = polygon_distance.excess(vertices[i], counts[i], other[i], other_counts[i])
 
 
 @compiled
@@ -235,19 +197,18 @@ def margin(vertices: Floats, counts: Integers, out: Floats, point: Floats) -> No
 
 
 @compiled
-def size(vertices: Floats, counts: Integers, out: Floats) -> None:
-    """Areas and diameters."""
+def moments(vertices: Floats, counts: Integers, out: Floats) -> None:
+    """Areas and centroids."""
     for i in range(counts.size):
-        out[i, 0] = polygon.area(vertices[i], counts[i])
-        out[i, 1] = polygon_distance.diameter(vertices[i], counts[i])
+        if counts[i] > 0:
+            out[i, 0], out[i, 1], out[i, 2] = polygon.moments(vertices[i], counts[i])
 
 
 @compiled
-def centroid(vertices: Floats, counts: Integers, out: Floats) -> None:
-    """Centroids."""
+def diameter(vertices: Floats, counts: Integers, out: Floats) -> None:
+    """Maximum distances between two vertices."""
     for i in range(counts.size):
-        if counts[i] > 0:
-            out[i, 0], out[i, 1] = polygon.centroid(vertices[i], counts[i])
+        out[i, 0] = polygon.farthest_pair(vertices[i], counts[i])[0]
 
 
 @compiled
@@ -263,12 +224,14 @@ def sample(vertices: Floats, counts: Integers, uniform: Floats, out: Floats) -> 
     """Points distributed uniformly, from uniform numbers of shape (B, k, 3)."""
     for i in range(counts.size):
         n, points = counts[i], vertices[i]
-        whole = 2.0 * polygon.area(points, n)
-        for j in range(uniform.shape[1] if n > 0 else 0):
+        if n == 0:
+            continue
+        whole = 2.0 * polygon.moments(points, n)[0]
+        for j in range(uniform.shape[1]):
             rest, one, two = uniform[i, j, 0] * whole, uniform[i, j, 1], uniform[i, j, 2]
             k = 1
-            while k < n - 2 and rest > max(0.0, polygon.fan_area(points, k)):
-                rest -= max(0.0, polygon.fan_area(points, k))
+            while k < n - 2 and rest > polygon.fan_area(points, k):
+                rest -= polygon.fan_area(points, k)
                 k += 1
             if one + two > 1.0 and n > 2:
                 one, two = 1.0 - one, 1.0 - two

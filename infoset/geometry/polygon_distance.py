@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from infoset._compile import compiled
-from infoset.geometry.polygon import MINIMUM, Points
+from infoset.geometry.polygon import MINIMUM, Points, farthest_pair
 from infoset.geometry.polygon_exact import holds, intersect, tidy
 
 
@@ -33,16 +33,19 @@ def nearest(points: Points, count: int, x: float, y: float) -> tuple[float, floa
             near_x, near_y = points[i, 0] + part * along_x, points[i, 1] + part * along_y
         else:
             near_x, near_y = points[j, 0] + part * along_x, points[j, 1] + part * along_y
-        distance = math.hypot(x - near_x, y - near_y)
-        if distance < minimum:
-            minimum, best_x, best_y = distance, near_x, near_y
+        if max(abs(x - near_x), abs(y - near_y)) < minimum:
+            distance = math.hypot(x - near_x, y - near_y)
+            if distance < minimum:
+                minimum, best_x, best_y = distance, near_x, near_y
         j = i
     return best_x, best_y, max(minimum, MINIMUM)
 
 
 @compiled
-def farthest(points: Points, count: int, other: Points, other_count: int) -> float:
-    """Return the maximum distance of a vertex from another polygon, both nonempty. O(count * other_count)."""
+def excess(points: Points, count: int, other: Points, other_count: int) -> float:
+    """Return the maximum distance of a vertex from another polygon, 0 only for a subset. O(count * other_count)."""
+    if count == 0 or other_count == 0:
+        return np.inf if count > 0 else 0.0
     b, m = tidy(other, other_count)
     maximum = 0.0
     for i in range(count):
@@ -65,16 +68,6 @@ def gap(points: Points, count: int, other: Points, other_count: int) -> float:
     for i in range(m):
         minimum = min(minimum, nearest(a, n, b[i, 0], b[i, 1])[2])
     return minimum
-
-
-@compiled
-def diameter(points: Points, count: int) -> float:
-    """Return the maximum distance between two vertices. O(count^2)."""
-    maximum = 0.0
-    for i in range(count):
-        for j in range(i):
-            maximum = max(maximum, math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]))
-    return maximum
 
 
 @compiled
@@ -127,11 +120,5 @@ def max_disc(points: Points, count: int) -> tuple[float, float, float]:
         for i in range(min(chosen + 1, n - 1), n - 1):
             a[i, 0], a[i, 1] = a[i + 1, 0], a[i + 1, 1]
         n -= 1
-    first = last = 0
-    maximum = -1.0
-    for i in range(n):
-        for j in range(i + 1):
-            distance = math.hypot(a[i, 0] - a[j, 0], a[i, 1] - a[j, 1])
-            if distance > maximum:
-                maximum, first, last = distance, i, j
+    _, first, last = farthest_pair(a, n)
     return origin_x + 0.5 * (a[first, 0] + a[last, 0]), origin_y + 0.5 * (a[first, 1] + a[last, 1]), radius

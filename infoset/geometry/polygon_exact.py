@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from infoset._compile import compiled, inlined
-from infoset.geometry.polygon import MINIMUM, Points, append, put
-from infoset.geometry.polygon_hull import drop_repeats, sort_points
+from infoset.geometry.polygon import Points, append, close, put
 
 _SPLIT = 134217729.0
 """2^27 + 1, which splits a float into two halves of 26 bits."""
@@ -101,26 +100,57 @@ def side(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> fl
 
 
 @compiled
+def sort_points(points: Points, count: int) -> None:
+    """Sort points by x, then by y, in place, by insertion: O(count) if they are nearly sorted."""
+    for i in range(1, count):
+        x = points[i, 0]
+        y = points[i, 1]
+        j = i
+        while j > 0 and (points[j - 1, 0] > x or (points[j - 1, 0] == x and points[j - 1, 1] > y)):
+            points[j, 0] = points[j - 1, 0]
+            points[j, 1] = points[j - 1, 1]
+            j -= 1
+        points[j, 0] = x
+        points[j, 1] = y
+
+
+@compiled
+def drop_repeats(points: Points, count: int) -> int:
+    """Remove vertices that repeat the previous one, in place; return the new count. O(count)."""
+    made = 0
+    for i in range(count):
+        made = append(points, made, points[i, 0], points[i, 1])
+    return close(points, made)
+
+
+@compiled
 def hull(points: Points, count: int, out: Points) -> int:
     """Write the convex hull of points, exactly decided, without vertices along an edge; return the number of vertices.
 
-    O(count) for sorted points; the sort takes O(count^2) in the worst case.
+    It has 2 vertices if the points lie on a line, 1 if they coincide. `out` may be `points`. O(count) for sorted
+    points; the sort takes O(count^2) in the worst case.
+
+    References
+    ----------
+    A. M. Andrew, Another efficient algorithm for convex hulls in two dimensions, Inf. Process. Lett. 9 (1979).
     """
     points = points[:count].copy()
     sort_points(points, count)
-    count = drop_repeats(points, count)
     chain = np.empty((2 * count, 2))
-    made, fewest = 0, 1
-    for step in range(2 * count - 1 if count > 2 else count):
+    made, fewest, lower = 0, 1, 0
+    for step in range(2 * count - 1):  # forth and back
         i = step if step < count else 2 * count - 2 - step
         if step == count:
-            fewest = made
+            fewest, lower = made, made - 2
         x, y = points[i, 0], points[i, 1]
+        if lower > 0 and chain[lower, 0] == x and chain[lower, 1] == y:  # in the lower chain
+            lower -= 1
+            continue
         while made > fewest and (
             side(chain[made - 2, 0], chain[made - 2, 1], chain[made - 1, 0], chain[made - 1, 1], x, y) <= 0.0
         ):
             made -= 1
-        if step < 2 * count - 2 or count < 3:
+        if step == 0 or i > 0:
             made = append(chain, made, x, y)
     for i in range(made):
         put(out, i, chain[i, 0], chain[i, 1])
@@ -226,42 +256,28 @@ def apart(one: float, other: float) -> bool:
 
 
 @compiled
-def corner(points: Points, count: int) -> tuple[int, int, float]:
-    """Return how a ring turns, exactly decided, its first reflex vertex, and the depth of its reflex vertices.
-    O(count).
+def reflex_vertex(points: Points, count: int) -> int:
+    """Return the first vertex at which a ring is not convex, exactly decided; -1 for a convex ring. O(count).
 
-    The first number is 1 for a counter-clockwise ring, -1 for a clockwise one, 0 if all vertices are on one line. The
-    second is the first vertex at which the ring turns the other way or back; without one, the first from which it goes
-    around a second time; -1 if the ring is convex. The depth is the maximum distance by which such a vertex must move,
-    to the line through its neighbours or to one of them, relative to the largest coordinates.
+    There the ring turns the other way or back, or it begins a second revolution. No vertex repeats the previous one,
+    and a ring on one line is convex.
     """
-    size_x = size_y = area = 0.0
-    flat = True
-    for i in range(count):
-        size_x, size_y = max(size_x, abs(points[i, 0])), max(size_y, abs(points[i, 1]))
-        j, k = (i + 1) % count, (i + 2) % count
-        turn = orientation(points[i, 0], points[i, 1], points[j, 0], points[j, 1], points[k, 0], points[k, 1])
-        flat &= turn == 0.0
-        if 0 < i < count - 1:
-            area += orientation(points[0, 0], points[0, 1], points[i, 0], points[i, 1], points[j, 0], points[j, 1])
-    if flat:
-        return 0, -1, 0.0
-    turns = 1 if area > 0.0 else -1
-    reflex, around, depth, highest, second = -1, -1, 0.0, 0.0, 0.0
+    area, is_flat = 0.0, True
     for j in range(count):
-        i, k = (j - 1) % count, (j + 1) % count
-        ax, ay, bx, by = points[i, 0], points[i, 1], points[j, 0], points[j, 1]
-        cx, cy = points[k, 0], points[k, 1]
-        turn = turns * orientation(ax, ay, bx, by, cx, cy)
-        before = max(abs(bx - ax) / max(size_x, MINIMUM), abs(by - ay) / max(size_y, MINIMUM))
-        after = max(abs(cx - bx) / max(size_x, MINIMUM), abs(cy - by) / max(size_y, MINIMUM))
-        shorter = min(before, after)
-        if (by > ay or (by == ay and bx > ax)) and (cy < by or (cy == by and cx < bx)):  # a peak
-            around = j if around < 0.0 < highest else around
-            second = max(second, min(highest, shorter))
-            highest = max(highest, shorter)
+        ax, ay, bx, by = points[j - 1, 0], points[j - 1, 1], points[j, 0], points[j, 1]
+        cx, cy = points[(j + 1) % count, 0], points[(j + 1) % count, 1]
+        area += orientation(points[0, 0], points[0, 1], bx, by, cx, cy)
+        is_flat &= side(ax, ay, bx, by, cx, cy) == 0.0
+    if is_flat:
+        return -1
+    peaks, second_peak = 0, -1
+    for j in range(count):
+        ax, ay, bx, by = points[j - 1, 0], points[j - 1, 1], points[j, 0], points[j, 1]
+        cx, cy = points[(j + 1) % count, 0], points[(j + 1) % count, 1]
+        turn = side(ax, ay, bx, by, cx, cy) * (1.0 if area > 0.0 else -1.0)
         if turn < 0.0 or (turn == 0.0 and (bx - ax) * (cx - bx) + (by - ay) * (cy - by) < 0.0):
-            reflex = j if reflex < 0 else reflex
-            reach = abs(cx - ax) * size_y + abs(cy - ay) * size_x
-            depth = max(depth, min(shorter, -turn / reach) if turn < 0.0 < reach else shorter)
-    return turns, reflex if reflex >= 0 else around, max(depth, second)
+            return j
+        if (by > ay or (by == ay and bx > ax)) and (cy < by or (cy == by and cx < bx)):
+            peaks += 1
+            second_peak = j if peaks == 2 else second_peak
+    return second_peak

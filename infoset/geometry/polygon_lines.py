@@ -77,12 +77,6 @@ def beyond(values: Floats, lines: Floats, i: int, j: int, k: int) -> float:
 
 
 @compiled
-def intersect_rows(rows: Points, out: Points) -> int:
-    """Write the polygon {p: a x + b y <= c for all rows (a, b, c)}, `rows` of shape (k, 3), as `intersect_lines`."""
-    return intersect_lines(rows.copy().reshape((len(rows), 3, 1)), out)
-
-
-@compiled
 def intersect_lines(rows: Floats, out: Points) -> int:
     """Write the polygon {p: a x + b y <= c for all rows (a, b, c)}; return its number of vertices, or `UNBOUNDED`.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from infoset._compile import compiled, inlined
 from infoset.geometry.polygon import ROUNDING, Points, append, close, copy, cross, extremes, put, unsigned
-from infoset.geometry.polygon_hull import hull
+from infoset.geometry.polygon_exact import tidy
 
 
 @compiled
@@ -79,12 +79,13 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
 
     The result has at most count + other_count vertices; none if either polygon is empty. O(count + other_count). If
     rounding has given an edge a wrong direction, the hull is taken first, which costs more: the merge needs edges in
-    order. Each vertex of the sum is one addition of two vertices, so that rounding errors do not accumulate.
+    order. Each vertex of the sum is one addition of two vertices, so that rounding errors do not accumulate. Rounding
+    may exchange two edges that are nearly parallel, which moves a vertex by less than that.
     """
     if count == 0 or other_count == 0:
         return 0
-    first, first_count = with_edges_in_order(points, count)
-    second, second_count = with_edges_in_order(other, other_count)
+    first, first_count = tidy(points, count)
+    second, second_count = tidy(other, other_count)
     i = lowest_index(first, first_count)
     j = lowest_index(second, second_count)
     steps_i = first_count if first_count > 1 else 0
@@ -110,35 +111,6 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
             steps_j -= 1
         if steps_i == 0 and steps_j == 0:
             return close(out, made)
-
-
-@compiled
-def with_edges_in_order(points: Points, count: int) -> tuple[Points, int]:
-    """Return the polygon, or its hull if rounding has given an edge a wrong direction."""
-    if edges_in_order(points, count):
-        return points, count
-    ordered = np.empty((count, 2))
-    return ordered, hull(points, count, ordered)
-
-
-@compiled
-def edges_in_order(points: Points, count: int) -> bool:
-    """Whether the directions of the edges, from the lowest vertex on, increase over one revolution. O(count)."""
-    if count == 1:
-        return True
-    i = lowest_index(points, count)
-    from_x = 1.0
-    from_y = 0.0
-    for _ in range(count):
-        after = i + 1 if i + 1 < count else 0
-        edge_x = points[after, 0] - points[i, 0]
-        edge_y = points[after, 1] - points[i, 1]
-        if (edge_x == 0.0 and edge_y == 0.0) or direction_order(from_x, from_y, edge_x, edge_y) < 0:
-            return False
-        from_x = edge_x
-        from_y = edge_y
-        i = after
-    return True
 
 
 @compiled

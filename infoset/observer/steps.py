@@ -15,7 +15,7 @@ import numpy as np
 from infoset._compile import compiled, inlined
 from infoset.arrays import Floats, Integers
 from infoset.engine.section_life import CUT_SLACK, SUM_SLACK
-from infoset.geometry import polygon, polygon_hull, polygon_sum
+from infoset.geometry import polygon, polygon_exact, polygon_reduction, polygon_sum
 from infoset.geometry.polygon import Points
 
 MAX_VERTICES = 512
@@ -111,7 +111,7 @@ def predict_all(sets: Batch, move: Move, out: Batch) -> None:
         for g in range(len(generators)):
             count = polygon_sum.add_segment(scratch, count, generators[g, 0], generators[g, 1])
         if count > MAX_VERTICES:
-            count = polygon_hull.reduce_outward(scratch, count, MAX_VERTICES)
+            count = polygon_reduction.reduce_outward(scratch, count, MAX_VERTICES)
         out.counts[b] = enlarge(scratch, count, shift_x, shift_y, slack_x, slack_y, out.vertices[b])
 
 
@@ -220,9 +220,9 @@ def enlarge_carefully(
             corners[4 * i + k, 0] = points[i, 0] + shift_x + along_x * half_x
             corners[4 * i + k, 1] = points[i, 1] + shift_y + along_y * half_y
     hull = np.empty((4 * count, 2))
-    made = polygon_hull.hull(corners, 4 * count, hull)
+    made = polygon_exact.hull(corners, 4 * count, hull)
     if made > count + 4:
-        made = polygon_hull.reduce_outward(hull, made, count + 4)
+        made = polygon_reduction.reduce_outward(hull, made, count + 4)
     polygon.copy(hull, made, out)
     return made
 

@@ -10,14 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-import infoset.geometry.polygon_hull
+import infoset.geometry.polygon_reduction
 from infoset.arrays import Floats
-from infoset.geometry import polygon, polygon_sum
+from infoset.geometry import polygon, polygon_exact, polygon_sum
 from tests.infoset.geometry.test_polygon_oracle import Exact, exact, exact_sum, hull, outside_by
 from tests.kernels import callable_kernels
 from tests.rationals import Fraction
 
-polygon_hull = callable_kernels(infoset.geometry.polygon_hull)
+polygon_reduction = callable_kernels(infoset.geometry.polygon_reduction)
 
 EPS = Fraction(1, 2**52)
 
@@ -89,7 +89,7 @@ def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: f
         offsets = thickness * 10.0 ** rng.uniform(-1.0, 2.0) * sides * (1.0 - parts**2)
         cloud = distance + parts[:, np.newaxis] * along + offsets[:, np.newaxis] * across
         corners = np.empty((21, 2))
-        corners = corners[: polygon_hull.hull(cloud, len(cloud), corners)]
+        corners = corners[: polygon_exact.hull(cloud, len(cloud), corners)]
         made = add_segment(corners, 0.1 * along)
         for end in (along, -along):
             grown = np.max((made - corners[0]) @ end) - np.max((corners - corners[0]) @ end)
@@ -107,11 +107,11 @@ def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
         noise = 10.0 ** rng.uniform(-18.0, -15.0) * rng.uniform(-1.0, 1.0, 12)
         corners = np.stack([along, rng.uniform(-2.0, 2.0) * along + noise], axis=-1)
         reduced = corners.copy()
-        reduced = reduced[: polygon_hull.reduce_outward(reduced, len(reduced), 4)]
+        reduced = reduced[: polygon_reduction.reduce_outward(reduced, len(reduced), 4)]
         assert len(reduced) <= 4
         tolerance = 11 * EPS * reach(reduced)
         assert outside_by(exact(corners), hull(exact(reduced)), (tolerance, tolerance)) is None
-        assert polygon.area(reduced, len(reduced)) < 1e-14
+        assert polygon.moments(reduced, len(reduced))[0] < 1e-14
 
 
 def test_the_edge_that_adds_the_min_area_is_removed_first() -> None:
@@ -128,10 +128,10 @@ def test_the_edge_that_adds_the_min_area_is_removed_first() -> None:
         expected = path.copy()
         while len(expected) > 4:
             removals = [
-                polygon_hull.removed_edge(expected, i - 1, i, i + 1, i + 2) for i in range(1, len(expected) - 2)
+                polygon_reduction.removed_edge(expected, i - 1, i, i + 1, i + 2) for i in range(1, len(expected) - 2)
             ]
             first = min(range(len(removals)), key=lambda i: removals[i][0])
             expected[first + 1] = removals[first][1:]
             expected = np.delete(expected, first + 2, axis=0)
-        assert polygon_hull.drop_inner_edges(path, count, 4, work) == (4, True)
+        assert polygon_reduction.drop_inner_edges(path, count, 4, work) == (4, True)
         np.testing.assert_array_equal(path[:4], expected)

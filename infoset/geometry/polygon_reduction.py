@@ -1,4 +1,4 @@
-"""Compiled convex hulls, and outer approximations of polygons by fewer vertices, stored as in `polygon`."""
+"""Compiled outer approximations of polygons and of paths by fewer vertices, stored as in `polygon`."""
 
 from __future__ import annotations
 
@@ -9,55 +9,7 @@ import numpy as np
 from infoset._compile import allocation_free, compiled, inlined
 from infoset.arrays import Floats
 from infoset.geometry.polygon import ROUNDING, Points, append, close, cross
-
-
-@compiled
-def hull(points: Points, count: int, out: Points) -> int:
-    """Write the convex hull of points: counter-clockwise, without repeated vertices or vertices along an edge.
-
-    Return its number of vertices: 2 if the points lie on a line, 1 if they coincide, 0 if there are none. O(count) for
-    sorted points; the sort takes O(count^2) in the worst case. Points that protrude by less than rounding are removed.
-    The directions of the edges increase strictly in spite of rounding.
-
-    References
-    ----------
-    A. M. Andrew, Another efficient algorithm for convex hulls in two dimensions, Inf. Process. Lett. 9 (1979).
-    """
-    points = points[:count].copy()
-    sort_points(points, count)
-    count = drop_repeats(points, count)
-    made = 0
-    for i in range(count):
-        made = drop_turned(out, made, 1, points[i, 0], points[i, 1])
-        made = append(out, made, points[i, 0], points[i, 1])
-    lower = made
-    known = lower - 2
-    for i in range(count - 2, 0, -1):
-        x = points[i, 0]
-        y = points[i, 1]
-        if known > 0 and out[known, 0] == x and out[known, 1] == y:
-            known -= 1
-            continue
-        made = drop_turned(out, made, lower, x, y)
-        made = append(out, made, x, y)
-    if count > 0:
-        made = drop_turned(out, made, lower, points[0, 0], points[0, 1])
-    return made
-
-
-@compiled
-def sort_points(points: Points, count: int) -> None:
-    """Sort points by x, then by y, in place, by insertion: O(count) if they are nearly sorted."""
-    for i in range(1, count):
-        x = points[i, 0]
-        y = points[i, 1]
-        j = i
-        while j > 0 and (points[j - 1, 0] > x or (points[j - 1, 0] == x and points[j - 1, 1] > y)):
-            points[j, 0] = points[j - 1, 0]
-            points[j, 1] = points[j - 1, 1]
-            j -= 1
-        points[j, 0] = x
-        points[j, 1] = y
+from infoset.geometry.polygon_exact import hull
 
 
 @allocation_free
@@ -70,15 +22,6 @@ def drop_turned(out: Points, made: int, fewest: int, x: float, y: float) -> int:
             break
         made -= 1
     return made
-
-
-@compiled
-def drop_repeats(points: Points, count: int) -> int:
-    """Remove vertices that repeat the previous one, in place; return the new count. O(count)."""
-    made = 0
-    for i in range(count):
-        made = append(points, made, points[i, 0], points[i, 1])
-    return close(points, made)
 
 
 @compiled
