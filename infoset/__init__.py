@@ -15,7 +15,7 @@ from infoset.geometry.zonotope import Zonotope
 from infoset.information_set import InformationSet, InformationSetView
 from infoset.model import InitialSet, Model, Recovery, SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, BearingSensor, Bias, Camera, RangeSensor, RateSensor, Sensor
-from infoset.set_queries import Section, to_omega_alpha
+from infoset.set_queries import Section
 
 if TYPE_CHECKING:
     from infoset.geometry.polytope import Polytope
@@ -55,7 +55,6 @@ __all__ = [
     "SetStatus",
     "StateBox",
     "Zonotope",
-    "to_omega_alpha",
 ]
 
 

@@ -18,8 +18,32 @@ MINIMUM = 1e-110
 """Minimum value of a number that must be positive: its square is not zero."""
 
 
+class _Rule:
+    """What values of a field must be; readers of files check it too."""
+
+    def problem(self, value: Any) -> str | None:
+        """Return why a value is refused, or None."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return the schema of a field for readers of files: its type, and this rule for each of its values."""
+        from pydantic_core import core_schema
+
+        is_pair = source == tuple[float, float]
+
+        def checked(value: Any) -> Any:
+            problem = next(filter(None, map(self.problem, value if isinstance(value, tuple) else (value,))), None)
+            if problem is None and is_pair and value[0] > value[1]:
+                problem = "must be a pair [minimum, maximum], and is reversed"
+            if problem is not None:
+                raise ValueError(problem)
+            return value
+
+        return core_schema.no_info_after_validator_function(checked, handler(source))
+
+
 @dataclass(frozen=True)
-class Limits:
+class Limits(_Rule):
     """Limits of a number.
 
     Parameters
@@ -67,22 +91,6 @@ class Limits:
         if problem is not None:
             raise ValueError(f"{name} {problem}: got {shown(value)}")
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Return the schema of a field for readers of files: its type, and these limits for each of its numbers."""
-        from pydantic_core import core_schema
-
-        is_pair = source == tuple[float, float]
-
-        def checked(value: Any) -> Any:
-            problem = next(filter(None, map(self.problem, value if isinstance(value, tuple) else (value,))), None)
-            if problem is None and is_pair and value[0] > value[1]:
-                problem = "must be a pair [minimum, maximum], and is reversed"
-            if problem is not None:
-                raise ValueError(problem)
-            return value
-
-        return core_schema.no_info_after_validator_function(checked, handler(source))
-
 
 NUMBER = Limits()
 POSITIVE = Limits(above=0.0)
@@ -96,7 +104,7 @@ LONGEST_NAME, LONGEST_DESCRIPTION = 100, 300
 
 
 @dataclass(frozen=True)
-class Line:
+class Line(_Rule):
     """One line of printable text; `names_files` if files are named after it."""
 
     longest: int
@@ -113,18 +121,6 @@ class Line:
                 'must begin with a letter or a digit, without any of / \\ : * ? " < > | $, because files have this name'
             )
         return None
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Return the schema of a field for readers of files."""
-        from pydantic_core import core_schema
-
-        def checked(value: str) -> str:
-            problem = self.problem(value)
-            if problem is not None:
-                raise ValueError(problem)
-            return value
-
-        return core_schema.no_info_after_validator_function(checked, handler(source))
 
 
 Name = Annotated[str, Line(LONGEST_NAME, names_files=True)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,7 @@ from infoset.engine.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.engine.replays import PROBE, ROWS, past_of, replay_label
 from infoset.engine.set_state import SetState, SetStatus
 from infoset.geometry.convex_polygons import ConvexPolygons
-from infoset.limits import NUMBER, POSITIVE, WHOLE, Limits
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
+from infoset.limits import NUMBER, WHOLE, Limits
 
 MaskedFloats = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
 MaskedIntegers = np.ma.MaskedArray[tuple[int], np.dtype[np.int64]]
@@ -49,29 +45,13 @@ class Section:
 
     @property
     def omega_alpha(self) -> ConvexPolygons:
-        """The section in the (omega, alpha) plane of each lateral axis, rad/s and rad, shape (C,)."""
-        return to_omega_alpha(self.polygons, self.range_m, self.closing_speed_m_s)
+        """The section in the plane of omega = (V + e z/x)/x, rad/s, and alpha = z/x, rad, of each axis, shape (C,).
 
-
-def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
-    """Map polygons from the (V, z) plane to the (omega, alpha) plane at a range.
-
-    Parameters
-    ----------
-    polygon : ConvexPolygons
-        Polygons of (V, z), m/s and m.
-    range_m, closing_speed_m_s : float
-        Range x, m, at least `MIN_RANGE_M`, and closing speed e, m/s.
-
-    Returns
-    -------
-    ConvexPolygons
-        omega = (V + e z/x)/x in rad/s, alpha = z/x in rad.
-    """
-    Limits(minimum=MIN_RANGE_M).need("range_m", range_m)
-    POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
-    x, e = range_m, closing_speed_m_s
-    return polygon.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
+        The range x must be at least `MIN_RANGE_M`.
+        """
+        x, e = self.range_m, self.closing_speed_m_s
+        Limits(minimum=MIN_RANGE_M).need("range_m", x)
+        return self.polygons.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
 
 
 _TRACKING = SetStatus.TRACKING.value
@@ -244,13 +224,6 @@ class SetQueries:
         WHOLE.need("engagement", engagement)
         if engagement >= self.batch:
             raise IndexError(f"engagement must be less than {self.batch}, the number of engagements: got {engagement}")
-
-    def to_shapely(self, engagement: int = 0, axis: int = -1) -> list[BaseGeometry]:
-        """Return the living sections of one engagement as shapely geometries of (omega, alpha), rad/s and rad.
-
-        `axis` is the index of the lateral axis in `axes`; the last one is z.
-        """
-        return [section.omega_alpha[axis].to_shapely() for section in self.sections(engagement)]
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.batch} at t = {self.time_s:g} s>"

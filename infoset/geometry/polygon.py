@@ -198,7 +198,10 @@ def extremes(points: Points, count: int, normal_x: float, normal_y: float) -> tu
 
 @compiled
 def map_linearly(points: Points, count: int, xx: float, xy: float, yx: float, yy: float, out: Points) -> int:
-    """Write the image under the matrix [[xx, xy], [yx, yy]]; a singular one gives a segment or a point. O(count)."""
+    """Write the image under the matrix [[xx, xy], [yx, yy]]; a singular one gives a segment or a point. O(count).
+
+    A segment takes O(count^2).
+    """
     determinant = scaled_determinant(xx, xy, yx, yy)
     made = 0
     for i in range(count):
@@ -209,13 +212,9 @@ def map_linearly(points: Points, count: int, xx: float, xy: float, yx: float, yy
     made = close(out, made)
     if determinant != 0.0 or made <= 1:
         return made
-    along_x, along_y = (xx, yx) if max(abs(xx), abs(yx)) > max(abs(xy), abs(yy)) else (xy, yy)
-    scale = max(abs(along_x), abs(along_y))
-    first = support_index(out, made, -along_x / scale, -along_y / scale)
-    last = support_index(out, made, along_x / scale, along_y / scale)
-    first_x, first_y, last_x, last_y = out[first, 0], out[first, 1], out[last, 0], out[last, 1]
-    made = append(out, 0, first_x, first_y)
-    return append(out, made, last_x, last_y)
+    _, i, j = farthest_pair(out, made)
+    x, y, other_x, other_y = out[i, 0], out[i, 1], out[j, 0], out[j, 1]
+    return append(out, append(out, 0, x, y), other_x, other_y)
 
 
 @compiled

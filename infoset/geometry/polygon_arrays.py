@@ -31,7 +31,13 @@ _ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
 
 
 class PolygonArrays:
-    """Vertices, shape (..., V, 2), and their numbers, shape (...), of a batch of polygons; see `ConvexPolygons`."""
+    """Vertices, shape (..., V, 2), and their numbers, shape (...), of a batch of polygons; see `ConvexPolygons`.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree.
+    """
 
     vertices: Floats
     counts: Integers
@@ -290,16 +296,13 @@ class PolygonArrays:
 
     def _vectors(self, value: ArrayLike, name: str) -> Floats:
         """Return a vector for each polygon, shape (B, 2)."""
-        if isinstance(value, np.ma.MaskedArray) and value.shape == (*self.shape, 2):
-            masked = np.ma.getmaskarray(value).any(axis=-1)
-            value = value.filled(0.0) if (self.is_empty | ~masked).all() else value
         return self._spread(finite_values(name, value, "...", 2), name, (2,))
 
     def _and_vectors(self, value: ArrayLike, name: str) -> tuple[Self, Floats]:
         """Return the polygons and a vector for each; a single polygon is broadcast to the batch of the vectors."""
-        values = value if self.shape or isinstance(value, np.ma.MaskedArray) else real_values(name, value)
-        one = self if self.shape else self.broadcast_to(np.shape(values)[:-1])
-        return one, one._vectors(values, name)
+        values = finite_values(name, value, "...", 2)
+        one = self if self.shape else self.broadcast_to(values.shape[:-1])
+        return one, one._spread(values, name, (2,))
 
     def _scalars(self, value: ArrayLike, name: str) -> Floats:
         """Return a number for each polygon, shape (B,); it may be infinite."""

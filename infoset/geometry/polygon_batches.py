@@ -153,16 +153,29 @@ def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Fl
 
 @compiled
 def excess(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
-    """Maximum distances of a vertex from the other polygons."""
+    """Maximum distances of a vertex from the other polygons, 0 only for subsets."""
     for i in range(counts.size):
-        out[i, 0] = polygon_distance.excess(vertices[i], counts[i], other[i], other_counts[i])
+        points, count = polygon_exact.tidy(other[i], other_counts[i])
+        for x, y in vertices[i, : counts[i]]:
+            away = polygon_distance.nearest(points, count, x, y)[2] if count > 0 else np.inf
+            out[i, 0] = max(out[i, 0], away)
 
 
 @compiled
 def gap(vertices: Floats, counts: Integers, out: Floats, other: Floats, other_counts: Integers) -> None:
-    """Distances between polygons."""
+    """Distances between polygons: 0 only if they intersect, infinite if one is empty."""
+    common = np.empty((vertices.shape[1] + other.shape[1], 2))
     for i in range(counts.size):
-        out[i, 0] = polygon_distance.gap(vertices[i], counts[i], other[i], other_counts[i])
+        if polygon_exact.intersect(vertices[i], counts[i], other[i], other_counts[i], common) > 0:
+            continue
+        out[i, 0] = np.inf
+        if counts[i] > 0 and other_counts[i] > 0:
+            a, n = polygon_exact.tidy(vertices[i], counts[i])
+            b, m = polygon_exact.tidy(other[i], other_counts[i])
+            for j in range(n):
+                out[i, 0] = min(out[i, 0], polygon_distance.nearest(b, m, a[j, 0], a[j, 1])[2])
+            for j in range(m):
+                out[i, 0] = min(out[i, 0], polygon_distance.nearest(a, n, b[j, 0], b[j, 1])[2])
 
 
 @compiled

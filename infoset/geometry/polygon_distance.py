@@ -1,4 +1,4 @@
-"""Compiled distances between points and polygons, stored as in `polygon`, and largest discs in polygons."""
+"""Compiled nearest points of polygons, stored as in `polygon`, and largest discs in polygons."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from infoset._compile import compiled
 from infoset.geometry.polygon import MINIMUM, Points, farthest_pair
-from infoset.geometry.polygon_exact import holds, intersect, tidy
+from infoset.geometry.polygon_exact import holds, tidy
 
 
 @compiled
@@ -39,35 +39,6 @@ def nearest(points: Points, count: int, x: float, y: float) -> tuple[float, floa
                 minimum, best_x, best_y = distance, near_x, near_y
         j = i
     return best_x, best_y, max(minimum, MINIMUM)
-
-
-@compiled
-def excess(points: Points, count: int, other: Points, other_count: int) -> float:
-    """Return the maximum distance of a vertex from another polygon, 0 only for a subset. O(count * other_count)."""
-    if count == 0 or other_count == 0:
-        return np.inf if count > 0 else 0.0
-    b, m = tidy(other, other_count)
-    maximum = 0.0
-    for i in range(count):
-        maximum = max(maximum, nearest(b, m, points[i, 0], points[i, 1])[2])
-    return maximum
-
-
-@compiled
-def gap(points: Points, count: int, other: Points, other_count: int) -> float:
-    """Return the distance between two polygons, 0 if they intersect (exactly decided); infinite if one is empty."""
-    if count == 0 or other_count == 0:
-        return np.inf
-    if intersect(points, count, other, other_count, np.empty((count + other_count, 2))) > 0:
-        return 0.0
-    a, n = tidy(points, count)
-    b, m = tidy(other, other_count)
-    minimum = np.inf
-    for i in range(n):
-        minimum = min(minimum, nearest(b, m, a[i, 0], a[i, 1])[2])
-    for i in range(m):
-        minimum = min(minimum, nearest(a, n, b[i, 0], b[i, 1])[2])
-    return minimum
 
 
 @compiled
