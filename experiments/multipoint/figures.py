@@ -1,4 +1,4 @@
-"""Figures of visits: the path with the targets, the control, the costates."""
+"""Figures of visits: the path with the targets, and the control."""
 
 from __future__ import annotations
 
@@ -31,7 +31,6 @@ from experiments.multipoint.report import Report, Scene
 from infoset.arrays import Floats
 
 _TRACK_POINTS = 241
-_COMPONENTS = tuple({**look, "marker": "none"} for look in LINE_LOOKS[:3])
 _MAX_NAMED = 12
 _SUN_M3_S2 = 1.32712440018e20
 _TARGET: dict[str, Any] = {
@@ -48,7 +47,6 @@ def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
     yield draw_path(report.scene)
     yield draw_control(report.scene, report.problem.max_control_m_s2)
-    yield draw_costates(report.scene)
 
 
 @style()
@@ -97,28 +95,14 @@ def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
     """Draw the components and the magnitude of the control against time, with the bound if there is one."""
     control = scene.path.control(scene.times) * 1e3
     figure, (above, below) = _over_time(scene)
-    _draw_components(above, scene, control)
+    for title, look, component in zip(scene.axis_titles, LINE_LOOKS, control.T, strict=False):
+        _line(above, scene, component, label=title, **look | {"marker": "none"})
     _line(below, scene, np.linalg.norm(control, axis=1), color=INK, label="magnitude")
     if bound_m_s2 is not None:
         below.axhline(1e3 * bound_m_s2, label="bound of the control", **BOUND)
     above.set_ylabel("$u$, mm/s$^2$")
     below.set(ylabel="$|u|$, mm/s$^2$")
     below.set_ylim(bottom=0.0)
-    legend_below(figure, 3)
-    return figure
-
-
-@style()
-def draw_costates(scene: Scene) -> Figure:
-    """Draw the costates against time; the costate of the position jumps at each visit."""
-    costate = scene.path.costate(scene.times)
-    figure, (above, below) = _over_time(scene)
-    _draw_components(above, scene, costate[:, :3])
-    _draw_components(below, scene, costate[:, 3:])
-    above.set_ylabel(r"$\lambda_r$, m/s$^3$")
-    below.set_ylabel(r"$\lambda_V$, m/s$^2$")
-    for panel in (above, below):
-        panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
     legend_below(figure, 3)
     return figure
 
@@ -140,11 +124,6 @@ def _over_time(scene: Scene) -> tuple[Figure, list[Axes]]:
     grid[0, 0].set_xlim(scene.tour.start_s * per_s, scene.end_s * per_s)
     grid[1, 0].set_xlabel(f"time, {unit}")
     return figure, [*grid.flat]
-
-
-def _draw_components(panel: Axes, scene: Scene, values: Floats) -> None:
-    for title, look, component in zip(scene.axis_titles, _COMPONENTS, values.T, strict=True):
-        _line(panel, scene, component, label=title, **look)
 
 
 def _line(panel: Axes, scene: Scene, values: Floats, **look: Any) -> None:

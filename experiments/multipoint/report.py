@@ -108,7 +108,6 @@ def report_json(report: Report) -> dict[str, object]:
         "evaluations": report.best.evaluations,
         "orders_begun": report.best.nodes,
         "orders_left_out": len(report.best.lost),
-        "orders_that_do_not_fit": report.best.unfit,
         "notes": report.notes,
     }
 
@@ -170,5 +169,4 @@ def report_lines(report: Report) -> Iterator[Part]:
     if report.order_chosen == "best":
         text += f", {report.best.nodes} partial orders examined"
         text += f", {len(report.best.lost)} left out because no trajectory was found" if report.best.lost else ""
-        text += f"; {report.best.unfit} orders do not fit the times" if report.best.unfit else ""
     yield "; ".join([text, *report.notes])

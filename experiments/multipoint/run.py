@@ -64,6 +64,6 @@ COMMAND = ProblemCommand(
     lines=report_lines,
     to_html=multipoint_page,
     figures="experiments.multipoint.figures",
-    figure_names=("figure-path", "figure-control", "figure-costates"),
+    figure_names=("figure-path", "figure-control"),
 )
 run = COMMAND.run

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import permutations
 from math import factorial
-from operator import getitem
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Flags, Floats
 from rendezvous.multipoint.segments import NotSettledError, Path, check_times
-from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times, room_s
+from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times
 from rendezvous.multipoint.tour import SMOOTH, Visits
 
 Report = Callable[[float], None]
@@ -28,9 +26,7 @@ class BestOrder:
     """Targets visited in their best `order`, first to last.
 
     `objective` is the energy plus the price of the time, m^2/s^3. The search examined `nodes` partial orders and
-    computed `evaluations` paths; partial orders in `lost` were skipped because no path was found. `unfit` is the number
-    of infeasible orders: a stay ends after the time of the next visit, or stays leave no time for travel before the
-    latest time.
+    computed `evaluations` paths; partial orders in `lost` were skipped because no path was found.
     """
 
     order: tuple[int, ...]
@@ -39,7 +35,6 @@ class BestOrder:
     nodes: int
     evaluations: int
     lost: tuple[tuple[int, ...], ...] = ()
-    unfit: int = 0
 
 
 def best_order(
@@ -57,13 +52,12 @@ def best_order(
     Raises
     ------
     ValueError
-        If there are more than 9 targets, or they do not fit before the latest time.
+        If there are more than 9 targets.
     NotSettledError
-        If no path is found for any order.
+        If no order fits before the latest time, or no path is found for any order.
     """
     count = _checked_count(tour)
     dwell = tour.dwell_s
-    unfit = _orders_without_room(tour.start_s, dwell, limits)
     horizon = limits.latest_s
 
     def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Path]:
@@ -91,7 +85,7 @@ def best_order(
     best = search.run()
     final = best_times(tour, search.best, limits, [best.nodes.arrive_s, *guesses])
     evaluations = search.evaluations + final.evaluations
-    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, tuple(search.lost), unfit)
+    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, tuple(search.lost))
 
 
 def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
@@ -104,9 +98,9 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     Raises
     ------
     ValueError
-        If there are more than 9 targets, times do not increase, or no order fits them.
+        If there are more than 9 targets, or times do not increase.
     NotSettledError
-        If no path is found for any order that fits.
+        If no order fits the times, or no path is found for any order.
     """
     count, times = _checked_count(tour), np.asarray(time_s, dtype=np.float64)
     if times.shape != (count,):
@@ -114,13 +108,6 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     check_times(tour.start_s, times, times)
     # Whether each target may be visited at each time: its stay must end before the next visit.
     fits = times[:, None] + tour.dwell_s < np.append(times[1:], np.inf)[:, None]
-    rows = fits.tolist()
-    unfit = sum(not all(map(getitem, rows, order)) for order in permutations(range(count)))
-    if unfit == factorial(count):
-        raise ValueError(
-            "no order fits the times: in each one a stay ends after the next visit; make times farther apart, or "
-            "stays shorter"
-        )
 
     def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Path]:
         path = tour.flyer(order)(times[: len(order)])
@@ -130,7 +117,7 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
     search = _Search(solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits)
     path = search.run()
-    return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, tuple(search.lost), unfit)
+    return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, tuple(search.lost))
 
 
 def best_times(
@@ -169,7 +156,7 @@ class _Search:
     def run(self) -> Path:
         self._branch((), None)
         if self.best_path is None:
-            raise NotSettledError("no path was found for any order; give visits more time")
+            raise NotSettledError("no order fits, or no path was found for any order; give visits more time")
         return self.best_path
 
     def _branch(self, beginning: tuple[int, ...], before: Path | None) -> None:
@@ -233,18 +220,3 @@ def _checked_count(tour: Visits) -> int:
             f"{factorial(MAX_TARGETS)}, and each further target multiplies the cost: give the order"
         )
     return count
-
-
-def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) -> int:
-    """Count the orders that do not fit before the latest time; the stay with the last target may end later.
-
-    Raise `NoRoomError` if none fits.
-    """
-    room_s(start_s, np.sort(dwell_s), limits)
-    unfit = 0
-    for last in range(len(dwell_s)):
-        try:
-            room_s(start_s, np.append(np.delete(dwell_s, last), dwell_s[last]), limits)
-        except NoRoomError:
-            unfit += factorial(len(dwell_s) - 1)
-    return unfit

@@ -118,7 +118,6 @@ def order_and_times_agree(seed: int) -> None:
     found = best_order(tour, limits)
     room = latest_s - tour.start_s - tour.dwell_s.sum() + tour.dwell_s
     fitting = [order for order in permutations(range(3)) if room[order[-1]] > 0.0]
-    assert found.unfit == 6 - len(fitting)
     assert found.order in fitting
     each = [best_times(tour, order, limits).objective for order in fitting]
     assert found.objective <= min(each) * (1.0 + 1e-6)
