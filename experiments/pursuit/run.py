@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from experiments.common.errors import InputError
 from experiments.common.options import choice
 from experiments.common.problem_command import ProblemCommand
@@ -17,7 +19,7 @@ from rendezvous.pursuit_evasion import (
     Solution,
     Steering,
     certify,
-    fly_many,
+    fly,
     solve,
 )
 
@@ -60,16 +62,19 @@ def _fly(solution: Solution, options: Pursuit, policy: str, begin: BeginProgress
             return RandomSteering(options.seed, run, replan_s)
         return None if policy == OPTIMAL else Policy(policy).direction
 
-    flights = fly_many(
-        solution.game,
-        steering,
-        options.runs,
-        replan_s=replan_s,
-        observation=observation,
-        seed=options.seed,
-        progress=begin("feedback"),
-        solution=solution,
-    )
+    flights, progress = [], begin("feedback")
+    for run in range(options.runs):
+        flights.append(
+            fly(
+                solution.game,
+                steering(run),
+                replan_s=replan_s,
+                observation=observation,
+                seed=np.random.SeedSequence(entropy=options.seed, spawn_key=(run, 0)),
+                solution=solution,
+            )
+        )
+        progress((run + 1) / options.runs)
     return Feedback(policy, replan_s, observation, options.seed, tuple(flights))
 
 

@@ -6,7 +6,7 @@ not from these sources.
 """
 
 from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
-from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, fly, fly_many
+from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, fly
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
 from rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
@@ -37,7 +37,6 @@ __all__ = [
     "Verdict",
     "certify",
     "fly",
-    "fly_many",
     "history",
     "orbital_axes",
     "solve",

@@ -112,34 +112,6 @@ def fly(
     return flight.run(solution.capture.extremal, replan_s / units.time_s)
 
 
-def fly_many(
-    game: Game,
-    steering: Callable[[int], Steering | None],
-    runs: int,
-    *,
-    replan_s: float = 600.0,
-    observation: Observation | None = None,
-    seed: int = 0,
-    solution: Solution | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> list[Flight]:
-    """Simulate a pursuit several times; flights are in the order of the runs.
-
-    `steering` returns the steering of the evader of a run number; each run has a stream of the root `seed`. `progress`
-    is called with the fraction done. The other parameters are those of `fly`.
-    """
-    solution = solve(game) if solution is None else solution
-    flights = []
-    for run in range(runs):
-        stream = np.random.SeedSequence(entropy=seed, spawn_key=(run, 0))
-        flights.append(
-            fly(game, steering(run), replan_s=replan_s, observation=observation, seed=stream, solution=solution)
-        )
-        if progress is not None:
-            progress((run + 1) / runs)
-    return flights
-
-
 class _Pursuit:
     """One pursuit in progress, nondimensional."""
 

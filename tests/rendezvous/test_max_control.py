@@ -2,11 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from rendezvous.piecewise import max_control
-
-Floats = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("at", [0.0, 0.3, 1.7, 7.123456, 10.0])

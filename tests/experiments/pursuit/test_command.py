@@ -84,6 +84,10 @@ def test_feedback(infoset: Command) -> None:
     assert code == 0
     assert "feedback, a plan every 5000 s, evader random: " in out
     assert "distance at the end, m: smallest" in out
+    flights = infoset.json("pursuit", "--feedback", "random", *noise)["feedback"]["flights"]
+    assert flights[0]["time_s"] != flights[1]["time_s"]
+    noise = (*noise[:-3], 1, *noise[-2:])  # one run is the first of two
+    assert infoset.json("pursuit", "--feedback", "random", *noise)["feedback"]["flights"] == flights[:1]
 
 
 def test_a_map(infoset: Command) -> None:

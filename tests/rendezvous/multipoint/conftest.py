@@ -4,12 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from rendezvous.multipoint import Meet, Target, Tour
 from rendezvous.relative_motion import ClohessyWiltshire, LinearMotion
-
-Floats = NDArray[np.float64]
 
 RATE = 1.13e-3
 # T1 to T3 of the acceptance, then three more: (x, y, z, x', -2 n x, z') at t = 0.

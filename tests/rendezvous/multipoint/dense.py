@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from rendezvous.multipoint.segments import Nodes, check_times
 from rendezvous.relative_motion import LinearMotion
-
-Floats = NDArray[np.float64]
 
 
 def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> tuple[float, Floats]:

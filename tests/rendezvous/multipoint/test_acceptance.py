@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rendezvous.multipoint import (
     Meet,
@@ -23,7 +22,6 @@ from rendezvous.multipoint import (
 from rendezvous.relative_motion import TimeVaryingMotion
 from tests.rendezvous.multipoint.dense import solve_dense
 
-Floats = NDArray[np.float64]
 Make = Callable[..., Tour]
 
 NINE_DIGITS = 1e-9

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from infoset.arrays import Floats
 from rendezvous.multipoint import (
     KeplerTour,
     Meet,
@@ -19,8 +19,6 @@ from rendezvous.multipoint import (
     Target,
 )
 from rendezvous.two_body import coast
-
-Floats = NDArray[np.float64]
 
 
 def circular(radius: float, phase: float, inclination: float) -> Floats:

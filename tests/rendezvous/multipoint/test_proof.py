@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from infoset.arrays import Floats
 from rendezvous.multipoint import Meet, Target, Tour, solve_segments
 from rendezvous.relative_motion import (
     ClohessyWiltshire,
@@ -20,8 +20,6 @@ from rendezvous.relative_motion import (
     TschaunerHempel,
 )
 from tests.rendezvous.multipoint.dense import solve_dense
-
-Floats = NDArray[np.float64]
 
 RATE = 1.13e-3
 SEEDS = st.integers(0, 2**32 - 1)

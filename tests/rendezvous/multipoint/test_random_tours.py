@@ -7,9 +7,9 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from infoset.arrays import Floats
 from rendezvous.multipoint import (
     Meet,
     Target,
@@ -22,7 +22,6 @@ from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearM
 
 pytestmark = pytest.mark.thorough
 
-Floats = NDArray[np.float64]
 Check = Callable[[int], None]
 
 MANY = range(1000, 3000)

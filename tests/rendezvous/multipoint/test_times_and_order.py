@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rendezvous.multipoint import (
     Meet,
@@ -19,7 +18,6 @@ from rendezvous.multipoint import (
 )
 from rendezvous.relative_motion import ClohessyWiltshire
 
-Floats = NDArray[np.float64]
 Make = Callable[..., Tour]
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 from scipy.linalg import expm
 from scipy.optimize import minimize
 
+from infoset.arrays import Floats
 from rendezvous.pareto import (
     Component,
     Core,
@@ -34,8 +34,6 @@ from rendezvous.pareto import (
     total_impulse,
 )
 from rendezvous.relative_motion import ClohessyWiltshire
-
-Floats = NDArray[np.float64]
 
 POSITION = (Component.X, Component.Y, Component.Z)
 

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.sparse import csc_matrix
 
+from infoset.arrays import Floats
 from rendezvous.pareto import Component, Craft, Encounter, Meeting, solve_encounter
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, TschaunerHempel
-
-Floats = NDArray[np.float64]
 
 NODES = 24
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from experiments.common.hill_axes import from_paper, to_paper
+from infoset.arrays import Floats
 from rendezvous.pareto import (
     Component,
     Core,
@@ -21,8 +21,6 @@ from rendezvous.pareto import (
     solve_encounter,
 )
 from rendezvous.relative_motion import ClohessyWiltshire
-
-Floats = NDArray[np.float64]
 
 NINE_DIGITS = 1e-9
 STARTS = (

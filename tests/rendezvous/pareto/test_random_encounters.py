@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 import clarabel
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
+from infoset.arrays import Floats
 from rendezvous.pareto import (
     Component,
     Craft,
@@ -22,7 +22,6 @@ from rendezvous.pareto import (
 )
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
-Floats = NDArray[np.float64]
 Check = Callable[[int], None]
 
 FEW, MANY = range(30), range(1000, 3000)

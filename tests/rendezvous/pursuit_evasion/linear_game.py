@@ -7,10 +7,10 @@ nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt: both reachable sets ha
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize
 
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
+
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(20)
 PANELS = 25
 

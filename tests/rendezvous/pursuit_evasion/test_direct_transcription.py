@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import Solution
 from rendezvous.pursuit_evasion.game import scaled_craft
 from rendezvous.pursuit_evasion.paths import extremal_paths
 
-Floats = NDArray[np.float64]
 NODES, STEPS = 16, 400
 
 

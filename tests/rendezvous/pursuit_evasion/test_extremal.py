@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from rendezvous.pursuit_evasion._extremal import end_of, flow_back, rate, shoot_back
 from rendezvous.pursuit_evasion._pair import across
 
-Floats = NDArray[np.float64]
 PLACE = st.floats(-1.5, 1.5)
 OBLATENESS = (0.0, 5e-4)
 

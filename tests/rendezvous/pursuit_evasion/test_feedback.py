@@ -10,7 +10,6 @@ from rendezvous.pursuit_evasion import (
     Solution,
     Steering,
     fly,
-    fly_many,
     solve,
 )
 
@@ -54,19 +53,3 @@ def test_old_and_noisy_sight_costs_time(slides: MakeGame) -> None:
     assert noisy.ended is Ended.CAPTURED
     assert noisy.time_s > solution.capture.time_s
     assert noisy.time_s == pytest.approx(solution.capture.time_s, rel=1e-3)
-
-
-def test_a_batch_draws_each_flight_from_its_own_stream(slides: MakeGame) -> None:
-    game = slides(capture_radius_m=20e3)
-    seen = Observation(position_error_m=200.0)
-
-    def coast(_run: int) -> Steering:
-        return Policy.COAST.direction
-
-    told: list[float] = []
-    three = fly_many(game, coast, 3, observation=seen, seed=5, progress=told.append)
-    two = fly_many(game, coast, 2, observation=seen, seed=5)
-    assert [each.time_s for each in two] == [each.time_s for each in three[:2]]
-    assert len({each.time_s for each in three}) == 3
-    assert all(each.ended is Ended.CAPTURED for each in three)
-    assert told == pytest.approx([1.0 / 3.0, 2.0 / 3.0, 1.0])

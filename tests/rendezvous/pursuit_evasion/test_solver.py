@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
+from infoset.arrays import Floats
 from rendezvous.pursuit_evasion import (
     Capture,
     Game,
@@ -27,8 +27,6 @@ from rendezvous.pursuit_evasion.game import scaled_game, units_of
 from .conftest import EARTH_M, MU_M3_S2, MakeGame
 from .linear_game import capture_s
 from .published import CASES, Case
-
-Floats = NDArray[np.float64]
 
 GEO_M = 42166e3
 OFFSET_M, DRIFT_M_S = np.array([100e3, 1500e3, 200e3]), np.array([10.0, -20.0, 15.0])

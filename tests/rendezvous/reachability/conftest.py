@@ -6,12 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rendezvous.reachability import MotionModel, ReachabilityProblem, ThrustShape, discretised, motion_of
 from rendezvous.relative_motion import EllipticOrbit
 
-Floats = NDArray[np.float64]
 Paper = Callable[..., ReachabilityProblem]
 
 ORBIT = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
+from infoset.arrays import Floats
 from rendezvous.reachability import ReachabilityProblem, ThrustShape
 
-Floats = NDArray[np.float64]
 Numbers = NDArray[Any]
 
 DIGITS = 40

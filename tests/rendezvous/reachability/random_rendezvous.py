@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from rendezvous.reachability import (
     InadmissibleStartError,
     MotionModel,
@@ -19,8 +19,6 @@ from rendezvous.reachability import (
 from rendezvous.relative_motion import EllipticOrbit
 
 from .high_precision import Dense, cone_program
-
-Floats = NDArray[np.float64]
 
 MU_M3_S2 = 3.986004418e14
 GAPS = (0.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, -1e-9)

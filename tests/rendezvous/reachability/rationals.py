@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from math import lcm
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from rendezvous.reachability.problem import Block
 from tests.rationals import Fraction
 
 with suppress(ModuleNotFoundError):  # tests that need it are skipped
     import ppl
 
-Floats = NDArray[np.float64]
 Rationals = list[Fraction]
 
 

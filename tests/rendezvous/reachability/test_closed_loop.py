@@ -4,13 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from rendezvous.reachability import MotionModel, NonlinearMotion, ReachabilityProblem, replan
+from infoset.arrays import Floats
+from rendezvous.reachability import MotionModel, NonlinearMotion, replan
 from rendezvous.relative_motion import EllipticOrbit
-
-Floats = NDArray[np.float64]
-Paper = Callable[..., ReachabilityProblem]
+from tests.rendezvous.reachability.conftest import Paper
 
 
 @pytest.fixture

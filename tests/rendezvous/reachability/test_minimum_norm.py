@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from experiments.common.input_file import load_problem
 from rendezvous.reachability import (
@@ -29,12 +27,10 @@ from rendezvous.reachability import (
     solve,
 )
 from rendezvous.reachability.conic import CONE_TOLERANCE, NoSolutionError
+from tests.rendezvous.reachability.conftest import Paper
 
 from .high_precision import Dense, cone_program, precise_min_norm
 from .random_rendezvous import random_rendezvous
-
-Floats = NDArray[np.float64]
-Paper = Callable[..., ReachabilityProblem]
 
 CASES = Path(__file__).parent / "cases"
 SELECTIONS = (minimum_energy, minimum_l1, minimum_norms, minimum_peak, chebyshev_centre, analytic_centre)

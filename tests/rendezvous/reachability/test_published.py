@@ -5,17 +5,14 @@ The numbers are in the paper's axes, problems and solutions in Hill's.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from experiments.common.hill_axes import to_paper
+from infoset.arrays import Floats
 from rendezvous.reachability import (
     MotionModel,
     NonlinearMotion,
-    ReachabilityProblem,
     SetCounts,
     SetKind,
     Solution,
@@ -29,9 +26,7 @@ from rendezvous.reachability import (
     solve,
 )
 from rendezvous.relative_motion import EllipticOrbit
-
-Floats = NDArray[np.float64]
-Paper = Callable[..., ReachabilityProblem]
+from tests.rendezvous.reachability.conftest import Paper
 
 FORWARD = {
     1: [[1682.1015150268104, 3000], [-3000, -1646.5870806392707], [1714.4010382196716, 3000],

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from infoset.arrays import Floats
 from rendezvous.reachability import (
     EmptyTubeError,
     FeedbackPlan,
@@ -18,9 +17,7 @@ from rendezvous.reachability import (
     tightened,
 )
 from rendezvous.reachability.conic import NoSolutionError
-
-Floats = NDArray[np.float64]
-Paper = Callable[..., ReachabilityProblem]
+from tests.rendezvous.reachability.conftest import Paper
 
 
 def pushes(problem: ReachabilityProblem, acceleration_m_s2: float) -> Floats:

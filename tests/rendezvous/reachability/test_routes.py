@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from infoset.geometry.polytope import UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
@@ -35,11 +35,10 @@ from rendezvous.reachability.conic import CONE_TOLERANCE
 from rendezvous.reachability.optimum import BlockOptimum
 from rendezvous.reachability.sets import LiftedSets, exact_sets
 from rendezvous.reachability.solve import optimal_controls
+from tests.rendezvous.reachability.conftest import Paper
 
 from .rationals import rational_sets
 
-Floats = NDArray[np.float64]
-Paper = Callable[..., ReachabilityProblem]
 Random = Callable[[int, int], ReachabilityProblem]
 SHARED = [HealthCheck.function_scoped_fixture]
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")

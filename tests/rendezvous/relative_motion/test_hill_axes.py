@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from experiments.common.input_file import load_problem
+from infoset.arrays import Floats
 from rendezvous.multipoint import Tour
 from rendezvous.pursuit_evasion import orbital_axes
 from rendezvous.reachability import NonlinearMotion
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 from rendezvous.two_body import OrbitalElements
-
-Floats = NDArray[np.float64]
 
 MU = 3.986004418e14
 ANGLES = (0.9, 2.1, 0.4)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from experiments.common.hill_axes import to_paper
+from infoset.arrays import Floats
 from rendezvous.reachability import MotionModel, motion_of
 from rendezvous.relative_motion import (
     ClohessyWiltshire,
@@ -20,8 +20,6 @@ from rendezvous.relative_motion import (
     TschaunerHempel,
 )
 from rendezvous.relative_motion.elliptic_orbit import eccentric_of_mean
-
-Floats = NDArray[np.float64]
 
 RATE = 1.13e-3
 MOTIONS: dict[str, Callable[[], LinearMotion]] = {
