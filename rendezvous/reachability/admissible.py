@@ -216,16 +216,12 @@ def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
     return float(point[-1]), point[:-1]
 
 
-def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Optimum:
-    """Minimise v . matrix v / 2 + vector . v over a set of controls without equations, `matrix` positive semidefinite.
-
-    For a box the solution is moved to the intersection of its active rows, so that it is exact to rounding.
-    """
+def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Floats:
+    """Minimise v . matrix v / 2 + vector . v, convex, over a set of controls without equations."""
     if not lifted.size:
-        return Optimum(np.zeros(0), np.zeros(len(lifted.limits)))
+        return np.zeros(0)
     program = ConeProgram(vector, matrix).keep(lifted.rows, lifted.limits)
-    optimum = with_thrust(program, lifted).solve()
-    return optimum if lifted.ball else _polished(optimum, matrix, vector, lifted.rows, lifted.limits)
+    return with_thrust(program, lifted).solve().point
 
 
 def min_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
@@ -295,25 +291,6 @@ def _with_norms_below(program: ConeProgram, lifted: Lifted, scale: Floats, tops:
         mine = slice(t * group, (t + 1) * group)
         program.bound(scale[mine, None] * lifted.control_response[mine], scale[mine] * lifted.control_free[mine], top)
     return program
-
-
-def _polished(optimum: Optimum, matrix: Floats, vector: Floats, rows: Floats, limits: Floats) -> Optimum:
-    """Solve for the point where the active rows hold with equality; keep it if it is a solution."""
-    active = optimum.multipliers > limits - rows @ optimum.point
-    held = rows[active]
-    count = len(vector)
-    system = np.zeros((count + len(held), count + len(held)))
-    system[:count, :count] = matrix
-    system[:count, count:], system[count:, :count] = held.T, held
-    right = np.concatenate([-vector - matrix @ optimum.point, limits[active] - held @ optimum.point])
-    step = np.linalg.lstsq(system, right, rcond=1e-13)[0]
-    point, pressed = optimum.point + step[:count], step[count:]
-    size = max(1.0, float(np.abs(pressed).max(initial=0.0)))
-    if float((limits - rows @ point).min(initial=0.0)) < -1e-10 or float(pressed.min(initial=0.0)) < -1e-9 * size:
-        return optimum
-    multipliers = np.zeros(len(rows))
-    multipliers[active] = np.maximum(pressed, 0.0)
-    return Optimum(point, multipliers)
 
 
 class Maximiser:

@@ -222,4 +222,4 @@ def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, F
 
 def _nearest(space: Lifted, scale: Floats, control: Floats | float = 0.0) -> Floats:
     turned = scale[:, None] * space.control_response
-    return quadratic(space, turned.T @ turned, turned.T @ (scale * space.control_free - control)).point
+    return quadratic(space, turned.T @ turned, turned.T @ (scale * space.control_free - control))

@@ -1,14 +1,14 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
-from infoset.arrays import Floats
 from rendezvous.multipoint import Meet, Target, Tour
-from rendezvous.relative_motion import ClohessyWiltshire, LinearMotion
+from rendezvous.relative_motion import ClohessyWiltshire
 
+Make = Callable[..., Tour]
 RATE = 1.13e-3
 # T1 to T3 of the acceptance, then three more: (x, y, z, x', -2 n x, z') at t = 0.
 TARGETS = np.array(
@@ -23,28 +23,13 @@ TARGETS = np.array(
 )
 
 
-class Tours:
+@pytest.fixture(scope="session")
+def tours() -> Make:
     """Makes tours of the first few targets."""
 
-    def __call__(
-        self,
-        count: int,
-        meets: Sequence[Meet] | None = None,
-        dwell_s: Sequence[float] | None = None,
-        motion: LinearMotion | None = None,
-        initial: Floats | None = None,
-    ) -> Tour:
-        meets = meets or [Meet.FLYBY] * count
-        dwell_s = dwell_s or [0.0] * count
-        motion = motion or ClohessyWiltshire(RATE)
-        targets = tuple(
-            Target(f"T{number}", meet, dwell)
-            for number, (meet, dwell) in enumerate(zip(meets, dwell_s, strict=True), 1)
-        )
-        states = TARGETS[:count] if initial is None else initial
-        return Tour(motion, targets, states, np.zeros(6))
+    def make(count: int, meets: Sequence[Meet] = (), dwell_s: Sequence[float] = ()) -> Tour:
+        visits = zip(meets or [Meet.FLYBY] * count, dwell_s or [0.0] * count, strict=True)
+        targets = tuple(Target(f"T{number}", *visit) for number, visit in enumerate(visits, 1))
+        return Tour(ClohessyWiltshire(RATE), targets, TARGETS[:count], np.zeros(6))
 
-
-@pytest.fixture(scope="session")
-def tours() -> Tours:
-    return Tours()
+    return make

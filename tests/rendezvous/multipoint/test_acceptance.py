@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -20,9 +19,8 @@ from rendezvous.multipoint import (
     solve_segments,
 )
 from rendezvous.relative_motion import TimeVaryingMotion
+from tests.rendezvous.multipoint.conftest import Make
 from tests.rendezvous.multipoint.dense import solve_dense
-
-Make = Callable[..., Tour]
 
 NINE_DIGITS = 1e-9
 

@@ -173,14 +173,3 @@ def test_the_min_peak_of_a_straight_line() -> None:
     assert peak_control(plan) == pytest.approx(6.0 * 10.0 / 100.0**2, rel=1e-9)
     passing = solve_encounter(Encounter(craft, 100.0, (Component.Y,), fixed, Meeting.INTERCEPT))
     assert min_peak(passing.plan(0, np.zeros(1)), 3) == pytest.approx(2.0 * 10.0 / 100.0**2, rel=1e-6)
-
-
-def test_bounds_are_met_or_not() -> None:
-    plan = some(6, 2).plan(0)
-    peak, minimum = peak_control(plan), min_peak(plan)
-    assert minimum < peak
-    assert check_bound(plan, 1.001 * peak).feasibility is Feasibility.WITHIN
-    assert check_bound(plan, 0.5 * (peak + minimum)).feasibility is Feasibility.ANOTHER_CONTROL
-    check = check_bound(plan, 0.99 * minimum)
-    assert check.feasibility is Feasibility.IMPOSSIBLE
-    assert check.min_peak_m_s2 == pytest.approx(minimum)

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from experiments.common.input_file import load_problem
 from infoset.arrays import Floats
-from rendezvous.multipoint import Tour
 from rendezvous.pursuit_evasion import orbital_axes
 from rendezvous.reachability import NonlinearMotion
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
@@ -95,22 +93,3 @@ def test_the_nonlinear_motion_is_two_body_motion(eccentricity: float, anomaly: f
     relative = np.array([40e3, -70e3, 25e3, 30.0, -20.0, 15.0])
     found = motion.paths(0.0, relative, np.zeros(3), [1800.0])[0, 0]
     np.testing.assert_allclose(found, after(relative, reference(axis, eccentricity, anomaly), 1800.0), rtol=1e-7)
-
-
-def test_the_problems_of_three_commands_are_in_these_axes() -> None:
-    # Each built-in problem's own motion moves the same state as two-body motion about its reference orbit.
-    cone, encounter, tour = (
-        load_problem("approach-cone"),
-        load_problem("pareto-2008"),
-        load_problem("service-2").tour,
-    )
-    assert isinstance(tour, Tour)
-    small = np.array([40.0, -60.0, 30.0, 0.03, 0.02, -0.01])
-    for motion, axis, eccentricity, anomaly in (
-        (cone.motion, 6778137.0, 0.001, np.radians(40.0)),
-        (encounter.encounter.craft[0].motion, (MU / 0.001176**2) ** (1 / 3), 0.0, 0.0),
-        (tour.motion, (MU / 1.13e-3**2) ** (1 / 3), 0.0, 0.0),
-    ):
-        chief = reference(axis, eccentricity, float(anomaly))
-        found = 0.5 * (after(small, chief, 600.0) - after(-small, chief, 600.0))
-        np.testing.assert_allclose(found, motion.transition(0.0, 600.0) @ small, rtol=1e-4, atol=1e-6)
