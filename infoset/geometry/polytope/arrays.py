@@ -65,8 +65,7 @@ class PolytopeArrays:
         digits. The facets are the rays of a double description: O(m f) for f facets in the plane, O(m f^2) at worst.
         """
         array = finite_values("points", points, "m", "n")
-        # The minimum width also keeps a set that is nearly flat along an axis from being blown up to rounding errors.
-        centre, scale = coordinates(array.min(axis=0), array.max(axis=0), 1e-10 * np.abs(array).max(axis=0))
+        centre, scale = _around(array.min(axis=0), array.max(axis=0))
         return cls._hull((array - centre) / scale, centre, scale, flat)
 
     @classmethod
@@ -230,8 +229,14 @@ class PolytopeArrays:
         return replace(self, points=points, facets=facets)
 
     @classmethod
-    def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0) -> Self:
-        """Return {x: rows (x - origin) <= limits}.
+    def _of_rows(
+        cls,
+        rows: Floats,
+        limits: Floats,
+        origin: Floats | float = 0.0,
+        box: tuple[Floats, Floats] | None = None,
+    ) -> Self:
+        """Return {x: rows (x - origin) <= limits}, which a `box` contains, if it is known.
 
         The coordinates in which the set is round are not known before the set, so it is computed again if others are
         much better.
@@ -240,28 +245,22 @@ class PolytopeArrays:
             return cls.empty(rows.shape[1])
         rows, limits = rows[limits < np.inf], limits[limits < np.inf]
         # In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
-        centre, found = np.zeros(rows.shape[1]), None
-        with suppress(UnboundedPolytopeError, UncertainHullError):
-            found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 0.25))
-        if found is None or found.is_empty:
-            found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 1.0))
-        return found if found._is_round else cls._in_box(rows, limits, origin, found._box) or found
-
-    @classmethod
-    def _in_box(cls, rows: Floats, limits: Floats, origin: Floats | float, box: tuple[Floats, Floats]) -> Self | None:
-        """Return {x: rows (x - origin) <= limits}, which a box contains, computed in the coordinates of the box.
-
-        Again, if those of the result are much better. None if it is empty, or rounding decides.
-        """
-        found = None
+        *starts, last = [(np.zeros(rows.shape[1]), _guess(rows, limits, share)) for share in (0.25, 1.0)]
+        for start in starts if box is None else [_around(*box), *starts]:
+            with suppress(UnboundedPolytopeError, UncertainHullError):
+                found = cls._intersect(rows, limits, origin, *start)
+                if not found.is_empty:
+                    break
+        else:
+            found = cls._intersect(rows, limits, origin, *last)
         with suppress(UnboundedPolytopeError, UncertainHullError):
             for _ in range(3):
-                better = cls._intersect(rows, limits, origin, *coordinates(*box, 1e-10 * np.abs(box).max(axis=0)))
-                if better.is_empty:
-                    break
-                found, box = better, better._box
                 if found._is_round:
                     break
+                better = cls._intersect(rows, limits, origin, *_around(*found._box))
+                if better.is_empty:
+                    break
+                found = better
         return found
 
     @property
@@ -328,14 +327,12 @@ class PolytopeArrays:
 
         `box` are two ends that contain the part, if known.
         """
-        limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
+        limits = _moved(rows, limits, self.centre - origin)
         own, ends = self._rows(self.centre)
-        both = np.vstack([own, rows]), np.append(ends, limits)
-        if box is not None and (SMALL * (box[1] - box[0]) < before * self.scale).any():
+        everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
+        if box is not None and (SMALL * (box[1] - box[0]) < np.ptp(self.points, axis=0) * self.scale).any():
             # Sets that touch each other do so within the rounding of their own coordinates.
-            better = self._in_box(*both, self.centre, box)
-            if better is not None:
-                return better
+            return self._of_rows(*everything, box)
         scaled, possible = _scaled_rows(rows, limits, self.scale)
         heights = self.points @ scaled[:, :-1].T - scaled[:, -1]
         cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max())))
@@ -351,14 +348,9 @@ class PolytopeArrays:
             return self.empty(self.space)
         part = replace(self, points=rays[:, :-1].copy(), facets=np.vstack([self.facets, scaled[cuts]]), incidence=bits)
         new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
-        widths = np.ptp(part.points, axis=0)
         with suppress(UncertainHullError):
-            # An axis along which the part has no width is no reason: its equations fix that coordinate.
-            if not ((SMALL * widths < before) & (widths > FLAT * before)).any():
-                return part._reduced(new)
-        # The part is much smaller: again, in its own coordinates.
-        better = self._in_box(*both, self.centre, part._box)
-        return part._reduced(new) if better is None else better
+            return part._reduced(new)
+        return self._of_rows(*everything, part._box)
 
     # Representation ---------------------------------------------------------------------------------------------------
 
@@ -480,6 +472,12 @@ def coordinates(lower: Floats, upper: Floats, minimum: Floats) -> tuple[Floats, 
     scale = np.ldexp(1.0, np.frexp(np.where(widths > 0.0, widths, 1.0))[1] - 1)
     far = np.maximum(np.abs(lower), np.abs(upper)) > _FAR * scale
     return np.where(far, 0.5 * lower + 0.5 * upper, 0.0), scale
+
+
+def _around(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Return the coordinates of a set between two points."""
+    # The minimum width also keeps a set that is nearly flat along an axis from being blown up to rounding errors.
+    return coordinates(lower, upper, 1e-10 * np.maximum(np.abs(lower), np.abs(upper)))
 
 
 def _guess(rows: Floats, limits: Floats, share: float) -> Floats:

@@ -227,8 +227,7 @@ class Polytope(PolytopeArrays):
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
         lower, upper = np.array(self.bounding_box()) - other.bounding_box()
-        found = self._in_box(rows, less, self.centre, (lower, np.maximum(lower, upper)))
-        return found or self._of_rows(rows, less, self.centre)
+        return self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""

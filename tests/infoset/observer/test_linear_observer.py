@@ -544,3 +544,18 @@ def test_numbers_of_one_output_and_a_wrong_bound() -> None:
     np.testing.assert_allclose([observer.estimate().lower[0], observer.estimate().upper[0]], [1.4, 1.6], atol=1e-9)
     with pytest.raises(ValueError, match="max_facets"):
         LinearObserver(np.eye(3), np.eye(3), box, noise=0.1, max_facets=5)
+
+
+def test_a_precise_measurement_is_one_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Formerly a set that became much thinner was computed from all of its rows again: up to 280 ms a step."""
+    rng = np.random.default_rng(3)
+    a, c, generators = 0.4 * rng.normal(size=(6, 6)), np.eye(2, 6), 0.1 * rng.normal(size=(2, 6))
+    start, disturbance = Zonotope.box(-np.ones(6), np.ones(6)), Zonotope(np.zeros(6), generators)
+    observer = LinearObserver(a, c, start, noise=1e-4, disturbance=disturbance)
+    monkeypatch.setattr(Polytope, "_of_rows", None)
+    x = np.zeros(6)
+    for _ in range(4):
+        observer.predict()
+        x = a @ x + rng.uniform(-1.0, 1.0, 2) @ generators
+        observer.update(c @ x + rng.uniform(-1e-4, 1e-4, 2))
+        assert observer.estimate().polytopes[0].contains(x)
