@@ -466,29 +466,6 @@ def _least_factor(facets: Floats, mine: Integers, needs: Floats, step: Floats) -
     return factor
 
 
-@_kernels.allocation_free
-def _solve(table: Floats, result: Floats) -> None:
-    """Write the solution of the linear equations (a, b), a x = b, to a zero result, which stays zero if singular."""
-    n = len(table)
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            best = i if abs(table[i, k]) > abs(table[best, k]) else best
-        if table[best, k] == 0.0:
-            return
-        for j in range(k, n + 1):
-            table[k, j], table[best, j] = table[best, j], table[k, j]
-        for i in range(k + 1, n):
-            factor = table[i, k] / table[k, k]
-            for j in range(k, n + 1):
-                table[i, j] -= factor * table[k, j]
-    for k in range(n - 1, -1, -1):
-        value = table[k, n]
-        for j in range(k + 1, n):
-            value -= table[k, j] * result[j]
-        result[k] = value / table[k, k]
-
-
 @_kernels.compiled
 def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bool, most: float) -> Floats:
     """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
@@ -504,7 +481,7 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
     for i in range(v):
         for j in range(n):
             middle[j] += points[i, j] / v
-    mine, needs, table = np.empty(len(facets), np.int64), np.empty(len(facets)), np.empty((n, n + 1))
+    mine, needs = np.empty(len(facets), np.int64), np.empty(len(facets))
     for i in range(v):
         moved, count = 0.0, _members(bits[i], mine)
         for attempt in range(3 if chosen[i] else 0):
@@ -522,13 +499,9 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
             for j in range(n):
                 away[j], step[j] = points[i, j] - middle[j], 0.0
             factor = _least_factor(facets, mine[:count], needs, away)
-            if not flat and (count == n or factor * math.sqrt(_along(away, away)[0]) > _RADIAL):
-                if count == n:
-                    for m in range(n):
-                        table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
-                    _solve(table, step)
+            if not flat and factor * math.sqrt(_along(away, away)[0]) > _RADIAL:
                 rounding = 0.0
-                for _ in range(50):
+                for _ in range(15):
                     done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
                     for m in range(count):
                         along, square = _along(facets[mine[m]], step)
