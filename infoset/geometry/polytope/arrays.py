@@ -97,52 +97,25 @@ class PolytopeArrays:
         centre, scale = coordinates(minimum, most, np.zeros(len(minimum)))
         least, top = (minimum - centre) / scale, (most - centre) / scale
         ends = [dict.fromkeys(pair) for pair in zip(least, top, strict=True)]
-        unit, wide = np.eye(len(least)), least < top
-        return cls._of_shape(
-            np.array(list(itertools.product(*ends))),
-            np.column_stack([np.vstack([unit[wide], -unit[wide]]), np.concatenate([top[wide], -least[wide]])]),
-            np.column_stack([unit[~wide], top[~wide]]),
-            centre,
-            scale,
-        )
-
-    @classmethod
-    def _of_shape(cls, points: Floats, facets: Floats, equations: Floats, centre: Floats, scale: Floats) -> Self:
-        """Return a polytope whose vertices and facets are known; the incidence follows from their distances."""
-        facets = facets * _units(facets)
-        on = facets[:, -1] - points @ facets[:, :-1].T <= dd.ON * max(1.0, float(np.abs(points).max()))
-        return cls(points, facets, equations, dd.packed(on), centre, scale)
+        points, unit, wide = np.array(list(itertools.product(*ends))), np.eye(len(least)), least < top
+        facets = np.column_stack([np.vstack([unit[wide], -unit[wide]]), np.concatenate([top[wide], -least[wide]])])
+        on = points @ facets[:, :-1].T == facets[:, -1]
+        return cls(points, facets, np.column_stack([unit[~wide], top[~wide]]), dd.packed(on), centre, scale)
 
     @classmethod
     def from_ball(cls, centre: ArrayLike, radius: float, *, outer: bool = True) -> Self:
         """Return a polytope around the ball with `centre`, shape (n,), and `radius`, or in it.
 
         Its facets, or its vertices if not `outer`, are in the 3^n - 1 directions whose components are in ratios of -1,
-        0 and 1; it has 2^n n! vertices, or facets. It extends beyond the ball, or stays inside it, by the factor 1.09
-        in two dimensions, 1.13 in three and 1.21 in six at most.
+        0 and 1; it has 2^n n! vertices, or facets: 3840 in R^5. It extends beyond the ball, or stays inside it, by the
+        factor 1.09 in two dimensions, 1.13 in three and 1.19 in five at most.
         """
         middle, size = finite_values("centre", centre, "n"), float(radius_values(radius))
-        space = len(middle)
-        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=space) if any(row)])
+        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=len(middle)) if any(row)])
         rows /= np.linalg.norm(rows, axis=1)[:, None]
-        # The hyperplane through (1, 0, ..), (1, 1, 0, ..) / sqrt(2), .. is one side; symmetry gives the others.
-        side = np.diff(np.sqrt(np.arange(space + 1)))
-        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=space)))
-        sides = (np.array(list(itertools.permutations(side)))[:, None] * signs).reshape(-1, space)
-        if size <= 1e-13 * np.abs(middle).max():  # rounding of the coordinates is larger
-            return cls.from_vertices(middle + size * (sides if outer else rows))
-        points, normals = (sides, rows) if outer else (rows, sides)
-        offsets = np.ones(len(normals)) if outer else dd.supports(points, normals)
-        base, scale = coordinates(middle - size, middle + size, np.zeros(space))
-        shift, share = (middle - base) / scale, size / scale
-        facets = normals / share
-        return cls._of_shape(
-            shift + share * points,
-            np.column_stack([facets, offsets + facets @ shift]),
-            np.zeros((0, space + 1)),
-            base,
-            scale,
-        )
+        if outer and size > 1e-13 * np.abs(middle).max():  # rounding of the coordinates is smaller
+            return cls._of_rows(rows, np.full(len(rows), size), middle, (middle - size, middle + size))
+        return cls.from_vertices(middle + size * rows)
 
     @classmethod
     def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Self:
@@ -257,16 +230,11 @@ class PolytopeArrays:
             for _ in range(3):
                 if found._is_round:
                     break
-                better = cls._intersect(rows, limits, origin, *_around(*found._box))
+                better = cls._intersect(rows, limits, origin, *_around(*found.bounding_box()))
                 if better.is_empty:
                     break
                 found = better
         return found
-
-    @property
-    def _box(self) -> tuple[Floats, Floats]:
-        """Minimum and maximum coordinates."""
-        return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
     @property
     def _is_round(self) -> bool:
@@ -350,7 +318,7 @@ class PolytopeArrays:
         new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
         with suppress(UncertainHullError):
             return part._reduced(new)
-        return self._of_rows(*everything, part._box)
+        return self._of_rows(*everything, part.bounding_box())
 
     # Representation ---------------------------------------------------------------------------------------------------
 
@@ -456,6 +424,10 @@ class PolytopeArrays:
         if self.is_empty:
             raise EmptyPolytopeError("the polytope is empty")
         return self
+
+    def bounding_box(self) -> tuple[Floats, Floats]:
+        """Return the minimum and the maximum coordinates of the vertices, each of shape (n,). O(v n), exact."""
+        return self.needed().vertices.min(axis=0), self.vertices.max(axis=0)
 
     def __repr__(self) -> str:
         if self.is_empty:

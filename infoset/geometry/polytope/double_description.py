@@ -29,8 +29,8 @@ COLLINEAR = 1e-9
 """Distance of a ray from the plane of two others that contains it. A wrong one adds only points of the set."""
 TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
-_RADIAL = 1e-13
-"""The same up to which a vertex of more than n facets moves away from the centre: others need several steps."""
+_SWEEPS = 15
+"""Number of times that a vertex moves to the outer sides of all of its facets: more only help at sharp corners."""
 MAX_CROSSINGS = 50_000
 """Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
 EPS = float(np.finfo(np.float64).eps)
@@ -137,21 +137,6 @@ def sides(rays: Floats, row: Floats) -> tuple[Floats, Integers]:
 
 
 @_kernels.compiled
-def _near(bits: Bits, others: Integers, chosen: Integers, least: int) -> Integers:
-    """Return the `chosen` sets of bits that share at least `least` bits with the union of the `others`."""
-    union = np.zeros(bits.shape[1], np.uint64)
-    for i in others:
-        for word in range(len(union)):
-            union[word] |= bits[i, word]
-    near, count = np.empty(len(chosen), np.int64), 0
-    for i in chosen:
-        if _common(bits[i], union) >= least:
-            near[count] = i
-            count += 1
-    return near[:count]
-
-
-@_kernels.compiled
 def crossings(
     rays: Floats, bits: Bits, heights: Floats, signs: Integers, least: int, affine: bool
 ) -> tuple[Floats, Bits]:
@@ -167,8 +152,8 @@ def crossings(
         counts[i] = _common(bits[i], bits[i])
     room, count, blocker = 2 * k + 16, 0, 0
     result, marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)
-    below = _near(bits, np.flatnonzero(signs > 0), np.flatnonzero(signs < 0), least)
-    for p in _near(bits, below, np.flatnonzero(signs > 0), least):
+    below = np.flatnonzero(signs < 0)
+    for p in np.flatnonzero(signs > 0):
         for q in below:
             shared = _common(bits[p], bits[q])
             if shared < least:
@@ -261,31 +246,16 @@ def pivots(rows: Floats, tolerance: float, first: int) -> tuple[Integers, Intege
 
     A pivot up to `tolerance` ends it. If `first` >= 0, the first pivot is the last entry of that row.
     """
-    table = rows.copy()
-    k, size = table.shape
+    table, (k, size) = rows.copy(), rows.shape
     chosen, columns = np.empty(min(k, size), np.int64), np.empty(min(k, size), np.int64)
-    used_row, used_column = np.zeros(k, np.bool_), np.zeros(size, np.bool_)
     for step in range(min(k, size)):
-        best, row, column = tolerance, -1, -1
-        if step == 0 and first >= 0:
-            row, column = first, size - 1
-        else:
-            for i in range(k):
-                if not used_row[i]:
-                    for j in range(size):
-                        if not used_column[j] and abs(table[i, j]) > best:
-                            best, row, column = abs(table[i, j]), i, j
-        if row < 0:
+        best = np.abs(table).argmax() if step or first < 0 else first * size + size - 1
+        row, column = best // size, best % size
+        if abs(table[row, column]) <= tolerance:
             return chosen[:step].copy(), columns[:step].copy()
         chosen[step], columns[step] = row, column
-        used_row[row], used_column[column] = True, True
-        for i in range(k):
-            if not used_row[i]:
-                factor = table[i, column] / table[row, column]
-                if factor != 0.0:
-                    for j in range(size):
-                        table[i, j] -= factor * table[row, j]
-                    table[i, column] = 0.0
+        table -= np.outer(table[:, column] / table[row, column], table[row])
+        table[row], table[:, column] = 0.0, 0.0
     return chosen, columns
 
 
@@ -455,26 +425,15 @@ def _along(row: Floats, step: Floats) -> tuple[float, float]:
     return along, square
 
 
-@_kernels.allocation_free
-def _least_factor(facets: Floats, mine: Integers, needs: Floats, step: Floats) -> float:
-    """Return the minimum factor of a step away from the centre that moves a point by its needs across its facets."""
-    factor = 0.0
-    for m in range(len(mine)):
-        along, _ = _along(facets[mine[m]], step)
-        if along > 0.0 and needs[m] > factor * along:
-            factor = needs[m] / along
-    return factor
-
-
 @_kernels.compiled
 def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bool, most: float) -> Floats:
     """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
-    its outer side covers the set. A point that is exactly on its facets stays. The others move to the common point of n
-    facets that are moved outward by rounding; to the outer sides of more than n facets, one after the other (Agmon and
-    Motzkin); and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves by more
-    than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
+    its outer side covers the set. A point that is exactly on its facets stays. The others move to the outer sides of
+    their facets, one after the other (Agmon and Motzkin), and for what is left, at a sharp corner or in a `flat` set,
+    away from the centre. No point moves by more than `most`: where rounding moves facets more than the vertex, the hull
+    may lack the very tip.
     """
     v, n = points.shape
     result, middle, away, step = points.copy(), np.zeros(n), np.empty(n), np.empty(n)
@@ -494,34 +453,32 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                 for j in range(n):
                     terms += abs(facets[f, j] * points[i, j])
                 needs[m] = 0.4 * attempt * EPS * terms - high  # rounding of coordinates
-            if not inside:
+            if not inside or moved >= most:
                 break
             for j in range(n):
                 away[j], step[j] = points[i, j] - middle[j], 0.0
-            factor = _least_factor(facets, mine[:count], needs, away)
-            if not flat and factor * math.sqrt(_along(away, away)[0]) > _RADIAL:
-                rounding = 0.0
-                for _ in range(15):
-                    done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
-                    for m in range(count):
-                        along, square = _along(facets[mine[m]], step)
-                        gap = needs[m] - along
-                        if gap > rounding:
-                            part = (gap + 0.25 * abs(needs[m])) / square
-                            for j in range(n):
-                                step[j] += part * facets[mine[m], j]
-                            done = False
-                    if done:
-                        break
-                for m in range(count):  # what is left, at sharp corners, away from the centre
-                    needs[m] -= _along(facets[mine[m]], step)[0] + rounding
-                factor = _least_factor(facets, mine[:count], needs, away)
+            rounding = 0.0  # far below that of the coordinates
+            for _ in range(0 if flat else _SWEEPS):
+                done, rounding = True, EPS * math.sqrt(_along(step, step)[0])
+                for m in range(count):
+                    along, square = _along(facets[mine[m]], step)
+                    gap = needs[m] - along
+                    if gap > rounding:
+                        for j in range(n):
+                            step[j] += (gap + 0.25 * abs(needs[m])) / square * facets[mine[m], j]
+                        done = False
+                if done:
+                    break
+            factor = 0.0
+            for m in range(count):
+                depth = _along(facets[mine[m]], away)[0]
+                left = needs[m] - _along(facets[mine[m]], step)[0] - rounding
+                if depth > 0.0 and left > factor * depth:
+                    factor = left / depth
             for j in range(n):
                 step[j] += factor * away[j]
             length = math.sqrt(_along(step, step)[0])
-            if length == 0.0 or moved >= most:
-                break
-            share = min(1.0, (most - moved) / length)
+            share = min(1.0, (most - moved) / max(length, 1e-300))
             moved += share * length
             for j in range(n):
                 result[i, j] += share * step[j]

@@ -91,12 +91,9 @@ class Polytope(PolytopeArrays):
         units = np.abs(matrix).max(axis=0) + 1e-300  # the condition does not depend on those of the columns
         if not len(rows) == self.dimension == self.space or np.linalg.cond(matrix / units) > _MAX_CONDITION:
             return self._hull(points, centre, scale, FLAT, errors)
-        normals = self.facets[:, :-1] @ np.linalg.inv(matrix)
-        # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding.
-        back, _ = dd.affine_image(normals, np.ascontiguousarray(matrix.T), np.zeros(self.space))
-        away = np.abs(back - self.facets[:, :-1]) @ np.abs(self.points).max(axis=0)
-        ends, low = dd.affine_image(shift[None], normals, self.facets[:, -1])
-        facets = np.column_stack([normals, ends[0] + (low + away)])
+        # The image of the set is in the hull of the points, but for their errors.
+        normals = np.ascontiguousarray(self.facets[:, :-1] @ np.linalg.inv(matrix))
+        facets = np.column_stack([normals, dd.supports(points, normals)])
         return replace(self, points=points, facets=facets, centre=centre, scale=scale)._around(errors)
 
     @staticmethod
@@ -364,10 +361,6 @@ class Polytope(PolytopeArrays):
     def equals(self, other: Polytope, tolerance: float = 0.0) -> bool:
         """Return whether each set is a subset of the other one, with the tolerance of `is_subset`."""
         return self.is_subset(other, tolerance) and other.is_subset(self, tolerance)
-
-    def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates of the vertices, each of shape (n,). O(v n), exact."""
-        return self.needed().vertices.min(axis=0), self.vertices.max(axis=0)
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
