@@ -30,7 +30,11 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain help: its text has 45 of 80 columns, in a table of Rich 20
     pretty_exceptions_enable=False,
 )
-EXTRAS = {"pandas": "campaign", "pyarrow": "campaign", "distributed": "distributed"}
+EXTRAS = {
+    **dict.fromkeys(("pandas", "pyarrow"), "campaign"),
+    **dict.fromkeys(("oem", "astropy", "spiceypy"), "trajectory"),
+    "distributed": "distributed",
+}
 """The optional extra of each library that a command may lack."""
 RUNS: dict[type, str] = {}
 """The module in `experiments` whose function ``run`` takes the options, by the class of the options."""
@@ -49,11 +53,6 @@ def _add(name: str, options: type, run: str, *, example: str) -> None:
     def command(**values: Any) -> None:
         try:
             import_module(RUNS[options]).run(options(**values))
-        except ModuleNotFoundError as error:
-            extra = EXTRAS.get(error.name or "")
-            if extra is None:
-                raise
-            raise InputError(f"{error.name} is not installed: install infoset with the extra [{extra}]") from None
         except KeyboardInterrupt as interrupt:
             typer.echo("interrupted" + "".join(map(str, interrupt.args)), err=True)
             raise
@@ -133,6 +132,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     try:
         commands()(args=arguments, prog_name="infoset")
-    except (InputError, OSError, MemoryError) as error:
-        typer.echo(on_a_screen(f"error: {str(error) or 'not enough memory'}"), err=True)
+    except (InputError, OSError, MemoryError, ModuleNotFoundError) as error:
+        message = str(error) or "not enough memory"
+        if isinstance(error, ModuleNotFoundError):
+            library = str(error.name).partition(".")[0]
+            if library not in EXTRAS:
+                raise
+            message = f"{library} is not installed: install infoset with the extra [{EXTRAS[library]}]"
+        typer.echo(on_a_screen(f"error: {message}"), err=True)
         sys.exit(2)

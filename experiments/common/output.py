@@ -98,19 +98,9 @@ def output_of(
 ) -> Iterator[Output]:
     """Yield the output of a command, and list the written files on stderr at the end.
 
-    Parameters
-    ----------
-    options : dataclass
-        Options of the command. Single files are those of ``--json``, ``--csv`` and ``--html``.
-    names : sequence of str
-        Files that the command writes into the folder of ``--out``.
-    files : mapping of str to Path
-        Further single files, by the option that names them.
-
-    Raises
-    ------
-    InputError
-        Before the work, if a file exists and ``--overwrite`` is not given, or two files have the same path.
+    Single files are those of the options ``json``, ``csv`` and ``html``, and of `files`, by option; `names` are those
+    that the command writes into the folder of ``--out``. Raise `InputError` before the work if a file exists and
+    ``--overwrite`` is not given, or two files have the same path.
     """
     given = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")} | dict(files or {})
     single = {option: path for option, path in given.items() if path is not None}

@@ -36,11 +36,7 @@ UNITS = {
 
 
 def quantity_and_unit(name: str) -> tuple[str, str]:
-    """Return the quantity and the unit of a name; the unit is empty if the name has none.
-
-    >>> quantity_and_unit("max_impulse_m_s")
-    ('max_impulse', 'm_s')
-    """
+    """Return the quantity and the unit of a name, which is empty if it has none: `max_impulse` and `m_s`."""
     parts = name.split("_")
     for first in range(1, len(parts)):
         unit = "_".join(parts[first:])
@@ -50,11 +46,7 @@ def quantity_and_unit(name: str) -> tuple[str, str]:
 
 
 def si_factor(name: str, si_name: str) -> Decimal | None:
-    """Return the factor from a name's unit to that of another name; None unless both are the same quantity.
-
-    >>> si_factor("range_km", "range_m")
-    Decimal('1000')
-    """
+    """Return the factor from a name's unit to that of another name; None unless both are the same quantity."""
     if name == si_name:
         return Decimal(1)
     (quantity, unit), (wanted, si_unit) = quantity_and_unit(name), quantity_and_unit(si_name)

@@ -156,13 +156,11 @@ class Compare(FileOptions):
 class Bound(FileOptions):
     """Compute a lower bound of the guaranteed miss.
 
-    It holds for all strategies. The pairs of states that prove the bound are simulated. Two true states whose
-    measurements are equal until some step receive equal impulses until that step, so at least one of them misses. The
-    bound is the maximum miss, the minimum distance of the flight, that such pairs prove. In space, the two states
-    differ along both axes if the errors of the angles are in a box, and along one axis if they are in a disc. Each
-    strategy is simulated with these pairs, and in the searches of infoset adversary. Where range and closing speed are
-    known and there is no gravity, the bound is the value of the game up to a reserve, which is printed; otherwise the
-    minimum of the maximum misses found is. Without --out or --json no file is written.
+    It holds for all strategies: two true states whose measurements are equal until some step receive equal impulses
+    until that step, so at least one of them misses. The bound is the maximum miss that such pairs prove; in space, they
+    differ along both axes. Each strategy is simulated with these pairs, and in the searches of infoset adversary. Where
+    range and closing speed are known and there is no gravity, the bound is the value of the game up to a reserve, which
+    is printed. Without --out or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"

@@ -32,10 +32,7 @@ SMALL_ANGLE_RAD = 0.01
 def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Scenario:
     """Read a built-in scenario or a scenario file; the parameters are those of `read_file`.
 
-    Raises
-    ------
-    InputError
-        If there is no such scenario or file, or it is invalid, or gravity has no bound in it.
+    Raise `InputError` if there is no such scenario or file, or it is invalid, or gravity has no bound in it.
     """
     scenario = read_file(Scenario, name_or_path, settings)
     choice(f"{os.fspath(name_or_path)}: strategy", scenario.strategy, strategy_names())

@@ -18,7 +18,6 @@ from sim.covariance import Covariance
 from sim.gravity import on_board_model
 from sim.scenario import Scenario
 
-EXTRA = "trajectory"
 ROTATING = ("ITRF", "GRC", "TDR", "EFG")
 """Beginnings of the names of rotating frames in OEM files."""
 
@@ -174,11 +173,9 @@ def _states(trajectory: Trajectory, folder: Path, source: str) -> Floats:
 
 def _oem_state(file: Path, epoch: str) -> tuple[Floats, tuple[str, str, str]]:
     """Return position and velocity of an OEM file at an epoch, m and m/s, and its centre, frame and time system."""
-    try:
-        from oem import OrbitEphemerisMessage  # isort: skip  # it needs astropy
-        from astropy.time import Time
-    except ModuleNotFoundError as error:
-        raise _absent(error, "OEM files") from None
+    from oem import OrbitEphemerisMessage  # isort: skip  # it needs astropy
+    from astropy.time import Time
+
     try:
         message = OrbitEphemerisMessage.open(str(file))
         known = message.segments[0].metadata
@@ -193,10 +190,8 @@ def _oem_state(file: Path, epoch: str) -> tuple[Floats, tuple[str, str, str]]:
 
 def _spice_state(trajectory: Trajectory, body: str, folder: Path) -> Floats:
     """Return position and velocity of a body of SPICE kernels at the epoch, m and m/s."""
-    try:
-        import spiceypy
-    except ModuleNotFoundError as error:
-        raise _absent(error, "SPICE kernels") from None
+    import spiceypy
+
     try:
         with spiceypy.KernelPool([str(folder / kernel) for kernel in trajectory.kernels]):
             time_s = spiceypy.str2et(trajectory.epoch)
@@ -204,7 +199,3 @@ def _spice_state(trajectory: Trajectory, body: str, folder: Path) -> Floats:
     except spiceypy.SpiceyError as error:
         raise InputError(f"spice: {body}: {error.long or error.short}") from None
     return 1e3 * np.reshape(state, (2, 3))
-
-
-def _absent(error: ModuleNotFoundError, what: str) -> InputError:
-    return InputError(f"{error.name} is not installed: for {what}, install infoset with the extra [{EXTRA}]")

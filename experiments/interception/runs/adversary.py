@@ -87,16 +87,11 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
         ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
         (f"initial {position}, km", lambda found: _texts(found.position_m / M_PER_KM)),
         (f"initial {velocity}, km/s", lambda found: _texts(found.velocity_m_s / M_PER_KM)),
-        ("objective after half the budget, m", lambda found: number(_halfway_m(found))),
     ]
 
 
 def _texts(values: NDArray[np.float64]) -> str:
     return ", ".join(f"{value:.6g}" for value in values)
-
-
-def _halfway_m(found: WorstEngagement) -> float | None:
-    return max((value for count, value in found.history if 2 * count <= found.evaluations), default=None)
 
 
 def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> Iterator[Part]:
