@@ -38,12 +38,9 @@ Out = Annotated[
 ]
 Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints JSON only.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write a table as CSV; - prints CSV only.")]
-TrajectoryCsv = Annotated[
+Csv = Annotated[
     Path | None,
-    typer.Option(
-        "--csv", metavar="FILE", help="Write the trajectories as CSV, units in the headings; - prints CSV only."
-    ),
+    typer.Option("--csv", metavar="FILE", help="Write a table as CSV, units in the headings; - prints CSV only."),
 ]
 Html = Annotated[
     Path | None,

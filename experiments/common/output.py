@@ -83,10 +83,6 @@ class Output:
         self.folder, self._overwrite = folder, True
         self.written += [folder / name for name in names]
 
-    def add(self, file: Path) -> None:
-        """List a file that another function has written."""
-        self.written.append(file)
-
     def _write(self, file: Path, content: str | bytes) -> None:
         write_file(file, content, overwrite=self._overwrite)
         self.written.append(file)

@@ -91,12 +91,8 @@ class Header:
     format: Literal["infoset-record-3"] = "infoset-record-3"
 
 
-def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write the record of an engagement as an `.npz` file, completely or not at all.
-
-    `InputError` if the file cannot be written, or exists already.
-    """
-    file = Path(path)
+def record_bytes(record: Record) -> bytes:
+    """Return the content of the `.npz` file of a record."""
     header = Header(
         **{name: getattr(record, name) for name in _OF_HEADER},
         outcome=record.result.outcomes[0],
@@ -105,13 +101,12 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
     text = json.dumps(to_json(header)).encode()
     stream = io.BytesIO()
     np.savez(stream, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **_to_arrays(record))
-    content = stream.getvalue()
-    if len(content) > MAX_FILE_BYTES:
-        raise InputError(
-            f"{file}: the record would take {len(content)} bytes, more than the {MAX_FILE_BYTES} that can be read; "
-            "take fewer sections or longer steps"
-        )
-    write_file(file, content, overwrite=overwrite)
+    return stream.getvalue()
+
+
+def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a record, completely or not at all; `InputError` if the file cannot be written, or exists already."""
+    write_file(Path(path), record_bytes(record), overwrite=overwrite)
 
 
 def load_record(path: str | os.PathLike[str]) -> Record:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName, Settings, TrajectoryCsv
+from experiments.common.options import Csv, FileOptions, Html, ProblemName, Settings
 
 
 @dataclass(frozen=True)
@@ -30,5 +30,5 @@ class Multipoint(FileOptions):
         Literal["given", "best"] | None,
         typer.Option(help="Times of the visits: those of the file, or the best ones. Default: as in the file."),
     ] = None
-    csv: TrajectoryCsv = None
+    csv: Csv = None
     html: Html = None

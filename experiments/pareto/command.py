@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName, Settings, TrajectoryCsv
+from experiments.common.options import Csv, FileOptions, Html, ProblemName, Settings
 
 
 @dataclass(frozen=True)
@@ -33,5 +33,5 @@ class Pareto(FileOptions):
             help="Preferred meeting, for example x_m=0,z_m=50. The nearest Pareto-optimal meeting is also evaluated.",
         ),
     ] = None
-    csv: TrajectoryCsv = None
+    csv: Csv = None
     html: Html = None

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings, TrajectoryCsv
+from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Pursuit(FileOptions):
     ] = 0.0
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Number of simulations with feedback.")] = 1
     seed: Seed = 0
-    csv: TrajectoryCsv = None
+    csv: Csv = None
     html: Html = None
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings, TrajectoryCsv
+from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings
 
 
 @dataclass(frozen=True)
@@ -41,5 +41,5 @@ class Reach(FileOptions):
         ),
     ] = False
     seed: Seed = 0
-    csv: TrajectoryCsv = None
+    csv: Csv = None
     html: Html = None

@@ -7,10 +7,8 @@ import importlib
 import io
 import json
 import math
-import signal
 import subprocess
 import sys
-import time
 from itertools import product
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -279,28 +277,6 @@ def test_a_reader_that_leaves_is_no_error() -> None:
     process.stderr.close()
     process.wait(60)
     assert err == b""
-
-
-@pytest.mark.thorough
-@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-def test_interrupt_of_a_process(tmp_path: Path) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "experiments", "campaign", "--runs", "1000000", "--out", "out"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    try:
-        deadline = time.monotonic() + 120
-        while not (tmp_path / "out" / "manifest.json").exists() and time.monotonic() < deadline:
-            time.sleep(0.05)
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    finally:
-        process.kill()
-    assert (process.returncode, out) == (130, b"")
-    assert err.decode().splitlines()[-1].startswith("interrupted; the stored runs are complete")
-    assert b"Traceback" not in err
 
 
 def test_a_message_keeps_its_lines_and_its_letters() -> None:

@@ -183,10 +183,6 @@ def test_a_number_that_should_agree_and_does_not(
     assert "1.25  1.9000       1.2512  explained by another model (1)" in run()[1]
 
 
-def test_bad_input(infoset: Command) -> None:
-    assert "pareto" in infoset.refused("reproduce", "--paper", "paretto")
-
-
 def test_reachability_tables_stand_as_the_theory_says() -> None:
     found = reproduce_paper(read_paper("reachability"), silent)
     assert len(found) == 3 * (12 + 24 + 24 + 1)

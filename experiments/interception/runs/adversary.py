@@ -12,8 +12,9 @@ from experiments.common.errors import InputError
 from experiments.common.screen import Part, figure_files, number, number_table, show
 from experiments.common.units import M_PER_KM
 from experiments.interception.command import Adversary
+from experiments.interception.record_file import record_bytes
 from experiments.interception.runs.engage import steps_csv
-from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, read_times, save_records
+from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, read_times
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, work_of
 from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import own_strategy
@@ -50,7 +51,7 @@ def run(options: Adversary) -> None:
         if options.record is not None or options.out is not None:
             record = chosen.record(own)
             work.written.save("steps.csv", steps_csv([record]))
-            save_records({RECORD: record}, [options.record], work.written, options.overwrite)
+            work.written.save(RECORD, record_bytes(record), "--record")
             draw_engagements([record], times_s, work.written, work.begin)
     show(_parts(scenario, worst, options, elapsed_s), options.quiet or work.written.stdout_taken)
 

@@ -11,12 +11,12 @@ import numpy as np
 from experiments.common.output import Cell, outcome_columns, to_csv
 from experiments.common.screen import figure_files, show
 from experiments.interception.command import Engage
+from experiments.interception.record_file import record_bytes
 from experiments.interception.runs.engagement_table import (
     FIGURES,
     draw_engagements,
     engagement_parts,
     read_times,
-    save_records,
 )
 from experiments.interception.runs.shared import need_finite, work_of
 from experiments.interception.scenario_file import scenario_with
@@ -42,15 +42,10 @@ def run(options: Engage) -> None:
     noises = [*wanted]
     if isinstance(chosen, str) and not both:
         scenario = replace(scenario, noise=NoiseKind(chosen))
-    record_files = {}
-    if options.record is not None:
-        file = options.record
-        record_files = {
-            noise: file.with_name(f"{file.stem}-{noise}{file.suffix}") if both else file for noise in noises
-        }
-    folder_records = [f"record-{noise}.npz" for noise in noises]
-    names = ["steps.csv", *folder_records, *figure_files(*FIGURES)]
-    files = {f"--record ({file.name})": file for file in record_files.values()}
+    files = {f"--record of {noise}": options.record for noise in noises}
+    if both and (file := options.record) is not None:
+        files = {f"--record of {noise}": file.with_name(f"{file.stem}-{noise}{file.suffix}") for noise in noises}
+    names = ["steps.csv", *(f"record-{noise}.npz" for noise in noises), *figure_files(*FIGURES)]
     with work_of(options, scenario, names, files) as work:
         records, summaries = [], {}
         for noise in noises:
@@ -64,8 +59,8 @@ def run(options: Engage) -> None:
             summaries[noise] = _summary(record, perf_counter() - began_s)
         work.save(summaries if both else summaries[noises[0]])
         work.written.save("steps.csv", steps_csv(records), "--csv")
-        named = dict(zip(folder_records, records, strict=True))
-        save_records(named, [record_files.get(noise) for noise in noises], work.written, options.overwrite)
+        for noise, record in zip(noises, records, strict=True):
+            work.written.save(f"record-{noise}.npz", record_bytes(record), f"--record of {noise}")
         draw_engagements(records, times_s, work.written, work.begin)
     show(engagement_parts(records), options.quiet or work.written.stdout_taken)
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 
 from experiments.common.errors import input_errors
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
-from experiments.interception.record_file import write_record
 from experiments.interception.runs.shared import allowance, bound_name
 from sim import Record
 
@@ -61,15 +59,6 @@ def read_times(text: str | None) -> tuple[float, ...]:
     """Return the times of figure 3 that ``--times`` gives, s; none without the option."""
     with input_errors("--times", "; for example --times 0.5,40,90"):
         return () if text is None else tuple(map(float, text.split(",")))
-
-
-def save_records(records: Mapping[str, Record], files: Sequence[Path | None], written: Output, overwrite: bool) -> None:
-    """Write records into the folder under their names, and each into a file if there is one."""
-    for (name, record), file in zip(records.items(), files, strict=True):
-        for target in (file, written.folder and written.folder / name):
-            if target is not None:
-                write_record(record, target, overwrite=overwrite)
-                written.add(target)
 
 
 def draw_engagements(

@@ -66,32 +66,3 @@ def test_the_files_of_experiment_have_the_columns_of_space(space_file: Path, inf
         flown[name] for name in ("miss_m", "miss_y_m", "miss_z_m")
     ]
     assert not {"start_y_m", "start_z_m"} & set(curve)
-
-
-OWN = """
-import numpy as np
-
-
-class Mine:
-    name = "mine"
-
-    def start(self, shape):
-        return None
-
-    def decide(self, situation, state):
-        wanted = 0.5 * (situation.predicted_miss.lower_m + situation.predicted_miss.upper_m) / 10.0
-        return np.where(situation.predicted_miss.exists, wanted{more}, 0.0)
-"""
-
-
-def test_a_strategy_of_a_file_decides_along_both_axes(space_file: Path, infoset: Command) -> None:
-    Path("whole.py").write_text(OWN.format(more=""))
-    code, out, err = infoset("engage", space_file, "--strategy", "whole.py:Mine", "--json", "-")
-    assert code == 0, err
-    steps = strict(out)["steps"]
-    assert max(abs(step["impulse_y_m_s"]) for step in steps) > 0.0
-    assert infoset("engage", "asteroid-1997", "--strategy", "whole.py:Mine")[0] == 0
-    Path("none.py").write_text(OWN.format(more="[:, :0]"))
-    code, _, message = infoset("engage", space_file, "--strategy", "none.py:Mine")
-    assert code == 2
-    assert "none.py: ValueError: strategy Mine must return finite impulses (m/s) of the shape (2, 1)" in message
