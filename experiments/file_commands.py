@@ -106,18 +106,13 @@ def _print_check(file: str, kinds: Sequence[str], json: bool, quiet: bool) -> No
     from experiments.common.input_file import load_problem
     from experiments.common.output import to_json
     from experiments.common.screen import say_warnings
-    from experiments.interception.scenario_file import (
-        feasibility_warnings,
-        flight_facts,
-        load_scenario,
-        scenario_warnings,
-    )
+    from experiments.interception.scenario_file import all_warnings, flight_facts, load_scenario
     from sim.storage.codec import fingerprint
     from sim.versions import versions
 
     if SCENARIO in kinds:
         read: Any = load_scenario(file)
-        head, warnings = {"scenario_hash": fingerprint(read)}, scenario_warnings(read) + feasibility_warnings(read)
+        head, warnings = {"scenario_hash": fingerprint(read)}, all_warnings(read)
         facts = flight_facts(read)
     else:
         read = load_problem(file)
@@ -143,14 +138,14 @@ def from_states(
 ) -> None:
     """Make a scenario from the states of a spacecraft and an object, and their covariance."""
     from experiments.common.screen import say_warnings
-    from experiments.interception.scenario_file import feasibility_warnings, load_scenario, scenario_warnings
+    from experiments.interception.scenario_file import all_warnings, load_scenario
     from experiments.interception.trajectory_file import scenario_of
 
     model = load_scenario(like)
     scenario, text = scenario_of(file, model, sigma)
     note = f"with the sensors and the engine of {model.name}; change them, then: infoset scenarios check {out}"
     _write(out, text, note, overwrite, quiet)
-    say_warnings(scenario_warnings(scenario) + feasibility_warnings(scenario), quiet)
+    say_warnings(all_warnings(scenario), quiet)
 
 
 problems = _commands("problem", "A problem is one of rendezvous, pursuit or estimation, or a trajectory.", "service-2")

@@ -13,8 +13,8 @@ import pandas as pd
 from rich.table import Table
 
 from experiments.campaigns.sweep_axes import tied_keys
-from experiments.common.screen import Part, number, number_table, quantile_notes, some_runs
-from experiments.interception.runs.shared import bound_name
+from experiments.common.screen import Part, number, number_table, quantile_notes
+from experiments.interception.runs.shared import bound_name, certificate
 from experiments.interception.study import SetCounts, hit_text, miss_text, noise_notes, redrawn_text, set_warnings
 from sim import CampaignNoise, HitEstimate, Outcome, estimate_hits, estimate_quantiles
 from sim.miss_cause import count_causes
@@ -211,11 +211,8 @@ def _notes(folder: CampaignFolder, row: Mapping[str, Any], sets: SetCounts, nois
             yield causes
     if started := redrawn_text(row.get("redrawn_share")):
         yield started
-    held = (
-        f"; miss within the bound Phi: {row['phi_held']} of {some_runs(row['phi_known'])}" if row["phi_known"] else ""
-    )
     outcomes = ", ".join(f"{row[name]} {outcome}" for name, outcome in OUTCOMES.items() if row[name])
-    yield f"{sets}{held}; outcomes: {outcomes}"
+    yield f"{certificate(sets, row['phi_held'], row['phi_known'])}; outcomes: {outcomes}"
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:

@@ -8,7 +8,8 @@ from functools import cache
 from importlib import resources
 from typing import Any, NamedTuple
 
-from experiments.common.errors import InputError, nearest, shown
+from experiments.common.errors import InputError
+from experiments.common.options import choice
 
 SCENARIO = "scenario"
 
@@ -65,15 +66,10 @@ def built_in_names(kinds: Collection[str]) -> list[str]:
 def built_in(name: str, kinds: Collection[str]) -> BuiltIn:
     """Return the built-in file of a name; `InputError` if there is none, or it has none of these kinds."""
     file = built_in_files().get(name)
-    if file is not None and file.kind in kinds:
-        return file
-    if file is not None:
+    if file is not None and file.kind not in kinds:
         raise InputError(f"{name}: {taken_by(file.kind, name)}")
-    names = built_in_names(kinds)
-    guess = nearest(name, names)
-    hint = f'did you mean "{guess}"? ' if guess else ""
-    noun = SCENARIO if SCENARIO in kinds else "problem"
-    raise InputError(f"no built-in {noun} is called {shown(name)}; {hint}the built-in ones are {', '.join(names)}")
+    known = choice("built-in scenario" if SCENARIO in kinds else "built-in problem", name, built_in_names(kinds))
+    return built_in_files()[known]
 
 
 def kind_of(document: Mapping[str, Any]) -> str | None:

@@ -90,6 +90,11 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
     return with_model(scenario, default), [note]
 
 
+def all_warnings(scenario: Scenario) -> list[str]:
+    """Return all warnings about a scenario, one line each."""
+    return scenario_warnings(scenario) + feasibility_warnings(scenario)
+
+
 def scenario_warnings(scenario: Scenario) -> list[str]:
     """Return warnings about values of a scenario that are allowed but probably not intended, one line each."""
     lines = []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import importlib
 import io
 import json
 import math
@@ -11,11 +10,9 @@ import subprocess
 import sys
 from itertools import product
 from pathlib import Path
-from typing import Any, get_type_hints
 
 import pytest
 
-from experiments.cli import RUNS
 from experiments.common import screen
 from experiments.common.errors import on_a_screen
 from experiments.common.output import to_csv, to_json, write_file
@@ -55,12 +52,6 @@ def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.split() == ["[]", "[]"]
-
-
-def test_the_run_of_every_command_takes_its_options() -> None:
-    for options, module in RUNS.items():
-        hints = get_type_hints(importlib.import_module(module).run)
-        assert hints in ({"options": options, "return": type(None)}, {"options": Any, "return": type(None)})
 
 
 @pytest.mark.parametrize(

@@ -73,8 +73,8 @@ def test_a_file_is_replaced_only_if_asked(noun: str, infoset: Command) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("scenarios show asteroid-1996", 'no built-in scenario is called "asteroid-1996"; did you mean "asteroid-1997'),
-        ("problems new mine.toml --like pareto-2009", 'is called "pareto-2009"; did you mean "pareto-2008"?'),
+        ("scenarios show asteroid-1996", 'scenario: there is no "asteroid-1996"; did you mean asteroid-1997'),
+        ("problems new mine.toml --like pareto-2009", 'there is no "pareto-2009"; did you mean pareto-2008?'),
         ("problems check asteroid-1997", "asteroid-1997: this is a scenario; use infoset engage asteroid-1997"),
         ("scenarios new file/mine.toml", "File exists"),
         ("scenarios check binary", "is not text in UTF-8"),

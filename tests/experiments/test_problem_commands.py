@@ -50,7 +50,7 @@ def test_the_folder_has_the_problem_the_results_and_the_figures(module: str, inf
 @pytest.mark.parametrize("command", [arguments[0] for arguments in COMMANDS.values()])
 def test_an_unknown_problem_is_refused_with_one_message(command: str, infoset: Command, tmp_path: Path) -> None:
     err = infoset.refused(command, "bad\x1b[31mname", "--json", "x.json")
-    assert "no built-in problem is called" in err
+    assert "built-in problem: there is no" in err
     assert "\x1b" not in err
     assert list(tmp_path.iterdir()) == []
 

@@ -146,9 +146,10 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
     counts = SetCounts()
     for curve in curves:
         results = curve.results
-        counts += set_counts(results.truth_kept, results.set_emptied)
+        sets, held = set_counts(results.truth_kept, results.set_emptied), results.phi_held.compressed()
+        counts += sets
         outcomes = Counter(outcome.value for outcome in results.outcomes)
-        lines = [hit_text(results.hits, scenario), certificate(results)]
+        lines = [hit_text(results.hits, scenario), certificate(sets, int(held.sum()), len(held))]
         lines += [f"{outcome}: {count}" for outcome, count in outcomes.items()]
         yield f"curve {curve.number}: {'; '.join(filter(None, lines))}"
         if causes := miss_text(results.missed, runs, scenario):

@@ -14,9 +14,9 @@ from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
 from experiments.common.output import Output, output_of, to_json
 from experiments.common.screen import NOT_FINITE, BeginProgress, progress_bar, say_warnings, some_runs
-from experiments.interception.scenario_file import feasibility_warnings, scenario_warnings
+from experiments.interception.scenario_file import all_warnings
 from experiments.interception.strategies import own_code_errors
-from experiments.interception.study import set_counts
+from experiments.interception.study import SetCounts
 from guidance import Strategy
 from sim import Results, Scenario
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
@@ -84,7 +84,7 @@ def work_of(
     """
     wanted = ("scenario.toml", "results.json", *names)
     with own_code_errors(), output_of(options, wanted, files) as written, progress_bar(options.quiet) as begin:
-        warnings = scenario_warnings(scenario) + feasibility_warnings(scenario)
+        warnings = all_warnings(scenario)
         say_warnings(warnings, options.quiet, notes)
         yield Work(scenario, warnings, written, begin, perf_counter())
 
@@ -117,15 +117,12 @@ def allowance(scenario: Scenario) -> str | None:
     )
 
 
-def certificate(results: Results) -> str:
-    """Return a line about the sets of all runs, and the number of runs within the bound Phi."""
-    runs = len(results)
-    sets = str(set_counts(results.truth_kept, results.set_emptied))
-    held = results.phi_held.compressed()
-    if not len(held):
-        return sets
-    missing = f" ({runs - len(held)} without a bound)" if len(held) < runs else ""
-    return f"{sets}; miss within the bound Phi: {int(held.sum())} of {some_runs(len(held))}{missing}"
+def certificate(sets: SetCounts, held: int, known: int) -> str:
+    """Return a line about the sets of runs, and of the runs with a bound Phi, how many are within it."""
+    if not known:
+        return str(sets)
+    missing = f" ({sets.runs - known} without a bound)" if known < sets.runs else ""
+    return f"{sets}; miss within the bound Phi: {held} of {some_runs(known)}{missing}"
 
 
 @dataclass(frozen=True)

@@ -190,7 +190,7 @@ def test_a_name_wins_over_a_file_and_a_path_over_a_name(tmp_path: Path, monkeypa
     (tmp_path / "comet-fast").write_text(TEXT)
     assert load_scenario("comet-fast").name == "comet-fast"
     assert load_scenario("./comet-fast").name == "asteroid-1997"
-    with pytest.raises(InputError, match=r'is called "commet-fast"; did you mean "comet-fast"\?'):
+    with pytest.raises(InputError, match=r'built-in scenario: there is no "commet-fast"; did you mean comet-fast\?'):
         load_scenario("commet-fast")
     with pytest.raises(InputError, match=r"mine\.toml: cannot be read: No such file"):
         load_scenario("mine.toml")

@@ -35,8 +35,3 @@ def test_three_impulses_meet_the_requirement_of_deep_impact() -> None:
     assert burns_m_s is not None
     assert burns_m_s.shape == (1, 3)
     assert burns_m_s.sum(axis=1) == pytest.approx(results.impulse_m_s)
-
-
-def test_the_closing_speed_and_range_of_the_missions_give_the_published_times() -> None:
-    for name, hours in (("dart-2022", 4.0), ("deep-impact-2005", 23.3), ("haiv-2013", 2.0)):
-        assert load_scenario(name).nominal_arrival_s / 3600.0 == pytest.approx(hours, rel=1e-3)
