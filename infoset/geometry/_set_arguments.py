@@ -103,21 +103,11 @@ def need_set(name: str, value: object, kind: type[Set]) -> Set:
     return value
 
 
-def is_set(value: object) -> bool:
-    """Whether a value is a set, of any class: it tells NumPy that it is no array."""
-    return getattr(value, "__array_ufunc__", True) is None
-
-
 def not_negative(name: str, value: float) -> float:
     """Return a number that is not negative."""
     if value != 0.0:
         NOT_NEGATIVE.need(name, value)
     return value
-
-
-def is_number(value: object) -> bool:
-    """Return whether a factor of a set is a number, not an array or another set."""
-    return isinstance(value, int | float | np.integer | np.floating)
 
 
 def present_axes(axes: Any) -> Any:

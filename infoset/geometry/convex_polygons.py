@@ -12,11 +12,10 @@ from infoset.geometry import polygon_batches as kernels
 from infoset.geometry._set_arguments import (
     axis_numbers,
     finite_values,
-    is_number,
-    is_set,
     not_negative,
     present_axes,
 )
+from infoset.geometry.convex_set import ConvexSet
 from infoset.geometry.polygon_arrays import PolygonArrays
 from infoset.limits import Limits, real_values, shown
 
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from infoset.geometry.polytope import Polytope
 
 
-class ConvexPolygons(PolygonArrays):
+class ConvexPolygons(PolygonArrays, ConvexSet):
     """A batch of convex polygons with any batch shape; a single polygon is a batch of shape ().
 
     Parameters
@@ -55,8 +54,6 @@ class ConvexPolygons(PolygonArrays):
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
     `point in P`, `P <= Q` (subset). `P == Q` compares objects; `equals` compares sets.
     """
-
-    __array_ufunc__ = None
 
     def __repr__(self) -> str:
         return f"ConvexPolygons(shape={self.shape}, counts={self.counts.tolist()})"
@@ -280,10 +277,6 @@ class ConvexPolygons(PolygonArrays):
         one, two = self._with(other)
         return one._measure(kernels.excess, *two._flat())[..., 0]
 
-    def equals(self, other: ConvexPolygons, tolerance: float = 0.0) -> Flags:
-        """Return whether each set is a subset of the other one, with the tolerance of `is_subset`. O(n m)."""
-        return np.asarray(self.is_subset(other, tolerance) & other.is_subset(self, tolerance))
-
     def area(self) -> Floats:
         """Return the area, shape (...). O(n); rounded relative to the squared diameter at most."""
         return self._measure(kernels.moments)[..., 0]
@@ -355,33 +348,3 @@ class ConvexPolygons(PolygonArrays):
         axes = present_axes(axes)
         for index in np.ndindex(self.shape):
             axes.fill(*self.vertices[index][: self.counts[index]].T, **style)
-
-    # Operators --------------------------------------------------------------------------------------
-
-    def __and__(self, other: ConvexPolygons) -> ConvexPolygons:
-        return self.intersection(other) if isinstance(other, ConvexPolygons) else NotImplemented
-
-    def __add__(self, other: ConvexPolygons | ArrayLike) -> ConvexPolygons:
-        given: Any = other
-        return self.minkowski_sum(given) if is_set(given) else self.translate(given)
-
-    __radd__ = __add__
-
-    def __mul__(self, factor: float) -> ConvexPolygons:
-        return self.linear_map(float(factor) * np.eye(2)) if is_number(factor) else NotImplemented
-
-    __rmul__ = __mul__
-
-    def __neg__(self) -> ConvexPolygons:
-        return -1.0 * self
-
-    def __rmatmul__(self, matrix: ArrayLike) -> Any:
-        return self.affine_map(matrix)
-
-    def __contains__(self, point: ArrayLike) -> bool:
-        if self.shape:
-            raise TypeError("'in' is for a single polygon; use contains for a batch")
-        return bool(self.contains(point))
-
-    def __le__(self, other: ConvexPolygons) -> Flags:
-        return self.is_subset(other) if isinstance(other, ConvexPolygons) else NotImplemented

@@ -16,12 +16,11 @@ from infoset.geometry._set_arguments import (
     axis_numbers,
     bound_values,
     finite_values,
-    is_number,
-    is_set,
     need_set,
     not_negative,
     present_axes,
 )
+from infoset.geometry.convex_set import ConvexSet
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, nearest_difference, simplices_of, triangle_of
 from infoset.geometry.polytope.arrays import FLAT, PolytopeArrays, coordinates
@@ -35,7 +34,7 @@ _THICK = 3e-8
 """Thickness of a flat set that is enlarged, relative to its coordinates: rounding does not lose it again."""
 
 
-class Polytope(PolytopeArrays):
+class Polytope(PolytopeArrays, ConvexSet):
     """A convex polytope; it may be flat, a segment, a point, or empty.
 
     It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v, n), without redundant
@@ -61,8 +60,6 @@ class Polytope(PolytopeArrays):
     `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding). `P == Q` compares objects; `equals` compares sets. The
     vertices are in no order; `plot` and `to_shapely` order those of a set of the plane.
     """
-
-    __array_ufunc__ = None
 
     # Sets -----------------------------------------------------------------------------------------------------------
 
@@ -358,10 +355,6 @@ class Polytope(PolytopeArrays):
         """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
         return bool(self._need_other(other).contains(self.vertices, tolerance).all())
 
-    def equals(self, other: Polytope, tolerance: float = 0.0) -> bool:
-        """Return whether each set is a subset of the other one, with the tolerance of `is_subset`."""
-        return self.is_subset(other, tolerance) and other.is_subset(self, tolerance)
-
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
         if self.is_empty:
@@ -459,31 +452,3 @@ class Polytope(PolytopeArrays):
         points = self.vertices - self.vertices.mean(axis=0) if len(self.vertices) else self.vertices
         order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
         present_axes(axes).fill(*self.vertices[order].T, **style)
-
-    # Operators and old names --------------------------------------------------------------------------------------
-
-    def __and__(self, other: Polytope) -> Polytope:
-        return self.intersection(other) if isinstance(other, Polytope) else NotImplemented
-
-    def __add__(self, other: Polytope | ArrayLike) -> Polytope:
-        given: Any = other
-        return self.minkowski_sum(given) if is_set(given) else self.translate(given)
-
-    __radd__ = __add__
-
-    def __mul__(self, factor: float) -> Polytope:
-        return self.affine_map(float(factor) * np.eye(self.space)) if is_number(factor) else NotImplemented
-
-    __rmul__ = __mul__
-
-    def __neg__(self) -> Polytope:
-        return -1.0 * self
-
-    def __rmatmul__(self, matrix: ArrayLike) -> Polytope:
-        return self.affine_map(matrix)
-
-    def __contains__(self, point: ArrayLike) -> bool:
-        return bool(self.contains(point))
-
-    def __le__(self, other: Polytope) -> bool:
-        return self.is_subset(other) if isinstance(other, Polytope) else NotImplemented
