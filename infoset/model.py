@@ -297,14 +297,9 @@ class SetModel(SetSettings):
             )
 
     def check_start(self, name: str, box: StateBox) -> None:
-        """Refuse starts below the range threshold, and starts where the error bound of the angle is not positive.
+        """Refuse starts below the range threshold, or where the error bound of the angle is not positive.
 
-        Parameters
-        ----------
-        name : str
-            Name of the box, for the message.
-        box : StateBox
-            Possible starts.
+        `name` is that of the box, for the message.
 
         Raises
         ------

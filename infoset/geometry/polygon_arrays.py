@@ -68,8 +68,8 @@ class PolygonArrays:
     def from_vertices(cls, rings: ArrayLike) -> Self:
         """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the polygon. O(n).
 
-        Rings of different lengths are a list of arrays of shape (n, 2). A ring may repeat vertices, also its first at
-        the end, and have vertices along a side.
+        A ring may repeat vertices, also its first at the end, and have vertices along a side. `stack` makes a batch of
+        polygons from rings of different lengths.
 
         Raises
         ------
@@ -77,8 +77,6 @@ class PolygonArrays:
             If a ring is not convex; the message has the first reflex vertex. This is decided exactly. `from_points`
             takes the convex hull of any points instead.
         """
-        if isinstance(rings, list | tuple) and len({np.shape(ring) for ring in rings}) > 1:
-            return cls.stack([cls.from_vertices(ring) for ring in rings])
         vertices = finite_values("rings", rings, "...", "k", 2)
         polygons = cls.unchecked(vertices.copy(), np.full(vertices.shape[:-2], vertices.shape[-2]))
         corners, counts = polygons._flat()
@@ -99,11 +97,8 @@ class PolygonArrays:
     def from_points(cls, points: ArrayLike) -> Self:
         """Return the convex hull of points, shape (n, 2) or (..., n, 2); no points give the empty set.
 
-        Different numbers of points are a list of arrays of shape (n, 2), as in `from_vertices`. O(n) for sorted points,
-        O(n^2) at worst. Exact: vertices are points, and rounding does not decide which.
+        O(n) for sorted points, O(n^2) at worst. Exact: vertices are points, and rounding does not decide which.
         """
-        if isinstance(points, list | tuple) and len({np.shape(one) for one in points}) > 1:
-            return cls.stack([cls.from_points(one) for one in points])
         array = finite_values("points", points, "...", "k", 2)
         return cls.unchecked(array, np.full(array.shape[:-2], array.shape[-2]))._make(0, kernels.hull)
 
@@ -170,30 +165,27 @@ class PolygonArrays:
         return points._make(2 * rows.shape[-2], kernels.add_segments, np.ascontiguousarray(halves))
 
     @classmethod
-    def from_shapely(cls, geometry: BaseGeometry | Sequence[BaseGeometry]) -> Self:
-        """Return a convex shapely Point, LineString or Polygon as a single polygon, and a sequence of them as a batch.
+    def from_shapely(cls, geometry: BaseGeometry) -> Self:
+        """Return a convex shapely Point, LineString or Polygon as a single polygon. O(n).
 
-        O(n). Vertices along a side are dropped.
+        Vertices along a side are dropped.
 
         Raises
         ------
         ValueError
             If a geometry is not convex by more than rounding, or is of another type.
         """
-        if isinstance(geometry, Sequence | np.ndarray) and not isinstance(geometry, str):
-            return cls.stack([cls.from_shapely(one) for one in geometry])
         from shapely import get_coordinates
 
         vertices, kind = get_coordinates(geometry), geometry.geom_type
-        has_hole = kind == "Polygon" and len(geometry.interiors) > 0
-        if kind not in ("Point", "LineString", "Polygon") or has_hole or (kind == "LineString" and len(vertices) > 2):
-            raise ValueError(f"a Point, a single segment or a Polygon without a hole is needed: got {shown(geometry)}")
+        if kind not in ("Point", "LineString", "Polygon"):
+            raise ValueError(f"a Point, a LineString or a Polygon is needed: got {shown(geometry)}")
         hull = cls.from_points(vertices)
-        if kind == "Polygon" and len(vertices):
+        if len(vertices):
             rounding = _ROUNDING * np.abs(vertices).max(axis=0) @ np.ptp(vertices, axis=0)[::-1]
             missing = abs(geometry.convex_hull.area - geometry.area)
             if missing > rounding:
-                raise ValueError(f"the Polygon is not convex: its area and that of its hull differ by {missing:g}")
+                raise ValueError(f"the {kind} is not convex: its area and that of its hull differ by {missing:g}")
         return hull
 
     def to_shapely(self) -> BaseGeometry:

@@ -71,7 +71,7 @@ def invert(matrix: Floats, out: Floats) -> None:
     """Inverse matrices, shape (B, 2, 2); zero for a singular matrix."""
     for i in range(len(matrix)):
         m = matrix[i]
-        determinant = polygon_lines.minor(m[0, 0], m[0, 1], m[1, 0], m[1, 1])
+        determinant = polygon_exact.orientation(0.0, 0.0, m[0, 0], m[0, 1], m[1, 0], m[1, 1])
         if determinant != 0.0:
             out[i, 0, 0], out[i, 0, 1] = m[1, 1] / determinant, -m[0, 1] / determinant
             out[i, 1, 0], out[i, 1, 1] = -m[1, 0] / determinant, m[0, 0] / determinant

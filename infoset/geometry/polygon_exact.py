@@ -226,7 +226,7 @@ def intersect(points: Points, count: int, other: Points, other_count: int, out: 
         j = i + 1 if i + 1 < n else 0
         for k in range(m if m > 2 else m - 1):
             p = k + 1 if k + 1 < m else 0
-            if apart(of_b[i, k], of_b[i, p]) and apart(of_a[k, i], of_a[k, j]):
+            if of_b[i, k] * of_b[i, p] < 0.0 and of_a[k, i] * of_a[k, j] < 0.0:
                 x, y = meeting(a, i, j, b, k, p)
                 put(corners, made, x, y)
                 made += 1
@@ -235,24 +235,18 @@ def intersect(points: Points, count: int, other: Points, other_count: int, out: 
 
 @compiled
 def sides_of(a: Points, n: int, b: Points, m: int, corners: Points, made: int) -> tuple[Points, int]:
-    """Return the side of each edge of a on which each vertex of b is, shape (n, m); append vertices of b in a."""
+    """Return the side of each edge of a on which each vertex of b is, -1, 0 or 1, shape (n, m); append those in a."""
     sides = np.empty((n, m))
     for k in range(m):
         inside = True
         for i in range(n):
             j = i + 1 if i + 1 < n else 0
-            sides[i, k] = side(a[i, 0], a[i, 1], a[j, 0], a[j, 1], b[k, 0], b[k, 1])
+            sides[i, k] = np.sign(side(a[i, 0], a[i, 1], a[j, 0], a[j, 1], b[k, 0], b[k, 1]))
             inside &= sides[i, k] >= 0.0
         if inside and (n > 2 or holds(a, n, b[k, 0], b[k, 1])):
             put(corners, made, b[k, 0], b[k, 1])
             made += 1
     return sides, made
-
-
-@inlined
-def apart(one: float, other: float) -> bool:
-    """Whether two numbers have opposite signs and neither is zero."""
-    return (one > 0.0 and other < 0.0) or (one < 0.0 and other > 0.0)
 
 
 @compiled

@@ -20,15 +20,6 @@ LONGEST = 16
 
 
 @inlined
-def minor(a: float, b: float, c: float, d: float) -> float:
-    """Return a d - b c within a few ulp of itself."""
-    left, left_low = two_product(a, d)
-    right, right_low = two_product(b, c)
-    difference, low = two_sum(left, -right)
-    return difference + (low + (left_low - right_low))
-
-
-@inlined
 def add_products(one: Floats, two: Floats, sign: float, sums: Floats, made: int) -> int:
     """Append the terms of the product of two sums, each with its rounding error; return the new number of terms."""
     for a in one:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from infoset._compile import allocation_free, compiled, inlined
 from infoset.arrays import Floats
-from infoset.geometry.polygon import ROUNDING, Points, append, close, cross
+from infoset.geometry.polygon import ROUNDING, Points, append, close, cross, farthest_pair
 from infoset.geometry.polygon_exact import hull
 
 
@@ -172,29 +170,16 @@ def box_around(points: Points, count: int, sign: float, slope: float) -> int:
 
 @compiled
 def make_rectangle(points: Points, count: int) -> int:
-    """Replace a polygon by its bounding rectangle along the longest direction from vertex 0, in place. O(count)."""
-    origin_x = points[0, 0]
-    origin_y = points[0, 1]
-    length = 0.0
-    x = 1.0
-    y = 0.0
-    for i in range(1, count):
-        distance = math.hypot(points[i, 0] - origin_x, points[i, 1] - origin_y)
-        if distance > length:
-            length = distance
-            x = (points[i, 0] - origin_x) / distance
-            y = (points[i, 1] - origin_y) / distance
-    minimum = maximum = lowest = highest = 0.0
-    for i in range(1, count):
-        from_x = points[i, 0] - origin_x
-        from_y = points[i, 1] - origin_y
-        along = x * from_x + y * from_y
-        height = cross(x, y, from_x, from_y)
-        minimum = min(minimum, along)
-        maximum = max(maximum, along)
-        lowest = min(lowest, height)
-        highest = max(highest, height)
+    """Replace a polygon by its bounding rectangle along its diameter, in place. O(count^2)."""
+    length, i, j = farthest_pair(points, count)
+    x, y = 1.0, 0.0
+    if length > 0.0:
+        x, y = (points[i, 0] - points[j, 0]) / length, (points[i, 1] - points[j, 1]) / length
+    origin_x, origin_y = points[0, 0], points[0, 1]
+    from_x, from_y = points[:count, 0] - origin_x, points[:count, 1] - origin_y
+    along, height = x * from_x + y * from_y, x * from_y - y * from_x
+    left, right, low, high = along.min(), along.max(), height.min(), height.max()
     made = 0
-    for along, height in ((minimum, lowest), (maximum, lowest), (maximum, highest), (minimum, highest)):
-        made = append(points, made, origin_x + along * x - height * y, origin_y + along * y + height * x)
+    for a, h in ((left, low), (right, low), (right, high), (left, high)):
+        made = append(points, made, origin_x + a * x - h * y, origin_y + a * y + h * x)
     return close(points, made)

@@ -121,8 +121,4 @@ def direction_order(ax: float, ay: float, bx: float, by: float) -> int:
     if a_returns != b_returns:
         return -1 if a_returns else 1
     turn = cross(ax, ay, bx, by)
-    if turn > 0.0:
-        return 1
-    if turn < 0.0:
-        return -1
-    return 0
+    return int(turn > 0.0) - int(turn < 0.0)

@@ -220,13 +220,7 @@ class AngleSensor(BearingSensor):
         return self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
 
     def error_bounds(self, range_m: Floats) -> Floats:
-        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B).
-
-        Returns
-        -------
-        ndarray, shape (..., B)
-            (2, B) if the two axes differ.
-        """
+        """Return the maximum size of the error of each angle, rad, at ranges (m) of shape (..., B), as they differ."""
         if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
             return self.error_bound(range_m)
         y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))

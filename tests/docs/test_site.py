@@ -80,14 +80,6 @@ def public_names() -> Iterator[str]:
         yield from (f"{package}.{name}" for name in importlib.import_module(package).__all__)
 
 
-def test_there_is_a_page_for_every_file(site: Path, read: dict[Path, _Reader]) -> None:
-    sources = [path for path in (ROOT / "docs").rglob("*.md") if not {"_build", "gallery"} & set(path.parts)]
-    made = {path.relative_to(site).with_suffix("") for path in read}
-    assert {path.relative_to(ROOT / "docs").with_suffix("") for path in sources} <= made
-    examples = (ROOT / "docs" / "examples").glob("plot_*.py")
-    assert {Path("gallery") / path.stem for path in examples} <= made
-
-
 def test_links_and_anchors_inside_lead_somewhere(site: Path, read: dict[Path, _Reader]) -> None:
     seen = 0
     for page, reader in read.items():

@@ -16,7 +16,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Model, SetModel, StateBox
-from infoset.arrays import Floats
+from tests.infoset.test_information_set import living_range_interval_m
 
 pytestmark = pytest.mark.thorough
 
@@ -27,20 +27,13 @@ ROUNDING = 2e-8
 """Of a coordinate, or of a height, several times over."""
 
 
-def living_range_interval_m(information: InformationSet) -> tuple[Floats, Floats]:
-    """Return the minimum and the maximum range that agree with the history, to rounding, m, shape (B,)."""
-    refined = information.copy()
-    refined._state.refine(refined.tracking, 2)
-    return refined.stored_range_interval_m()
-
-
 def lies_in(inner: ConvexPolygons, outer: ConvexPolygons, by: float = ROUNDING) -> bool:
     """Whether every vertex of one is in the other, or nearer to it than rounding."""
     return all(float(outer.margin(vertex)) >= -by for vertex in inner.polygon())
 
 
-def same(one: ConvexPolygons, other: ConvexPolygons) -> bool:
-    return lies_in(one, other) and lies_in(other, one)
+def same(one: ConvexPolygons, other: ConvexPolygons, by: float = ROUNDING) -> bool:
+    return lies_in(one, other, by) and lies_in(other, one, by)
 
 
 # Information sets -----------------------------------------------------------------------------------------------
@@ -122,8 +115,7 @@ def test_measuring_again_tells_nothing_new(
         measure(what)
         first, second = section(once, label), section(information, label)
         assert first.is_empty == second.is_empty
-        assert lies_in(first, second, HAIR)
-        assert lies_in(second, first, HAIR)
+        assert same(first, second, HAIR)
         np.testing.assert_allclose(living_range_interval_m(once), living_range_interval_m(information), rtol=1e-9)
 
 
@@ -162,8 +154,7 @@ def test_more_data_give_smaller_sets_in_whatever_order(
     assume(not (one.inconsistent.any() or other.inconsistent.any()))
     cut, same_cut = section(one, label), section(other, label)
     assert lies_in(cut, section(before, label), HAIR)
-    assert lies_in(cut, same_cut, HAIR)
-    assert lies_in(same_cut, cut, HAIR)
+    assert same(cut, same_cut, HAIR)
     misses = [information.predicted_miss() for information in (before, one, other)]
     assert misses[0].lower_m[0] - HAIR <= misses[1].lower_m[0] <= misses[1].upper_m[0] <= misses[0].upper_m[0] + HAIR
     ends = [living_range_interval_m(information) for information in (before, one)]
@@ -180,14 +171,12 @@ def test_impulses_add_and_move_the_predicted_miss(
     one.shift(first)
     one.shift(second)
     other.shift(first + second)
-    assert lies_in(section(one, label), section(other, label), HAIR)
-    assert lies_in(section(other, label), section(one, label), HAIR)
+    assert same(section(one, label), section(other, label), HAIR)
     after = other.section_at(label).polygons[0]
     assume(not before.polygons[0].is_empty)
     assert float(after.area()) == pytest.approx(float(before.polygons[0].area()), rel=1e-9, abs=1e-9)
     moved = before.polygons[0].translate((-(first + second), 0.0))
-    assert lies_in(after, moved, HAIR)
-    assert lies_in(moved, after, HAIR)
+    assert same(after, moved, HAIR)
 
 
 @few
@@ -202,8 +191,7 @@ def test_prediction_is_a_shear_and_a_segment(events: list[tuple[float, float, fl
     nu = PAPER.disturbance_m_s2
     half = np.array([nu * STEP, 0.5 * nu * STEP**2])
     wanted = before.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment(half)
-    assert lies_in(after.polygons[0], wanted, HAIR)
-    assert lies_in(wanted, after.polygons[0], HAIR)
+    assert same(after.polygons[0], wanted, HAIR)
     width = float(wanted.support_function((-half[1], half[0]))) + float(wanted.support_function((half[1], -half[0])))
     area = float(before.area()) + 2.0 * width
     assert float(after.polygons[0].area()) == pytest.approx(area, rel=1e-9, abs=HAIR)
@@ -237,8 +225,7 @@ def test_a_mirrored_history_gives_the_mirrored_set(
     there, back = tell(model, events), tell(replace(model, bounds=box), events, sign=-1.0)
     image, wanted = section(back, label).linear_map(-np.eye(2)), section(there, label)
     assert image.is_empty == wanted.is_empty
-    assert lies_in(image, wanted, ROUNDING)
-    assert lies_in(wanted, image, ROUNDING)
+    assert same(image, wanted, ROUNDING)
     assert back.predicted_miss().lower_m == pytest.approx(-there.predicted_miss().upper_m, rel=1e-12)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from infoset import AngleSensor, ExtremePoints, RangeSensor, RateSensor
+from infoset import AngleSensor, RangeSensor, RateSensor
 from infoset.arrays import Floats
 
 EPS = float(np.finfo(np.float64).eps)
@@ -59,15 +59,6 @@ def test_the_errors_of_a_measurement_and_the_nearest_one(
     slack = 64.0 * EPS * (1.0 + slopes**2)
     assert (np.tan(measured - bound) - slack <= slopes).all()
     assert (slopes <= np.tan(measured + bound) + slack).all()
-
-
-@given(places, shares, st.floats(-2.0, 2.0))
-def test_each_angle_is_measured_as_in_the_plane(place: Place, error: float, beyond: float) -> None:
-    points = ExtremePoints(place.alpha_rad[1], place.omega_rad_s[1], place.range_m)
-    wanted = points.alpha_rad + beyond * SENSOR.bound(points)
-    both = np.array([[0.0], [error]])
-    assert np.array_equal(SENSOR.measured(place, both)[1], SENSOR.measured(points, np.array([error])))
-    assert np.array_equal(SENSOR.nearest(place, np.stack([wanted, wanted]))[1], SENSOR.nearest(points, wanted))
 
 
 def test_bounds_that_differ_by_axis() -> None:

@@ -39,30 +39,25 @@ def test_a_batch_gives_what_its_members_give(shape: tuple[int, ...]) -> None:
     vectors = random.normal(size=(*shape, 2))
     lower, upper = random.uniform(-0.5, 0.2, shape), random.uniform(0.3, 2.0, shape)
     matrices = random.normal(size=(*shape, 2, 2))
-    whole = [
-        batch.cut(vectors, lower, upper),
-        batch.linear_map(matrices),
-        batch.translate(vectors),
-        batch.add_segment(vectors),
-        batch.minkowski_sum(batch.linear_map(matrices)),
+    operations: list[Callable[..., Any]] = [
+        lambda sets, _, *vector: sets.cut(*vector),
+        lambda sets, matrix, *_: sets.linear_map(matrix),
+        lambda sets, _, vector, *__: sets.translate(vector),
+        lambda sets, _, vector, *__: sets.add_segment(vector),
+        lambda sets, matrix, *_: sets.minkowski_sum(sets.linear_map(matrix)),
+        lambda sets, _, vector, *__: sets.support_function(vector),
+        lambda sets, _, vector, *__: sets.support_vector(vector),
+        lambda sets, _, vector, *__: sets.margin(vector),
+        lambda sets, *_: sets.centroid(),
     ]
-    measures = [batch.support_function(vectors), batch.support_vector(vectors), batch.margin(vectors), batch.centroid()]
-    for index in np.ndindex(shape):
-        one = batch[index]
-        single = [
-            one.cut(vectors[index], lower[index], upper[index]),
-            one.linear_map(matrices[index]),
-            one.translate(vectors[index]),
-            one.add_segment(vectors[index]),
-            one.minkowski_sum(one.linear_map(matrices[index])),
-        ]
-        for many, alone in zip(whole, single, strict=True):
-            assert many[index].polygon().tolist() == alone.polygon().tolist()
-        v = vectors[index]
-        for got, wanted in zip(
-            measures, [one.support_function(v), one.support_vector(v), one.margin(v), one.centroid()], strict=True
-        ):
-            np.testing.assert_array_equal(got[index], wanted)
+    arguments = (batch, matrices, vectors, lower, upper)
+    for operation in operations:
+        whole = operation(*arguments)
+        for index in np.ndindex(shape):
+            many, alone = whole[index], operation(*(each[index] for each in arguments))
+            if isinstance(alone, ConvexPolygons):
+                many, alone = many.polygon(), alone.polygon()
+            np.testing.assert_array_equal(many, alone)
 
 
 def test_members_of_a_batch_may_have_few_vertices_or_none() -> None:
