@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Collection, Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -62,13 +62,13 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
     scenario = record.scenario
     thruster, model = scenario.thruster, scenario.set_model
     modulus_m_s = modulus(record.impulse_m_s.T)
-    stages = [*stages_of(record, kept)]
+    before, misses_m = computed_again(record, kept)
     states: list[tuple[Section, ...]] = []
     numbers: list[tuple[int, int, int]] = []
     for previous, index in zip([-2, *kept], kept, strict=False):
         if index != previous + 1:
-            states.append(stages[index].before)
-        states += [stages[index].measured, stages[index + 1].before]
+            states.append(before[index])
+        states += [record.sections[index], before[index + 1]]
         numbers.append((len(states) - 3, len(states) - 2, len(states) - 1))
     sections = [section for state in states for section in state]
     outlines = [section.omega_alpha for section in sections]
@@ -113,7 +113,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
                 **_axis_data(record, number, kept),
                 "fired_m_s": record.impulse_m_s[fired, number].tolist(),
                 "outlines": {
-                    "predicted_miss_m": _packed(np.concatenate([stages[k].miss_m[number] for k in kept]), "<f8"),
+                    "predicted_miss_m": _packed(np.concatenate([misses_m[k][number] for k in kept]), "<f8"),
                     **packed_outlines([outline[number].polygon() for outline in outlines]),
                 },
             }
@@ -163,39 +163,25 @@ def _known(values: Floats) -> list[Any]:
     return [value if is_known else None for value, is_known in zip(values.tolist(), known, strict=True)]
 
 
-class Stages(NamedTuple):
-    """The sections of one step predicted from the step before, and after its measurement.
+def computed_again(
+    record: Record, kept: Collection[int]
+) -> tuple[Mapping[int, tuple[Section, ...]], Mapping[int, Floats]]:
+    """Return by step what a record does not contain: sections before the measurement, and intervals of misses.
 
-    `miss_m` is the predicted-miss interval of each measured section, m, shape (C, sections, 2).
+    The sections are those predicted to the steps `kept` and to the steps after them; after an impulse k a section is
+    the measured one with V reduced by k. The intervals are those of the predicted misses of each measured section of
+    the steps `kept`, m, shape (C, sections, 2). The cost is that of the steps of the set, a few ms.
     """
-
-    before: tuple[Section, ...]
-    measured: tuple[Section, ...]
-    miss_m: Floats
-
-
-def stages_of(record: Record, kept: Collection[int]) -> Iterator[Stages]:
-    """Yield the stages of each step of a record, and the set predicted from the last step.
-
-    The sections are those of the steps `kept` and of the predictions from them; the other stages are empty.
-
-    Notes
-    -----
-    After the impulse k a section is the measured one with V reduced by k; after the prediction it is `before` of the
-    next step. Two of the four stages are therefore enough. The cost is that of the steps of the set, a few ms.
-    """
-    wanted, empty = {*kept}, np.empty((len(record.scenario.set_model.axes), 0, 2))
-    before: tuple[Section, ...] = ()
+    wanted = {*kept}
+    before, misses_m = {}, {}
     for number, information in enumerate(replayed(record.scenario, record.measured, record.impulse_m_s)):
         step, is_measured = divmod(number, 2)
-        if not is_measured:
-            before = tuple(information.sections()) if {step - 1, step} & wanted else ()
-        elif step in wanted:
-            intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)[:, 0, information.living[0]]
-            yield Stages(before, tuple(information.sections()), intervals)
-        else:
-            yield Stages(before, (), empty)
-    yield Stages(before, (), empty)
+        if is_measured and step in wanted:
+            intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)
+            misses_m[step] = intervals[:, 0, information.living[0]]
+        elif not is_measured and {step - 1, step} & wanted:
+            before[step] = tuple(information.sections())
+    return before, misses_m
 
 
 def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
+import itertools
 import json
 import re
 from dataclasses import replace
@@ -15,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.common.page_document import embedded_json, page
-from experiments.interception.page import STEPS_OF_A_BOX, interception_page, packed_outlines, stages_of
+from experiments.interception.page import STEPS_OF_A_BOX, computed_again, interception_page, packed_outlines
+from experiments.interception.record_file import replayed
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from infoset import InitialSet, Model, RateSensor, Recovery
@@ -81,16 +83,17 @@ def flown(name: str) -> Record:
 def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
     record = flown(name)
     assert (record.result.outcomes[0] is Outcome.SET_EMPTY) == (name in ("lost", "recovered"))
-    stages = [*stages_of(record, range(record.steps))]
-    assert len(stages) == record.steps + 1
-    for each, sections, misses in zip(stages, record.sections, record.predicted_miss_m, strict=False):
-        for found, recorded in zip(each.measured, sections, strict=True):
+    after = itertools.islice(replayed(record.scenario, record.measured, record.impulse_m_s), 1, None, 2)
+    for information, sections in zip(after, record.sections, strict=True):
+        for found, recorded in zip(information.sections(), sections, strict=True):
             assert (found.label_m, found.range_m) == (recorded.label_m, recorded.range_m)
             np.testing.assert_array_equal(found.polygons.vertices, recorded.polygons.vertices)
-        assert np.isnan(misses).all() == (not each.miss_m.size)
-        if each.miss_m.size:
-            ends = np.stack([each.miss_m[..., 0].min(axis=1), each.miss_m[..., 1].max(axis=1)], axis=1)
-            np.testing.assert_array_equal(misses, ends)
+    _, misses_m = computed_again(record, range(record.steps))
+    for step, interval in enumerate(record.predicted_miss_m):
+        assert np.isnan(interval).all() == (not misses_m[step].size)
+        if misses_m[step].size:
+            ends = np.stack([misses_m[step][..., 0].min(axis=1), misses_m[step][..., 1].max(axis=1)], axis=1)
+            np.testing.assert_array_equal(interval, ends)
 
 
 @pytest.mark.parametrize("kind", list(Model))
@@ -99,9 +102,10 @@ def test_what_was_before_holds_what_is_after(kind: Model) -> None:
     initial = InitialSet.BOX if kind is Model.GUARANTEED else InitialSet.RECTANGLE
     model = replace(scenario.set_model, model=kind, initial_set=initial)
     flown = fly_one(replace(scenario, **of_model(model)))
-    for each in [*stages_of(flown, range(flown.steps))][:-1:20]:
-        before = {section.label_m: section.polygons[0] for section in each.before}
-        for section in each.measured:
+    predicted, _ = computed_again(flown, range(flown.steps))
+    for step in range(0, flown.steps, 20):
+        before = {section.label_m: section.polygons[0] for section in predicted[step]}
+        for section in flown.sections[step]:
             if section.label_m in before:
                 points = section.polygons[0].polygon()
                 scale = np.abs(points).max()
