@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike
 
 from experiments.common.page_document import page
@@ -31,6 +32,8 @@ from sim import Record
 from sim.gravity import on_board_model
 
 MAX_RECORDS = 2
+TOLERANCE = 5e-4
+"""Tolerance of outlines in a page of a long flight, as a part of their box: about 0.2 pixels on a screen."""
 STEPS_OF_A_BOX = 65535
 """Steps of the vertex grid across the box of a polygon: about 0.01 pixels on a screen."""
 
@@ -114,7 +117,7 @@ def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
                 "fired_m_s": record.impulse_m_s[fired, number].tolist(),
                 "outlines": {
                     "predicted_miss_m": _packed(np.concatenate([misses_m[k][number] for k in kept]), "<f8"),
-                    **packed_outlines([outline[number].polygon() for outline in outlines]),
+                    **packed_outlines([outline[number].polygon() for outline in outlines], TOLERANCE * bool(thinned)),
                 },
             }
             for number, axis in enumerate(model.axes)
@@ -184,10 +187,11 @@ def computed_again(
     return before, misses_m
 
 
-def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:
+def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:
     """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX` across the box.
 
-    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum.
+    An outline has at least one vertex. A box is the minimum of each coordinate, then the maximum. With a tolerance, a
+    part of the box, outlines are simplified by the algorithm of Douglas and Peucker.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
     if not len(counts):
@@ -197,6 +201,11 @@ def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:
     minimum, maximum = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
     width = np.where(maximum > minimum, maximum - minimum, 1.0)
     share = (points - np.repeat(minimum, counts, axis=0)) / np.repeat(width, counts, axis=0)
+    if tolerance:
+        closed = np.insert(share, np.cumsum(counts), share[starts], axis=0)
+        lines = shapely.linestrings(closed, indices=np.repeat(np.arange(len(counts)), counts + 1))
+        share, line = shapely.get_coordinates(shapely.simplify(lines, tolerance), return_index=True)
+        share, counts = share[np.append(line[1:] == line[:-1], False)], np.bincount(line) - 1
     return {
         "boxes": _packed(np.concatenate([minimum, maximum], axis=1), "<f8"),
         "counts": _packed(counts, "<u4"),

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.common.page_document import embedded_json, page
-from experiments.interception.page import STEPS_OF_A_BOX, computed_again, interception_page, packed_outlines
+from experiments.interception.page import STEPS_OF_A_BOX, TOLERANCE, computed_again, interception_page, packed_outlines
 from experiments.interception.record_file import replayed
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
@@ -119,3 +119,18 @@ def test_outlines_keep_their_boxes_exactly() -> None:
     assert boxes.tolist() == [[1e-9, 3.0, 2e-9, 7.0], [4.0, 4.0, 4.0, 4.0]]
     grid = np.frombuffer(base64.b64decode(packed["vertices"]), dtype="<u2").reshape(-1, 2)
     assert grid.tolist() == [[0, 0], [STEPS_OF_A_BOX, 32768], [49151, STEPS_OF_A_BOX], [0, 0]]
+
+
+def test_outlines_of_long_flights_have_few_vertices() -> None:
+    turns = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
+    circle, triangle = np.column_stack([np.cos(turns), np.sin(turns)]), np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]])
+    packed = packed_outlines([circle, triangle, triangle[:1], triangle[:2], circle], TOLERANCE)
+    counts = np.frombuffer(base64.b64decode(packed["counts"]), dtype="<u4")
+    assert counts[1:4].tolist() == [3, 1, 2]
+    assert 20 < counts[0] == counts[4] < 150
+    grid = np.frombuffer(base64.b64decode(packed["vertices"]), dtype="<u2").reshape(-1, 2)[: counts[0]]
+    drawn = 2.0 * grid / STEPS_OF_A_BOX - 1.0
+    chords = 0.5 * (drawn + np.roll(drawn, 1, axis=0))
+    assert np.hypot(*chords.T).min() > 1.0 - 2.0 * TOLERANCE - 1e-4
+    boxes = np.frombuffer(base64.b64decode(packed["boxes"])).reshape(-1, 4)
+    np.testing.assert_allclose(boxes[0], [-1.0, -1.0, 1.0, 1.0])
