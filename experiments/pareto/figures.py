@@ -31,7 +31,7 @@ from experiments.common.hill_axes import AXIS_TITLES, component_titles
 from experiments.common.units import length_unit
 from experiments.pareto.report import CHOICES, Report
 from infoset.arrays import Floats
-from rendezvous.pareto import DurationSweep, EncounterSolution, pareto_set, simplex_weights
+from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
 _VIEWS: tuple[tuple[int, ...], ...] = ((1, 0), (0, 1, 2), (1, 2), (0, 2))
 """Axes of the panels: three planes, and space in the second one."""
@@ -57,7 +57,7 @@ def draw_all(report: Report) -> Iterator[Figure]:
     solution = report.solution
     yield draw_trajectories(solution)
     yield draw_controls(solution, report.problem.max_control_m_s2)
-    yield draw_front(solution, report.selections, report.sweep)
+    yield draw_front(report)
 
 
 @style()
@@ -108,13 +108,14 @@ def draw_controls(solution: EncounterSolution, bound_m_s2: float | None = None) 
 
 
 @style()
-def draw_front(solution: EncounterSolution, selections: Mapping[str, Floats], sweep: DurationSweep) -> Figure:
+def draw_front(report: Report) -> Figure:
     """Draw the Pareto set with the chosen meetings, the Pareto front, and costs against the duration."""
     figure, (panels,) = subplots(105.0, 1, 3)
-    sampled = pareto_set(solution, simplex_weights(len(solution.costs), _SET_POINTS))
-    _draw_set(panels[0], solution, sampled.points, selections)
-    _draw_excesses(panels[1], solution, sampled.excess, selections)
-    _draw_sweep(panels[2], solution, sweep)
+    solution, selections = report.solution, report.selections
+    points = pareto_set(solution, simplex_weights(len(solution.costs), _SET_POINTS))
+    _draw_set(panels[0], solution, points, selections)
+    _draw_excesses(panels[1], solution, solution.excess(points), selections)
+    _draw_sweep(panels[2], report)
     letters(panels, ["Pareto set", "Pareto front", "costs against time"])
     legend_below(figure, 3)
     return figure
@@ -189,11 +190,13 @@ def _widest_pair(excess: Floats) -> tuple[int, int]:
     return min(pairs, key=lambda pair: float(correlation[pair]))
 
 
-def _draw_sweep(axes: Axes, solution: EncounterSolution, sweep: DurationSweep) -> None:
-    for index, name in enumerate(_names(solution)):
-        line = _look(index, marker="none", label=f"$J^2$ of {name}")
-        axes.plot(sweep.meeting_s, sweep.cost_squared[:, index], **line)
-    axes.plot(sweep.meeting_s, sweep.group_loss, color=LIMIT, linewidth=2.0, label="group loss")
-    axes.axvline(solution.encounter.meeting_s, label="time of the meeting in (a) and (b)", **EVENT)
+def _draw_sweep(axes: Axes, report: Report) -> None:
+    times_s = [solution.encounter.meeting_s for solution in report.sweep]
+    costs = np.array([solution.cost_squared() for solution in report.sweep])
+    for index, name in enumerate(_names(report.solution)):
+        axes.plot(times_s, costs[:, index], **_look(index, marker="none", label=f"$J^2$ of {name}"))
+    losses = [solution.group_loss() for solution in report.sweep]
+    axes.plot(times_s, losses, color=LIMIT, linewidth=2.0, label="group loss")
+    axes.axvline(report.solution.encounter.meeting_s, label="time of the meeting in (a) and (b)", **EVENT)
     axes.set(yscale="log", xlabel="time of the meeting, s", ylabel=f"$J^2$ and group loss, {_COST}")
     axes.margins(x=0.0)

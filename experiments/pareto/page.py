@@ -60,7 +60,7 @@ def pareto_page(report: Report) -> str:
         "selections": [{"name": CHOICES[rule], "point": point} for rule, point in report.selections.items()],
         # If all craft have the same M, the Pareto set is the convex hull of the ideals; else it is shown as points.
         "pareto_hull": faces_of(solution.ideals)[0] if hull else None,
-        "pareto_points": [] if hull else pareto_set(solution, simplex_weights(len(tracks), _SET_POINTS)).points,
+        "pareto_points": [] if hull else pareto_set(solution, simplex_weights(len(tracks), _SET_POINTS)),
     }
     script = (resources.files("experiments.pareto") / "page.js").read_text(encoding="utf-8")
     return motion_page(f"Encounter {report.problem.name}", about, time_s, views, own_script=script, own_data=data)

@@ -10,7 +10,7 @@ from experiments.common.problem_command import trajectories_csv
 from experiments.common.screen import Part, number, number_table
 from experiments.pareto.file import TERMINAL, ParetoProblem
 from infoset.arrays import Floats
-from rendezvous.pareto import BoundCheck, Coalitions, DurationSweep, EncounterSolution, Feasibility, distances
+from rendezvous.pareto import BoundCheck, Coalitions, EncounterSolution, Feasibility, distances
 
 SAMPLES = 31
 """Number of times in a trajectory of the CSV file."""
@@ -30,7 +30,8 @@ class Report:
     """Results of one command.
 
     `selections` are Pareto-optimal meetings, shape (f,), by the rule of their choice. There are no `coalitions` if
-    there are too many craft, and no `bounds` if the problem has no bound on the control.
+    there are too many craft, and no `bounds` if the problem has no bound on the control. `sweep` has other times of the
+    meeting.
     """
 
     problem: ParetoProblem
@@ -40,7 +41,7 @@ class Report:
     bounds: tuple[BoundCheck, ...]
     peaks_m_s2: tuple[float, ...]
     impulses_m_s: tuple[float, ...]
-    sweep: DurationSweep
+    sweep: tuple[EncounterSolution, ...]
 
 
 def report_json(report: Report) -> dict[str, object]:
@@ -72,10 +73,10 @@ def report_json(report: Report) -> dict[str, object]:
         },
         **_coalitions_json(report.coalitions, [cost.craft.name for cost in solution.costs]),
         "sweep": {
-            "meeting_time_s": report.sweep.meeting_s,
-            "group_loss_m2_s3": report.sweep.group_loss,
-            "cost_squared_m2_s3": report.sweep.cost_squared,
-            "ideal_cost_squared_m2_s3": report.sweep.ideal_cost_squared,
+            "meeting_time_s": [other.encounter.meeting_s for other in report.sweep],
+            "group_loss_m2_s3": [other.group_loss() for other in report.sweep],
+            "cost_squared_m2_s3": [other.cost_squared() for other in report.sweep],
+            "ideal_cost_squared_m2_s3": [[cost.ideal_cost_squared for cost in other.costs] for other in report.sweep],
         },
     }
 

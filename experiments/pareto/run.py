@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from experiments.common.errors import InputError, shown
@@ -24,7 +26,6 @@ from rendezvous.pareto import (
     nearest_to,
     peak_control,
     solve_encounter,
-    sweep_meeting_time,
     total_impulse,
 )
 from rendezvous.pareto.coalitions import MAX_CRAFT
@@ -51,7 +52,7 @@ def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Repo
     coalitions = analyse_coalitions(solution) if len(plans) <= MAX_CRAFT else None
     progress(0.9)
     latest_s = max(craft.start_s for craft in encounter.craft)
-    durations = latest_s + (encounter.meeting_s - latest_s) * np.linspace(*SWEEP)
+    times_s = (latest_s + (encounter.meeting_s - latest_s) * np.linspace(*SWEEP)).tolist()
     return Report(
         problem,
         solution,
@@ -60,7 +61,7 @@ def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Repo
         bounds,
         peaks_m_s2=tuple(peak_control(plan) for plan in plans),
         impulses_m_s=tuple(total_impulse(plan) for plan in plans),
-        sweep=sweep_meeting_time(encounter, durations),
+        sweep=tuple(solve_encounter(replace(encounter, meeting_s=time_s)) for time_s in times_s),
     )
 
 

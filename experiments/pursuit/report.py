@@ -56,7 +56,7 @@ def report_json(report: Report) -> dict[str, object]:
         "axes": INERTIAL_AXES,
         "units": solution.units,
         "verdict": solution.verdict,
-        "route": solution.route,
+        "branch_changes": solution.branch_changes,
         "looked_at_s": solution.looked_at_s,
         "exhausted": solution.exhausted,
         "capture": capture and {key: value for key, value in vars(capture).items() if key != "extremal"},
@@ -132,7 +132,7 @@ def _capture_lines(capture: Capture, solution: Solution) -> Iterator[Part]:
         f"curvatures of the distance over the direction: {' and '.join(f'{value:.4g}' for value in capture.curvature)} "
         f"times {solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)"
     )
-    yield f"method: {solution.route.value}"
+    yield f"changes to a branch that keeps the evader farther away: {solution.branch_changes}"
 
 
 def _verdict(solution: Solution) -> str:

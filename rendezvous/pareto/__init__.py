@@ -10,15 +10,13 @@ from rendezvous.pareto.feasibility import (
     peak_control,
     total_impulse,
 )
-from rendezvous.pareto.front import ParetoSet, distances, pareto_set, simplex_weights
+from rendezvous.pareto.front import distances, pareto_set, simplex_weights
 from rendezvous.pareto.selections import min_sum_of_costs, minimax_excess, nearest_to
 from rendezvous.pareto.solution import (
     CraftCost,
-    DurationSweep,
     EncounterSolution,
     Plan,
     solve_encounter,
-    sweep_meeting_time,
     weighted_point,
 )
 
@@ -30,12 +28,10 @@ __all__ = [
     "Core",
     "Craft",
     "CraftCost",
-    "DurationSweep",
     "Encounter",
     "EncounterSolution",
     "Feasibility",
     "Meeting",
-    "ParetoSet",
     "Plan",
     "analyse_coalitions",
     "check_bound",
@@ -48,7 +44,6 @@ __all__ = [
     "peak_control",
     "simplex_weights",
     "solve_encounter",
-    "sweep_meeting_time",
     "total_impulse",
     "weighted_point",
 ]

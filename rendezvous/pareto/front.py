@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rendezvous._arrays import Floats
@@ -11,22 +9,12 @@ from rendezvous._halton import halton
 from rendezvous.pareto.solution import EncounterSolution
 
 
-@dataclass(frozen=True)
-class ParetoSet:
-    """Pareto-optimal meetings.
+def pareto_set(solution: EncounterSolution, weights: Floats) -> Floats:
+    """Return Pareto-optimal meetings of a `solution`, shape (k, f), for `weights`, shape (k, n).
 
-    `points`, shape (k, f), are free terminal values, and `excess`, shape (k, n), is J_i^2 - J_i*^2, m^2/s^3.
-    """
-
-    points: Floats
-    excess: Floats
-
-
-def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:
-    """Return the Pareto-optimal meetings of a `solution` for k rows of `weights` (k, n), not negative and not all zero.
-
-    (sum w_i M_i)^-1 sum w_i M_i p_i*: with one M the convex hull of the ideals, otherwise curved. All weights together
-    cover the set, as the excesses are convex.
+    They are free terminal values; the weights are not negative, nor all zero in a row. (sum w_i M_i)^-1 sum w_i M_i
+    p_i*: with one M the convex hull of the ideals, otherwise curved. All weights together cover the set, as the
+    excesses are convex.
     """
     shares = weights / weights.sum(axis=1, keepdims=True)
     ideals = solution.ideals
@@ -38,8 +26,7 @@ def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:
     scaled = (ideals - middle) @ root.T
     left = np.einsum("kn,nab->kab", shares, matrices)
     right = np.einsum("kn,nab,nb->ka", shares, matrices, scaled)
-    points = middle + np.linalg.solve(left, right[..., None])[..., 0] @ back.T
-    return ParetoSet(points, solution.excess(points))
+    return np.asarray(middle + np.linalg.solve(left, right[..., None])[..., 0] @ back.T)
 
 
 def simplex_weights(craft: int, count: int) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -203,29 +203,3 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
     if not np.isfinite(ideal).all():
         raise ValueError(f"craft {craft.name!r}: the numbers overflow; check the units")
     return CraftCost(craft, ideal, float(rest @ rest), upper, base, slope, to_costate)
-
-
-@dataclass(frozen=True)
-class DurationSweep:
-    """An encounter at k meeting times.
-
-    `group_loss`, shape (k,), is the smallest one; `cost_squared` and `ideal_cost_squared`, shape (k, n), are J_i^2 and
-    J_i*^2 there. Costs are in m^2/s^3.
-    """
-
-    meeting_s: Floats
-    cost_squared: Floats
-    ideal_cost_squared: Floats
-    group_loss: Floats
-
-
-def sweep_meeting_time(encounter: Encounter, meeting_s: ArrayLike) -> DurationSweep:
-    """Solve an `encounter` at k meeting times, each after every craft's start."""
-    times = np.atleast_1d(np.asarray(meeting_s, dtype=np.float64))
-    solutions = [solve_encounter(replace(encounter, meeting_s=float(time))) for time in times]
-    return DurationSweep(
-        times,
-        np.array([solution.cost_squared() for solution in solutions]),
-        np.array([[cost.ideal_cost_squared for cost in solution.costs] for solution in solutions]),
-        np.array([float(solution.group_loss()) for solution in solutions]),
-    )

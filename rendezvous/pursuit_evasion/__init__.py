@@ -9,7 +9,7 @@ from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certi
 from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, fly
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
 from rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
-from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
+from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Solution, Verdict
 from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Steering
 
@@ -30,7 +30,6 @@ __all__ = [
     "PlayerHistory",
     "Policy",
     "RandomSteering",
-    "Route",
     "Solution",
     "Steering",
     "Units",

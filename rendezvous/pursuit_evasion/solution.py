@@ -23,13 +23,6 @@ class Verdict(Enum):
     """The extremals are no saddle from some duration on: nothing is claimed."""
 
 
-class Route(Enum):
-    """Method that found an extremal."""
-
-    CONTINUATION = "continuation in the duration"
-    SWITCHED = "continuation, with a change to a branch that keeps the evader farther away"
-
-
 @dataclass(frozen=True)
 class PlayerEnd:
     """One player at the end of the game, in the inertial frame.
@@ -99,7 +92,8 @@ class Capture:
 class Solution:
     """A game with its verdict; `units` are those of nondimensional values.
 
-    There is a `capture` if the verdict is `captured`. `curve` contains the distances along the branch, and
+    There is a `capture` if the verdict is `captured`. The continuation changed `branch_changes` times to a branch that
+    keeps the evader farther away. `curve` contains the distances along the branch, and
     `looked_at_s` is the longest duration that was solved; `exhausted` is the player without propellant at that time,
     pursuer or evader.
     """
@@ -108,7 +102,7 @@ class Solution:
     units: Units
     verdict: Verdict
     capture: Capture | None
-    route: Route
+    branch_changes: int
     curve: DistanceCurve
     looked_at_s: float
     exhausted: str | None = None

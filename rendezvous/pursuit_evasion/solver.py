@@ -9,7 +9,7 @@ from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion._scan import greater
 from rendezvous.pursuit_evasion.game import Game, Player, Units, horizon_s, scaled_game
-from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
+from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Solution, Verdict
 
 _MAX_BRANCHES = 6
 
@@ -32,7 +32,7 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     first = pair.begin(latest, radius)
     if first is None:
         empty = DistanceCurve(np.zeros(0), np.zeros(0), np.zeros(0))
-        return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, Route.CONTINUATION, empty, 0.0)
+        return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, 0, empty, 0.0)
     nodes: list[Node] = []
     branch = follow(pair, first, radius, latest)
     changes, work = 0, branch.work
@@ -46,7 +46,6 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
         branch = follow(pair, better, radius, latest, MAX_WORK - work)
         changes, work = changes + 1, work + branch.work
     nodes += branch.nodes
-    route = Route.SWITCHED if changes else Route.CONTINUATION
     curve = DistanceCurve(
         np.array([node.duration for node in nodes]) * units.time_s,
         np.array([node.distance for node in nodes]) * units.length_m,
@@ -56,11 +55,11 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     if branch.ending is Ending.CAPTURE:
         capture = _capture(game, units, branch.last)
         verdict = Verdict.CAPTURED if capture.is_local_saddle else Verdict.BRANCH_NOT_CERTIFIED
-        return Solution(game, units, verdict, capture, route, curve, looked_at_s)
+        return Solution(game, units, verdict, capture, changes, curve, looked_at_s)
     if branch.ending is Ending.TIME:
         verdict, exhausted = _uncaptured(game)
-        return Solution(game, units, verdict, None, route, curve, looked_at_s, exhausted)
-    return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, route, curve, looked_at_s)
+        return Solution(game, units, verdict, None, changes, curve, looked_at_s, exhausted)
+    return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, changes, curve, looked_at_s)
 
 
 def _capture(game: Game, units: Units, node: Node) -> Capture:
