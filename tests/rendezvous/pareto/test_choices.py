@@ -63,10 +63,10 @@ SEEDS = st.integers(0, 2**32 - 1)
 @settings(max_examples=20, deadline=None)
 def test_no_meeting_dominates_the_pareto_set(seed: int, count: int, own_starts: bool) -> None:
     solution, random = some(seed, count, own_starts=own_starts), np.random.default_rng(seed)
-    found = pareto_set(solution, random.dirichlet(np.ones(count), size=20))
+    found = pareto_set(solution, simplex_weights(count, 20))
     spread = float(np.ptp(solution.ideals, axis=0).max())
     elsewhere, excess = (
-        solution.excess(found[:, None] + random.normal(size=(20, 50, 3)) * spread),
+        solution.excess(found[:, None] + random.normal(size=(len(found), 50, 3)) * spread),
         solution.excess(found),
     )
     assert not (excess[:, None] - elsewhere > 1e-9 * excess.max()).all(axis=-1).any()

@@ -72,7 +72,9 @@ def test_matrices_satisfy_their_differential_equations(name: str, duration: floa
     transition, gramian, held = integrated(motion, start, start + duration)
     scale = np.array([duration] * 3 + [1.0] * 3)
     weight = scale[None, :] / scale[:, None]
-    found = motion.segment(start, start + duration)
+    found, breaks = motion.segment(start, start + duration), motion.breaks(start, start + duration)
+    assert (breaks[0], breaks[-1]) == (start, start + duration)
+    assert (np.diff(breaks) > 0.0).all()
     size = np.abs(transition * weight).max()
     np.testing.assert_allclose(found.transition * weight, transition * weight, rtol=0.0, atol=2e-10 * size)
     spread = np.sqrt(np.outer(np.diag(gramian), np.diag(gramian)))
