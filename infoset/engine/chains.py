@@ -468,7 +468,7 @@ def reduce_outward(section: SectionView, tau: float, points: Floats) -> None:
     count = ZERO
     for i in range(longer.begin, longer.end):
         v, m = read(longer, rings, i)
-        count = polygon.append(points, polygon_reduction.drop_turned(points, count, 1, v, m), v, m)
+        count = polygon.append(points, polygon_reduction.drop_turned(points, count, v, m), v, m)
     most = REDUCED - min(in_right, in_left)
     count, done = polygon_reduction.drop_inner_edges(points, count, most, points[CAPACITY + 2 :])
     if not done:

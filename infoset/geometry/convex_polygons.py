@@ -84,11 +84,11 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         ValueError
             If the normal is zero.
         """
-        normals = self._vectors(normal, "normal")
+        normals = self._each("normal", normal, 2)
         if not np.logical_or.reduce(normals, axis=-1).all():
             raise ValueError("the normal of a strip must not be zero")
         not_negative("slack_ulp", slack_ulp)
-        bounds = np.stack([self._scalars(lower, "lower"), self._scalars(upper, "upper")], axis=-1)
+        bounds = np.stack([self._each("lower", lower), self._each("upper", upper)], axis=-1)
         return self._make(2, kernels.cut, normals, bounds, float(slack_ulp))
 
     def linear_map(self, matrix: ArrayLike) -> ConvexPolygons:
@@ -96,11 +96,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
         O(n). Each coordinate of a vertex is rounded three times. `affine_map` maps to other dimensions.
         """
-        return self._make(0, kernels.linear_map, self._matrices(matrix))
-
-    def _matrices(self, matrix: ArrayLike) -> Floats:
-        """Return a matrix for each polygon, shape (B, 2, 2)."""
-        return self._spread(finite_values("matrix", matrix, "...", 2, 2), "matrix", (2, 2))
+        return self._make(0, kernels.linear_map, self._each("matrix", matrix, 2, 2))
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
         """Return {matrix p + offset}; a matrix of shape (m, 2), m not 2, maps a single polygon to a `Polytope` in R^m.
@@ -114,7 +110,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
     def translate(self, offset: ArrayLike) -> ConvexPolygons:
         """Return the polygons moved by an offset, shape (2,) or (..., 2). O(n); each coordinate is rounded once."""
-        moved = self.vertices + self._vectors(offset, "offset").reshape(*self.shape, 1, 2)
+        moved = self.vertices + self._each("offset", offset, 2).reshape(*self.shape, 1, 2)
         return ConvexPolygons.unchecked(moved, self.counts)
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
@@ -126,7 +122,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         rows, shift = real_values("matrix", matrix), real_values("offset", offset)
         if rows.shape[-1:] != (2,):
             return self.polytope().preimage(rows, shift)
-        matrices, moved = self._matrices(rows), self.translate(-shift if shift.ndim else np.full(2, -shift))
+        matrices, moved = self._each("matrix", rows, 2, 2), self.translate(-shift if shift.ndim else np.full(2, -shift))
         inverse = np.zeros(matrices.shape)
         kernels.invert(matrices, inverse)
         if inverse.any(axis=(1, 2)).all():
@@ -139,7 +135,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
         O(n), each vertex rounded once.
         """
-        return self._make(2, kernels.add_segments, self._vectors(half, "half")[:, None])
+        return self._make(2, kernels.add_segments, self._each("half", half, 2)[:, None])
 
     def minkowski_sum(self, other: ConvexPolygons) -> ConvexPolygons:
         """Return the Minkowski sum. O(n + m), each vertex rounded once."""
@@ -240,12 +236,12 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
     def support_function(self, direction: ArrayLike) -> Floats:
         """Return max(direction . p), shape (...); -inf for the empty set. O(n); rounded as one scalar product."""
-        one, directions = self._and_vectors(direction, "direction")
+        one, directions = self._and_vectors("direction", direction)
         return one._measure(kernels.support, directions)[..., 0]
 
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a direction, shape (..., 2). O(n)."""
-        one, directions = self._and_vectors(direction, "direction")
+        one, directions = self._and_vectors("direction", direction)
         return one._known(one._measure(kernels.support, directions)[..., 1:], "support vector")
 
     def margin(self, point: ArrayLike) -> Floats:
@@ -253,7 +249,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
         -inf for the empty set. O(n), within rounding of the coordinates.
         """
-        one, points = self._and_vectors(point, "point")
+        one, points = self._and_vectors("point", point)
         return one._measure(kernels.margin, points)[..., 0]
 
     def contains(self, point: ArrayLike, tolerance: float = 0.0) -> Flags:
@@ -261,7 +257,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
         O(n). Exact for a tolerance of 0: rounding does not affect the answer.
         """
-        one, points = self._and_vectors(point, "point")
+        one, points = self._and_vectors("point", point)
         return np.asarray(one._measure(kernels.nearest, points)[..., 2] <= not_negative("tolerance", tolerance))
 
     def is_subset(self, other: ConvexPolygons, tolerance: float = 0.0) -> Flags:
@@ -323,7 +319,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
     def closest_point(self, point: ArrayLike) -> Floats:
         """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside. O(n), rounded."""
-        one, points = self._and_vectors(point, "point")
+        one, points = self._and_vectors("point", point)
         return one._known(one._measure(kernels.nearest, points)[..., :2], "closest point")
 
     def hausdorff_distance(self, other: ConvexPolygons) -> Floats:

@@ -286,22 +286,18 @@ class PolygonArrays:
         shape = empty.shape + (1,) * (values.ndim - empty.ndim)
         return np.ma.masked_array(values, np.broadcast_to(empty.reshape(shape), values.shape))
 
-    def _vectors(self, value: ArrayLike, name: str) -> Floats:
-        """Return a vector for each polygon, shape (B, 2)."""
-        return self._spread(finite_values(name, value, "...", 2), name, (2,))
-
-    def _and_vectors(self, value: ArrayLike, name: str) -> tuple[Self, Floats]:
+    def _and_vectors(self, name: str, value: ArrayLike) -> tuple[Self, Floats]:
         """Return the polygons and a vector for each; a single polygon is broadcast to the batch of the vectors."""
-        values = finite_values(name, value, "...", 2)
+        values = real_values(name, value)
         one = self if self.shape else self.broadcast_to(values.shape[:-1])
-        return one, one._spread(values, name, (2,))
+        return one, one._each(name, values, 2)
 
-    def _scalars(self, value: ArrayLike, name: str) -> Floats:
-        """Return a number for each polygon, shape (B,); it may be infinite."""
-        return self._spread(bound_values(name, value), name, ())
+    def _each(self, name: str, value: ArrayLike, *last: int) -> Floats:
+        """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`.
 
-    def _spread(self, values: Floats, name: str, last: tuple[int, ...]) -> Floats:
-        """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`."""
+        Numbers, whose shape is (), may be infinite.
+        """
+        values = finite_values(name, value, "...", *last) if last else bound_values(name, value)
         shape = (*self.shape, *last)
         if values.shape != shape:
             try:

@@ -11,9 +11,9 @@ from infoset.geometry.polygon_exact import hull
 
 
 @allocation_free
-def drop_turned(out: Points, made: int, fewest: int, x: float, y: float) -> int:
-    """Remove last vertices, down to `fewest`, at which the path to (x, y) does not turn left; return the new count."""
-    while made > fewest:
+def drop_turned(out: Points, made: int, x: float, y: float) -> int:
+    """Remove last vertices, down to one, at which the path to (x, y) does not turn left; return the new count."""
+    while made > 1:
         along_x = out[made - 1, 0] - out[made - 2, 0]
         along_y = out[made - 1, 1] - out[made - 2, 1]
         if cross(along_x, along_y, x - out[made - 1, 0], y - out[made - 1, 1]) > 0.0:

@@ -1,4 +1,4 @@
-"""Sensors in space: two angles with their own errors, ranges and rates, and the bands that a measurement leaves."""
+"""Sensors in space: two angles with their own errors."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from infoset import AngleSensor, RangeSensor, RateSensor
+from infoset import AngleSensor
 from infoset.arrays import Floats
 
 EPS = float(np.finfo(np.float64).eps)
@@ -83,14 +83,3 @@ def test_an_axis_without_error_is_measured_exactly(right: float, up: float) -> N
         assert np.array_equal(one.nearest(place, place.alpha_rad + 1e-3)[0], place.alpha_rad[0])
         assert one.error(place, measured)[0, 0] == 0.0
         assert one.error(place, measured + 1e-12)[0, 0] > 1e40
-
-
-def test_range_and_rate_in_space() -> None:
-    place = Place(2e6, 3e3, -4e3)
-    meter, rate = RangeSensor(0.5, 0.05), RateSensor(0.5, 1e-6)
-    assert meter.measured(place, np.array([0.5])).shape == (1,)
-    error = np.array([[0.5], [-1.0]])
-    measured = rate.measured(place, error)
-    assert np.array_equal(measured, place.omega_rad_s + 1e-6 * error)
-    np.testing.assert_allclose(rate.error(place, measured), error, rtol=1e-9)
-    assert np.array_equal(rate.nearest(place, place.omega_rad_s + 1.0), place.omega_rad_s + 1e-6)

@@ -5,28 +5,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 
 import infoset.geometry.polygon_reduction
 from infoset.arrays import Floats
 from infoset.geometry import polygon, polygon_exact, polygon_sum
-from tests.infoset.geometry.test_polygon_oracle import Exact, exact, exact_sum, hull, outside_by
+from tests.infoset.geometry.test_polygon_oracle import exact, exact_sum, hull, outside_by
 from tests.kernels import callable_kernels
 from tests.rationals import Fraction
 
 polygon_reduction = callable_kernels(infoset.geometry.polygon_reduction)
 
 EPS = Fraction(1, 2**52)
-
-
-def assert_agree(made: Floats, right: Sequence[Exact], tolerance: Fraction) -> None:
-    """A polygon and the exact one lie in each other, enlarged by a box."""
-    box, corners = (tolerance, tolerance), hull(exact(made))
-    assert outside_by(corners, right, box) is None
-    assert outside_by(right, corners, box) is None
 
 
 def reach(*arrays: Floats) -> Fraction:
@@ -54,7 +45,9 @@ def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: f
             assert abs(grown - 0.1) <= 16 * float(EPS) * (1.0 + distance)
         if trial % 200 == 0:
             right = exact_sum(hull(exact(corners)), exact([0.1 * along, -0.1 * along]))
-            assert_agree(made, right, 11 * EPS * (reach(corners) + 1))
+            box, ends = (11 * EPS * (reach(corners) + 1),) * 2, hull(exact(made))
+            assert outside_by(ends, right, box) is None
+            assert outside_by(right, ends, box) is None
 
 
 def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
