@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from infoset._compile import compiled, inlined
-from infoset.geometry.polygon import Points, append, close, put
+from infoset.geometry.polygon import Points, append, close, copy, move, put
 
 _SPLIT = 134217729.0
 """2^27 + 1, which splits a float into two halves of 26 bits."""
@@ -103,15 +103,11 @@ def side(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> fl
 def sort_points(points: Points, count: int) -> None:
     """Sort points by x, then by y, in place, by insertion: O(count) if they are nearly sorted."""
     for i in range(1, count):
-        x = points[i, 0]
-        y = points[i, 1]
-        j = i
+        x, y, j = points[i, 0], points[i, 1], i
         while j > 0 and (points[j - 1, 0] > x or (points[j - 1, 0] == x and points[j - 1, 1] > y)):
-            points[j, 0] = points[j - 1, 0]
-            points[j, 1] = points[j - 1, 1]
+            move(points, j - 1, j)
             j -= 1
-        points[j, 0] = x
-        points[j, 1] = y
+        put(points, j, x, y)
 
 
 @compiled
@@ -152,8 +148,7 @@ def hull(points: Points, count: int, out: Points) -> int:
             made -= 1
         if step == 0 or i > 0:
             made = append(chain, made, x, y)
-    for i in range(made):
-        put(out, i, chain[i, 0], chain[i, 1])
+    copy(chain, made, out)
     return made
 
 

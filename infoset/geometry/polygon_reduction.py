@@ -6,7 +6,7 @@ import numpy as np
 
 from infoset._compile import allocation_free, compiled, inlined
 from infoset.arrays import Floats
-from infoset.geometry.polygon import ROUNDING, Points, append, close, cross, farthest_pair
+from infoset.geometry.polygon import ROUNDING, Points, append, close, cross, farthest_pair, move, put
 from infoset.geometry.polygon_exact import hull
 
 
@@ -35,12 +35,10 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
     while count > cap:
         chosen, x, y = cheapest_edge(points, count)
         if chosen >= 0:
-            points[chosen, 0] = x
-            points[chosen, 1] = y
+            put(points, chosen, x, y)
             gone = chosen + 1 if chosen + 1 < count else 0
             for i in range(gone, count - 1):
-                points[i, 0] = points[i + 1, 0]
-                points[i, 1] = points[i + 1, 1]
+                move(points, i + 1, i)
             count -= 1
             is_hull = False
         elif is_hull:

@@ -16,13 +16,18 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int
     O(count), in two passes. The boundary is divided at its extremes across the segment; the part to the right of the
     segment's direction moves by +half, the rest by -half. A division at extremes, and not at sign changes of edges, is
     correct for tiny edges with a wrong direction. If rounding could hide an extreme (an edge along the segment, a set
-    thin across it, a point), `add_segment_carefully` computes the sum.
+    thin across it, a point), the edges are merged as in `add_polygon`.
     """
     if count == 0 or (half_x == 0.0 and half_y == 0.0):
         return count
     bottom, top = extremes(points, count, -half_y, half_x)
     if not (is_lowest(points, count, bottom, half_x, half_y) and is_lowest(points, count, top, -half_x, -half_y)):
-        return add_segment_carefully(points, count, half_x, half_y)
+        segment, out = np.empty((2, 2)), np.empty((count + 2, 2))
+        put(segment, 0, -half_x, -half_y)
+        put(segment, 1, half_x, half_y)
+        made = add_polygon(points, count, segment, 2, out)
+        copy(out, made, points)
+        return made
     if bottom < top:
         half_x, half_y = -half_x, -half_y
     # Unsigned indices avoid the test for negative ones, which takes as long as the rest of this loop.
@@ -50,17 +55,6 @@ def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
     reach_x = max(abs(points[i, 0]), abs(points[before, 0]), abs(points[after, 0]))
     reach_y = max(abs(points[i, 1]), abs(points[before, 1]), abs(points[after, 1]))
     return bool(rise - height > ROUNDING * (abs(x) * reach_y + abs(y) * reach_x))
-
-
-@compiled
-def add_segment_carefully(points: Points, count: int, half_x: float, half_y: float) -> int:
-    """Minkowski sum, in place, with a segment, for all sets: thin ones, points, edges along the segment. O(count)."""
-    segment, out = np.empty((2, 2)), np.empty((count + 2, 2))
-    put(segment, 0, -half_x, -half_y)
-    put(segment, 1, half_x, half_y)
-    made = add_polygon(points, count, segment, 2, out)
-    copy(out, made, points)
-    return made
 
 
 @compiled
