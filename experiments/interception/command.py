@@ -57,15 +57,6 @@ RangeSensor = Annotated[
         help="Simulate with or without the scenario's range sensor. Default: with it, if there is one.",
     ),
 ]
-SetTimes = Annotated[
-    str | None,
-    typer.Option(
-        "--times",
-        metavar="T1,T2,...",
-        help="Times of the sets in figure 3 of --out, s, separated by commas; the nearest step is drawn. Default: "
-        "0.5,4,8.",
-    ),
-]
 RecordFile = Annotated[
     Path | None, typer.Option("--record", metavar="FILE.npz", help="Write the record of the engagement.")
 ]
@@ -118,7 +109,6 @@ class Engage(FileOptions):
     seed: Seed = 0
     run: Annotated[int, typer.Option(metavar="K", min=0, max=MAX_RUNS - 1, help="Number of the run, from 0.")] = 0
     record: RecordFile = None
-    times: SetTimes = None
     csv: Csv = None
 
 
@@ -209,7 +199,6 @@ class Adversary(FileOptions):
     ] = "any-state"
     seed: Seed = 0
     record: RecordFile = None
-    times: SetTimes = None
 
 
 @dataclass(frozen=True)
@@ -225,6 +214,13 @@ class Replay:
     html: Html = None
     gif: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="Write an animation of the sets.")] = None
     out: Out = None
-    times: SetTimes = None
+    times: Annotated[
+        str,
+        typer.Option(
+            metavar="T1,T2,...",
+            help="Times of the sets in figure 3 of --out, s, separated by commas; the nearest step is drawn.",
+            show_default="0.5,4,8, or in a long flight evenly over the logarithm of the time to go",
+        ),
+    ] = ""
     overwrite: Overwrite = False
     quiet: Quiet = False

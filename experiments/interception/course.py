@@ -178,9 +178,6 @@ class Courses:
             possible[np.isnan(possible[:, column - 1]), column] = np.nan
 
 
-_OUTCOMES = {Outcome.SET_EMPTY: "set empty", Outcome.BUDGET_SPENT: "budget spent", Outcome.DIVERGED: "diverged"}
-
-
 def noise_title(record: Record) -> str:
     """Return the title of the noise of an engagement: `random noise`, or `game noise, range sensor`."""
     name = "worst errors found" if record.noise == WORST_FOUND else f"{record.noise_name} noise"
@@ -210,8 +207,8 @@ def outcome_title(record: Record) -> str:
     """Return miss and impulse, the outcome if it is not the arrival, and for a body with a size how it ended."""
     result = record.result
     text = f"miss {_shown(float(result.miss_m[0]))} m, impulse spent {float(result.impulse_m_s[0]):.1f} m/s"
-    outcome, cause = _OUTCOMES.get(result.outcomes[0]), result.causes[0]
-    text = text if outcome is None else f"{text}, {outcome}"
+    outcome, cause = result.outcomes[0], result.causes[0]
+    text = text if outcome is Outcome.ARRIVED else f"{text}, {outcome.value.replace('-', ' ')}"
     return ending(text, result.hit.tolist()[0], cause and cause.value)
 
 

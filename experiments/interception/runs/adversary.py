@@ -14,7 +14,7 @@ from experiments.common.units import M_PER_KM
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_bytes
 from experiments.interception.runs.engage import steps_csv
-from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, read_times
+from experiments.interception.runs.engagement_table import FIGURES, draw_engagements
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, work_of
 from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import own_strategy
@@ -29,7 +29,6 @@ def run(options: Adversary) -> None:
     """Search, write the files and print the table."""
     scenario, notes = study_scenario(options)
     own = own_strategy(options.strategy)
-    times_s = read_times(options.times)
     names = ("steps.csv", RECORD, *figure_files(*FIGURES))
     with work_of(options, scenario, names, {"--record": options.record}, notes) as work:
         worst = find_worst_misses(
@@ -52,7 +51,7 @@ def run(options: Adversary) -> None:
             record = chosen.record(own)
             work.written.save("steps.csv", steps_csv([record]))
             work.written.save(RECORD, record_bytes(record), "--record")
-            draw_engagements([record], times_s, work.written, work.begin)
+            draw_engagements([record], work.written, work.begin)
     show(_parts(scenario, worst, options, elapsed_s), options.quiet or work.written.stdout_taken)
 
 

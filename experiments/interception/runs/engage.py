@@ -16,7 +16,6 @@ from experiments.interception.runs.engagement_table import (
     FIGURES,
     draw_engagements,
     engagement_parts,
-    read_times,
 )
 from experiments.interception.runs.shared import need_finite, work_of
 from experiments.interception.scenario_file import scenario_with
@@ -31,7 +30,6 @@ def run(options: Engage) -> None:
     """Simulate one or two engagements, write the files and print the table."""
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
-    times_s = read_times(options.times)
     both = options.noise == "both"
     chosen = chosen_noise(options.noise or scenario.noise.value, [*NOISES, "both"])
     wanted: dict[str, NoiseSource | str] = (
@@ -61,7 +59,7 @@ def run(options: Engage) -> None:
         work.written.save("steps.csv", steps_csv(records), "--csv")
         for noise, record in zip(noises, records, strict=True):
             work.written.save(f"record-{noise}.npz", record_bytes(record), f"--record of {noise}")
-        draw_engagements(records, times_s, work.written, work.begin)
+        draw_engagements(records, work.written, work.begin)
     show(engagement_parts(records), options.quiet or work.written.stdout_taken)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from experiments.common.errors import input_errors
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
 from experiments.interception.runs.shared import allowance, bound_name
@@ -55,14 +54,8 @@ def _outcome(record: Record) -> str:
     return f"{outcome}; set empty at {time_s:g} s, section {label_km:.0f} km"
 
 
-def read_times(text: str | None) -> tuple[float, ...]:
-    """Return the times of figure 3 that ``--times`` gives, s; none without the option."""
-    with input_errors("--times", "; for example --times 0.5,40,90"):
-        return () if text is None else tuple(map(float, text.split(",")))
-
-
 def draw_engagements(
-    records: Sequence[Record], times_s: Sequence[float], written: Output, begin: BeginProgress
+    records: Sequence[Record], written: Output, begin: BeginProgress, times_s: Sequence[float] = ()
 ) -> None:
     """Draw the figures of one or two engagements into the folder, if there is one."""
     if written.folder is not None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, input_errors
 from experiments.common.output import output_of
-from experiments.common.screen import figure_files, progress_bar, say, show
+from experiments.common.screen import figure_files, progress_bar, show
 from experiments.interception.command import Replay
 from experiments.interception.page import MAX_RECORDS, interception_page
 from experiments.interception.record_file import load_record
@@ -12,7 +12,6 @@ from experiments.interception.runs.engagement_table import (
     FIGURES,
     draw_engagements,
     engagement_parts,
-    read_times,
 )
 
 
@@ -20,7 +19,8 @@ def run(options: Replay) -> None:
     """Read the records, write the files and print the table."""
     if len(options.records) > MAX_RECORDS:
         raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
-    times_s = read_times(options.times)
+    with input_errors("--times", "; for example --times 0.5,40,90"):
+        times_s = [float(time_s) for time_s in options.times.split(",") if time_s]
     with (
         output_of(options, figure_files(*FIGURES), {"--gif": options.gif}) as written,
         progress_bar(options.quiet) as begin,
@@ -32,7 +32,5 @@ def run(options: Replay) -> None:
             from experiments.interception.figures.animation import animate
 
             written.deliver("--gif", animate(records, progress=begin(options.gif.name)))
-        draw_engagements(records, times_s, written, begin)
+        draw_engagements(records, written, begin, times_s)
     show(engagement_parts(records), options.quiet)
-    if not written.written:
-        say("--html FILE.html writes an interactive page, --out DIR writes the figures", options.quiet)
