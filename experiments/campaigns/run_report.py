@@ -19,7 +19,7 @@ from experiments.campaigns.run_tables import (
     summary_parts,
     worst_runs,
 )
-from experiments.campaigns.sweep_report import TABLE, SweepReport, default_requirement, figure_names, read_requirement
+from experiments.campaigns.sweep_report import TABLE, SweepReport, figure_names, read_requirement
 from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
@@ -72,9 +72,7 @@ def _read(options: Report) -> CampaignFolder:
 def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
     scenario = folder.manifest.scenario
     sized = bool(folder.runs(["hit"])["hit"].count())
-    required = read_requirement(options.require, folder.manifest.require or default_requirement(has_size=sized))
-    if required.quantity in ("hit", "cause") and not sized:
-        raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")
+    required = read_requirement(options.require or folder.manifest.require, has_size=sized)
     if required.quantity == "guaranteed_miss_m" and scenario.set_model.is_guaranteed and not folder.manifest.guarantee:
         raise InputError(
             f"--require {required}: this sweep was simulated without the bound Phi; simulate it in a new folder with "

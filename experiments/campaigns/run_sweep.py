@@ -5,7 +5,7 @@ from __future__ import annotations
 from experiments.campaigns.command import Sweep as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_report import SweepReport, default_requirement, read_requirement
+from experiments.campaigns.sweep_report import SweepReport, read_requirement
 from experiments.campaigns.sweep_table import sweep_table
 from experiments.common.errors import InputError
 from experiments.common.input_file import to_toml
@@ -24,13 +24,7 @@ def run(options: Options) -> None:
         scenario, notes = scenario_of(options)
         axes = sweep_axes(",".join(options.vary), scenario)
         cells = sweep_cells(scenario, axes)
-        sized = cells[0].body is not None
-        required = read_requirement(options.require, default_requirement(has_size=sized))
-        if required.quantity in ("hit", "cause") and not sized:
-            raise InputError(
-                f"--require {required}: the scenario {scenario.name} has no [body]; set its radius, for example "
-                "--set body.radius_m=80"
-            )
+        required = read_requirement(options.require, has_size=cells[0].body is not None)
         swept = Campaign(
             scenario,
             options.runs,

@@ -12,7 +12,7 @@ from rich.table import Table
 from experiments.campaigns.run_tables import CI, campaign_notes, heading, records, screen_table
 from experiments.campaigns.sweep_axes import unit_of
 from experiments.campaigns.sweep_table import SweepTable, limits
-from experiments.common.errors import input_errors
+from experiments.common.errors import InputError, input_errors
 from experiments.common.output import Output
 from experiments.common.screen import Part, some_runs
 from experiments.interception.study import SetCounts, random_note, set_warnings, study_title
@@ -162,12 +162,13 @@ class SweepReport:
         return lines + campaign_notes(self.folder)
 
 
-def read_requirement(text: str | None, default: str) -> AnyRequirement:
-    """Read the value of --require."""
+def read_requirement(text: str | None, *, has_size: bool) -> AnyRequirement:
+    """Read the value of --require; None is a hit if the body has a size, else a bound of the miss."""
     with input_errors("--require"):
-        return parse_requirement(text or default)
-
-
-def default_requirement(*, has_size: bool) -> str:
-    """Return the requirement of a sweep without --require: a hit, if the body has a size."""
-    return "hit>=0.95" if has_size else "miss_m p99<10"
+        required = parse_requirement(text or ("hit>=0.95" if has_size else "miss_m p99<10"))
+    if required.quantity in ("hit", "cause") and not has_size:
+        raise InputError(
+            f"--require {required}: the scenario has no [body]; set its radius, for example --set body.radius_m=80, or "
+            "give a bound of the miss"
+        )
+    return required
