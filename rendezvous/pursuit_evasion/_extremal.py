@@ -22,7 +22,7 @@ STATES, COLUMNS = 12, 9
 _SAFETY, _MIN_FACTOR, _MAX_FACTOR = 0.9, 0.2, 6.0
 _MAX_STEPS = 20_000
 _FIRST_STEP = 0.05
-_NO_VARIATIONS = np.zeros((0, COLUMNS))
+NO_VARIATIONS = np.zeros((0, COLUMNS))
 _Parameters = tuple[Floats, Floats, Floats]
 
 
@@ -146,24 +146,19 @@ def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, 
 _step = step_of(_rates)
 
 
-def flow_back(y: Floats, z: Floats | None, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
+@compiled
+def flow_back(y: Floats, z: Floats, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
     """Integrate a state and its variations from time to go `begin` to `end`, in place; either may be the greater.
 
-    `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`, shape (12, 9), contains its derivatives; None
-    integrates y alone. `craft`, shape (5,), is (mu, oblateness, thrust, mass at the end of the game, mass flow).
-    Returns False where the steps are too many or too small, or a number overflows.
+    `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`, shape (12, 9), contains its derivatives; one of no
+    rows (`NO_VARIATIONS`) integrates y alone. `craft`, shape (5,), is (mu, oblateness, thrust, mass at the end of the
+    game, mass flow). Returns False where the steps are too many or too small, or a number overflows.
 
     The `tolerance` of a step's error, relative and absolute, applies to y alone. A step costs 12 stages of some 0.3 us,
     or 0.1 us for y alone.
     """
     if begin == end:
         return True
-    return bool(flow_kernel(y, _NO_VARIATIONS if z is None else z, craft, begin, end, tolerance))
-
-
-@compiled
-def flow_kernel(y: Floats, z: Floats, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
-    """Integrate as `flow_back` does; z of no rows integrates y alone."""
     ky, kz = np.empty((STAGES, STATES)), np.empty((STAGES, len(z), COLUMNS))
     y_next, z_next = np.empty_like(y), np.empty_like(z)
     parameters = craft, np.empty((3, 3)), np.empty((3, 3))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._extremal import end_of, flow_back, rate, shoot_back
+from rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, end_of, flow_back, rate, shoot_back
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""
@@ -94,7 +94,7 @@ class Craft:
     ) -> Floats | None:
         """Newton's correction of another guess, shape (6,), with the derivatives of an earlier one near by."""
         y = end_of(end_state, nu)
-        is_propagated = flow_back(y, None, self.kernel_craft(duration), 0.0, duration, tolerance)
+        is_propagated = flow_back(y, NO_VARIATIONS, self.kernel_craft(duration), 0.0, duration, tolerance)
         return response.inverse @ (self.start - y[:6]) if is_propagated else None
 
     def ballistic(self, duration: float, nu: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._extremal import STATES, end_of, flow_back, rate
+from rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, STATES, end_of, flow_back, rate
 from rendezvous.pursuit_evasion._pair import FINE, Craft, Node
 from rendezvous.pursuit_evasion.game import Units, scaled_game
 from rendezvous.pursuit_evasion.solution import Solution
@@ -60,7 +60,7 @@ class ExtremalPath:
         return y[:6], rate(y, self.craft.mu, self.craft.oblateness, self.craft.thrust / mass)[3:]
 
     def _carry(self, y: Floats, begin: float, end: float) -> None:
-        if not flow_back(y, None, self.craft.kernel_craft(self.duration), begin, end, FINE):
+        if not flow_back(y, NO_VARIATIONS, self.craft.kernel_craft(self.duration), begin, end, FINE):
             raise PathError("an extremal of the solution cannot be propagated")
 
 

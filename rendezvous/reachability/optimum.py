@@ -101,9 +101,16 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
 
 
 def block_reaches_zero(block: Block) -> bool:
-    """Return whether admissible controls lead a block to zero."""
+    """Return whether admissible controls lead a block to zero.
+
+    `NoSolutionError` is raised if neither such a control nor a positive lower bound was found.
+    """
     relaxation = min_relaxation(lift(block))[0]
-    return relaxation <= _REACHED and reaches_zero(lift(_relaxed(block, relaxation)))
+    if relaxation > _REACHED:
+        return False
+    search = _Search(lift(_relaxed(block, relaxation)), np.ones(block.size))
+    search.solve()
+    return not search.above_zero and search.result().reached
 
 
 def admissible(block: Block) -> Block:
@@ -172,16 +179,6 @@ def min_norm(lifted: Lifted, weights: Floats) -> MinimumNorm:
     search = _Search(lifted, weights)
     search.solve()
     return search.result()
-
-
-def reaches_zero(lifted: Lifted) -> bool:
-    """Return whether some controls of a block, a set without equations, reach zero.
-
-    `NoSolutionError` is raised if neither such a control nor a positive lower bound was found.
-    """
-    search = _Search(lifted, np.ones(lifted.free.shape[1]))
-    search.solve()
-    return not search.above_zero and search.result().reached
 
 
 class _Search:

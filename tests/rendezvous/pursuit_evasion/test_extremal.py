@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from infoset.arrays import Floats
-from rendezvous.pursuit_evasion._extremal import end_of, flow_back, rate, shoot_back
+from rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, end_of, flow_back, rate, shoot_back
 from rendezvous.pursuit_evasion._pair import across
 
 PLACE = st.floats(-1.5, 1.5)
@@ -41,7 +41,7 @@ def test_variations_are_differences(oblateness: float) -> None:
     def start(state: Floats, direction: Floats, final_mass: float) -> Floats:
         craft = np.array([1.0, oblateness, thrust, final_mass, flow])
         y = end_of(state, direction)
-        assert flow_back(y, None, craft, 0.0, duration, 1e-14)
+        assert flow_back(y, NO_VARIATIONS, craft, 0.0, duration, 1e-14)
         return y
 
     shot = shoot_back(end, nu, plane, np.array([1.0, oblateness, thrust, mass, flow]), duration, 1e-13)
