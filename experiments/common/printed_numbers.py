@@ -118,12 +118,9 @@ class Comparison:
         if not math.isfinite(ours.value):
             return Verdict.DISAGREED
         if number.corrected is not None:
-            right = interval(number.corrected, number.tolerance, ours.beyond)
-            return (
-                Verdict.MISPRINT
-                if _within(ours.value if ours.other is None else ours.other, right)
-                else Verdict.DISAGREED
-            )
+            value = ours.value if ours.other is None else ours.other
+            is_right = _within(value, interval(number.corrected, number.tolerance, ours.beyond))
+            return Verdict.MISPRINT if is_right else Verdict.DISAGREED
         low, high = self.band
         if _within(ours.value if ours.spread is None else number.value, self.band):
             return Verdict.AGREED if ours.spread is None or high < 2.0 * low else Verdict.POSSIBLE

@@ -123,5 +123,3 @@ def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s
             f"the set became empty in {emptied} engagements of a search; these misses show a failure of the model"
             + ("" if scenario.set_model.is_guaranteed else "; use --model guaranteed, whose set keeps the true state")
         )
-    if options.record is not None:
-        yield f"to draw it: infoset replay {options.record} --out DIR"
