@@ -318,11 +318,11 @@ def _found(values: dict[str, Any], owner: type, key: str) -> tuple[dict[str, Any
 
 
 def _value(literal: str) -> Any:
-    """Return a TOML value; any other text is text without quotes."""
+    """Return a TOML value; any other text is a number such as ``.5``, or text without quotes."""
     try:
         return tomllib.loads(f"value = {literal}", parse_float=Decimal)["value"]
     except (ValueError, RecursionError, InvalidOperation):
-        return literal
+        return Decimal(literal) if re.fullmatch(r"[+-]?\.[0-9]+", literal) else literal
 
 
 def _scaled(value: Any, factor: Decimal) -> Any:

@@ -155,9 +155,9 @@ def test_a_number_is_both_ends_of_an_interval() -> None:
 
 
 def test_settings_are_in_any_unit_and_named_in_the_description() -> None:
-    scenario, before = load_scenario("asteroid-1997", ["thruster.budget_km_s=0.5"]), load_scenario("asteroid-1997")
+    scenario, before = load_scenario("asteroid-1997", ["thruster.budget_km_s=.5"]), load_scenario("asteroid-1997")
     assert scenario.thruster.budget_m_s == 500.0
-    assert scenario.description == f"{before.description}; with thruster.budget_km_s=0.5"
+    assert scenario.description == f"{before.description}; with thruster.budget_km_s=.5"
     tilted = load_scenario("asteroid-1997", ["uncertainty.x_km.min=5200", "dispersion.z_km=-8"])
     assert tilted.uncertainty.x_m == (5200e3, before.uncertainty.x_m[1])
     assert tilted.dispersion.z_m == (-8e3, -8e3)
