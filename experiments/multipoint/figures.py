@@ -27,7 +27,7 @@ from experiments.common.figure_style import (
     subplots,
 )
 from experiments.common.units import length_unit
-from experiments.multipoint.report import Report, Scene
+from experiments.multipoint.report import Report
 from infoset.arrays import Floats
 
 _TRACK_POINTS = 241
@@ -45,45 +45,45 @@ _NODE: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize":
 
 def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
-    yield draw_path(report.scene)
-    yield draw_control(report.scene, report.problem.max_control_m_s2)
+    yield draw_path(report)
+    yield draw_control(report)
 
 
 @style()
-def draw_path(scene: Scene) -> Figure:
+def draw_path(report: Report) -> Figure:
     """Draw the path and the motion of the targets, in two planes."""
-    states = scene.path.state(scene.times)[:, :3]
+    states = report.path.state(report.times)[:, :3]
     unit, per_m = length_unit(float(np.abs(states).max()))
-    path, visits = states * per_m, scene.path.arrival_states[:, :3] * per_m
-    planes = ((1, 0), (1, 2)) if scene.hill else ((0, 1), (0, 2))
+    path, visits = states * per_m, report.path.arrival_states[:, :3] * per_m
+    planes = ((1, 0), (1, 2)) if report.hill else ((0, 1), (0, 2))
     figure, (panels,) = subplots(105.0, 1, 2)
     for panel, plane in zip(panels, map(list, planes), strict=True):
-        for visit in range(len(scene.order)):
-            until_s = float(scene.path.nodes.leave_s[visit])
-            times = np.linspace(scene.tour.start_s, until_s, _TRACK_POINTS)
-            track = scene.target_path(visit, times)[:, plane] * per_m
+        for visit in range(len(report.best.order)):
+            until_s = float(report.path.nodes.leave_s[visit])
+            times = np.linspace(report.problem.tour.start_s, until_s, _TRACK_POINTS)
+            track = report.target_path(visit, times)[:, plane] * per_m
             panel.plot(*track.T, **_TARGET)
             panel.plot(*track[0], color=LIMIT, marker=".", label="target at the start", **_POINT)
         panel.plot(*path[:, plane].T, color=TRUTH, zorder=3, label="chaser")
         panel.plot(*path[0, plane], color=TRUTH, marker="s", markersize=4.5, label="start of the chaser", **_POINT)
-        if not scene.hill and plane[1] == 1:
-            panel.plot(0.0, 0.0, color=MEASURED, marker="*", markersize=8.0, label=_centre(scene), **_POINT)
+        if not report.hill and plane[1] == 1:
+            panel.plot(0.0, 0.0, color=MEASURED, marker="*", markersize=8.0, label=_centre(report), **_POINT)
             panel.set_aspect("equal", adjustable="datalim")
-        _mark_visits(panel, scene, visits[:, plane])
-        label_axes(panel, [f"{scene.axis_titles[axis]}, {unit}" for axis in plane])
+        _mark_visits(panel, report, visits[:, plane])
+        label_axes(panel, [f"{report.axis_titles[axis]}, {unit}" for axis in plane])
     letters(panels)
     legend_below(figure, 3)
     return figure
 
 
-def _centre(scene: Scene) -> str:
-    parameter = getattr(scene.tour, "gravitational_parameter_m3_s2", 0.0)
+def _centre(report: Report) -> str:
+    parameter = getattr(report.problem.tour, "gravitational_parameter_m3_s2", 0.0)
     return "Sun" if abs(parameter / _SUN_M3_S2 - 1.0) < 0.01 else "centre of gravity"
 
 
-def _mark_visits(panel: Axes, scene: Scene, visits: Floats) -> None:
+def _mark_visits(panel: Axes, report: Report, visits: Floats) -> None:
     """Mark the visits, shape (n, 2), with their names."""
-    for name, visit, rendezvous in zip(scene.names, visits, scene.path.nodes.rendezvous, strict=True):
+    for name, visit, rendezvous in zip(report.names, visits, report.path.nodes.rendezvous, strict=True):
         panel.plot(*visit, marker="D" if rendezvous else "o", label="rendezvous" if rendezvous else "flyby", **_NODE)
         if len(visits) <= _MAX_NAMED:
             place: dict[str, Any] = {"xytext": (4.0, 4.0), "textcoords": "offset points", "path_effects": HALO}
@@ -91,14 +91,14 @@ def _mark_visits(panel: Axes, scene: Scene, visits: Floats) -> None:
 
 
 @style()
-def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
+def draw_control(report: Report) -> Figure:
     """Draw the components and the magnitude of the control against time, with the bound if there is one."""
-    control = scene.path.control(scene.times) * 1e3
-    figure, (above, below) = _over_time(scene)
-    for title, look, component in zip(scene.axis_titles, LINE_LOOKS, control.T, strict=False):
-        _line(above, scene, component, label=title, **look | {"marker": "none"})
-    _line(below, scene, np.linalg.norm(control, axis=1), color=INK, label="magnitude")
-    if bound_m_s2 is not None:
+    control = report.path.control(report.times) * 1e3
+    figure, (above, below) = _over_time(report)
+    for title, look, component in zip(report.axis_titles, LINE_LOOKS, control.T, strict=False):
+        _line(above, report, component, label=title, **look | {"marker": "none"})
+    _line(below, report, np.linalg.norm(control, axis=1), color=INK, label="magnitude")
+    if (bound_m_s2 := report.problem.max_control_m_s2) is not None:
         below.axhline(1e3 * bound_m_s2, label="bound of the control", **BOUND)
     above.set_ylabel("$u$, mm/s$^2$")
     below.set(ylabel="$|u|$, mm/s$^2$")
@@ -107,29 +107,29 @@ def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
     return figure
 
 
-def _over_time(scene: Scene) -> tuple[Figure, list[Axes]]:
+def _over_time(report: Report) -> tuple[Figure, list[Axes]]:
     """Return a figure of two panels over time, with the visits and the stays marked, and named above the first one."""
-    unit, per_s = scene.time_unit
+    unit, per_s = report.time_unit
     figure, grid = subplots(115.0, 2, 1, sharex=True)
-    arrive, leave = scene.path.nodes.arrive_s * per_s, scene.path.nodes.leave_s * per_s
+    arrive, leave = report.path.nodes.arrive_s * per_s, report.path.nodes.leave_s * per_s
     for panel in grid.flat:
         for time in arrive:
             panel.axvline(time, zorder=0, label="visit", **EVENT)
         for begin, end in zip(arrive[:-1], leave[:-1], strict=True):
             if end > begin:
                 panel.axvspan(begin, end, facecolor=SET_FILL, linewidth=0.0, zorder=0, label="stay")
-    if len(scene.order) <= _MAX_NAMED:
+    if len(report.best.order) <= _MAX_NAMED:
         named = grid[0, 0].secondary_xaxis("top")
-        named.set_xticks(arrive, [plain(name) for name in scene.names])
-    grid[0, 0].set_xlim(scene.tour.start_s * per_s, scene.end_s * per_s)
+        named.set_xticks(arrive, [plain(name) for name in report.names])
+    grid[0, 0].set_xlim(report.problem.tour.start_s * per_s, report.end_s * per_s)
     grid[1, 0].set_xlabel(f"time, {unit}")
     return figure, [*grid.flat]
 
 
-def _line(panel: Axes, scene: Scene, values: Floats, **look: Any) -> None:
+def _line(panel: Axes, report: Report, values: Floats, **look: Any) -> None:
     """Draw a line with breaks where the chaser arrives at a target or leaves it."""
-    _, per_s = scene.time_unit
-    arrive, leave = scene.path.nodes.arrive_s[:-1], scene.path.nodes.leave_s[:-1]
-    cuts = np.searchsorted(scene.times, np.sort(np.concatenate([arrive, leave[leave > arrive]])), side="left")
-    for time, value in zip(np.split(scene.times, cuts), np.split(values, cuts), strict=True):
+    _, per_s = report.time_unit
+    arrive, leave = report.path.nodes.arrive_s[:-1], report.path.nodes.leave_s[:-1]
+    cuts = np.searchsorted(report.times, np.sort(np.concatenate([arrive, leave[leave > arrive]])), side="left")
+    for time, value in zip(np.split(report.times, cuts), np.split(values, cuts), strict=True):
         panel.plot(time * per_s, value, **look)

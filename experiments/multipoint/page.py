@@ -13,16 +13,17 @@ MOMENTS = 401
 
 def multipoint_page(report: Report) -> str:
     """Return the page of a path that visits targets as HTML."""
-    scene, bound_m_s2 = report.scene, report.problem.max_control_m_s2
-    path, nodes = scene.path, scene.path.nodes
-    time_s = np.unique(np.concatenate([np.linspace(scene.tour.start_s, scene.end_s, MOMENTS), nodes.arrive_s]))
+    path, nodes, bound_m_s2 = report.path, report.path.nodes, report.problem.max_control_m_s2
+    time_s = np.unique(
+        np.concatenate([np.linspace(report.problem.tour.start_s, report.end_s, MOMENTS), nodes.arrive_s])
+    )
     positions, control = path.state(time_s)[:, :3], path.control(time_s)
     tracks = [Track("chaser", 0, positions)]
-    for visit, target in enumerate(scene.names):
-        until_s = nodes.leave_s[visit] if visit < len(scene.order) - 1 else scene.end_s
-        tracks.append(Track(target, 1 + visit, scene.target_path(visit, time_s[time_s <= until_s])))
+    for visit, target in enumerate(report.names):
+        until_s = nodes.leave_s[visit] if visit < len(report.best.order) - 1 else report.end_s
+        tracks.append(Track(target, 1 + visit, report.target_path(visit, time_s[time_s <= until_s])))
     marks = [Mark("" if visit else "visit", state[:3], "diamond") for visit, state in enumerate(path.arrival_states)]
-    hill, axes = scene.hill, scene.axis_titles
+    hill, axes = report.hill, report.axis_titles
     if not hill:
         marks.append(Mark("centre of attraction", np.zeros(3), "plus"))
     unit = length_unit(float(np.abs(positions).max()))
@@ -40,9 +41,9 @@ def multipoint_page(report: Report) -> str:
         Graph("Magnitude of the control", "|u|", control_unit, [Curve("|u|", 0, magnitude)], levels),
         Graph("Components of the control", "u", control_unit, components),
     ]
-    clock, per_s = scene.time_unit
+    clock, per_s = report.time_unit
     visits = ", ".join(
-        f"{target} at {time * per_s:.6g} {clock}" for target, time in zip(scene.names, nodes.arrive_s, strict=True)
+        f"{target} at {time * per_s:.6g} {clock}" for target, time in zip(report.names, nodes.arrive_s, strict=True)
     )
-    about = [f"cost I = {path.cost:.8g} m²/s³", f"order: {visits}", f"axes: {scene.axes_text}"]
+    about = [f"cost I = {path.cost:.8g} m²/s³", f"order: {visits}", f"axes: {report.axes_text}"]
     return motion_page(f"Visits {report.problem.name}", about, time_s, views, graphs)

@@ -15,24 +15,35 @@ from experiments.common.screen import Part, number_table
 from experiments.common.units import Unit, time_unit
 from experiments.multipoint.file import MultipointProblem
 from infoset.arrays import Floats
-from rendezvous.multipoint import BestOrder, Path, Tour, Visits
+from rendezvous.multipoint import BestOrder, Path, Tour
 
 _POINTS = 1601
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """A path with the targets, whose indices `order` has in the order of the visits; axes are Hill's or inertial."""
+class Report:
+    """Results of one command; `peak_m_s2` is the largest control. Axes are Hill's or inertial."""
 
-    hill: bool
-    tour: Visits
-    order: tuple[int, ...]
-    path: Path
+    problem: MultipointProblem
+    order_chosen: Literal["given", "best"]
+    times_chosen: Literal["given", "best"]
+    best: BestOrder
+    peak_m_s2: float
+
+    @property
+    def hill(self) -> bool:
+        """Whether the axes are those of Hill."""
+        return self.problem.orbit_rate_rad_s is not None
+
+    @property
+    def path(self) -> Path:
+        """The path of the chaser."""
+        return self.best.path
 
     @property
     def names(self) -> list[str]:
         """Return the names of the targets in the order of the visits."""
-        return [self.tour.targets[target].name for target in self.order]
+        return [self.problem.tour.targets[target].name for target in self.best.order]
 
     @property
     def axis_titles(self) -> tuple[str, str, str]:
@@ -52,32 +63,20 @@ class Scene:
     @property
     def time_unit(self) -> Unit:
         """Return the unit in which times are shown."""
-        return time_unit(self.end_s - self.tour.start_s)
+        return time_unit(self.end_s - self.problem.tour.start_s)
 
     @cached_property
     def times(self) -> Floats:
         """Return equally spaced times, and the times on both sides of each visit."""
         nodes = self.path.nodes
-        even = np.linspace(self.tour.start_s, self.end_s, _POINTS)
+        even = np.linspace(self.problem.tour.start_s, self.end_s, _POINTS)
         before = np.nextafter(nodes.arrive_s, -np.inf)
         return np.unique(np.concatenate([even, nodes.arrive_s, before, nodes.leave_s[:-1]]))
 
     def target_path(self, visit: int, times_s: Floats) -> Floats:
         """Return the positions of the target of a visit, shape (n, 3)."""
-        targets = np.full(len(times_s), self.order[visit])
-        return np.asarray(self.tour.target_states(targets, times_s)[:, :3])
-
-
-@dataclass(frozen=True, eq=False)
-class Report:
-    """Results of one command; `peak_m_s2` is the largest control."""
-
-    problem: MultipointProblem
-    order_chosen: Literal["given", "best"]
-    times_chosen: Literal["given", "best"]
-    scene: Scene
-    best: BestOrder
-    peak_m_s2: float
+        targets = np.full(len(times_s), self.best.order[visit])
+        return np.asarray(self.problem.tour.target_states(targets, times_s)[:, :3])
 
     @property
     def notes(self) -> list[str]:
@@ -92,17 +91,17 @@ class Report:
 
 def report_json(report: Report) -> dict[str, object]:
     """Return the results for `experiments.common.output.to_json`."""
-    path = report.scene.path
+    path = report.path
     return {
-        "units": f"m, s; axes: {report.scene.axes_text}",
+        "units": f"m, s; axes: {report.axes_text}",
         "order_chosen": report.order_chosen,
         "times_chosen": report.times_chosen,
         "cost_m2_s3": path.cost,
         "cost_with_price_m2_s3": report.best.objective,
-        "order": report.scene.names,
+        "order": report.names,
         "times_s": path.nodes.arrive_s,
         "time_gradient_m2_s4": path.time_gradient,
-        "nodes": [_node_json(report.scene, index) for index in range(len(report.scene.order))],
+        "nodes": [_node_json(report, index) for index in range(len(report.names))],
         "costate0": {"position_m_s3": path.costate_start[:3], "velocity_m_s2": path.costate_start[3:]},
         "peak_control_m_s2": report.peak_m_s2,
         "evaluations": report.best.evaluations,
@@ -112,11 +111,11 @@ def report_json(report: Report) -> dict[str, object]:
     }
 
 
-def _node_json(scene: Scene, index: int) -> dict[str, object]:
-    nodes, jump, state = scene.path.nodes, scene.path.jumps[index], scene.path.arrival_states[index]
+def _node_json(report: Report, index: int) -> dict[str, object]:
+    nodes, jump, state = report.path.nodes, report.path.jumps[index], report.path.arrival_states[index]
     rendezvous = bool(nodes.rendezvous[index])
     return {
-        "name": scene.names[index],
+        "name": report.names[index],
         "meet": "rendezvous" if rendezvous else "flyby",
         "position_m": state[:3],
         "velocity_m_s": state[3:],
@@ -129,30 +128,29 @@ def _node_json(scene: Scene, index: int) -> dict[str, object]:
 
 def trajectories(report: Report) -> str:
     """Return the trajectories of the chaser and of the targets, as CSV; only the chaser has a control."""
-    scene = report.scene
-    times, none = scene.times, np.full((len(scene.times), 3), np.nan)
+    times, none = report.times, np.full((len(report.times), 3), np.nan)
     tracks: list[tuple[list[str], list[Floats]]] = [
-        (["chaser"], [times, scene.path.state(times), scene.path.control(times)])
+        (["chaser"], [times, report.path.state(times), report.path.control(times)])
     ]
-    for index, target in enumerate(scene.tour.targets):
-        states = scene.tour.target_states(np.full(len(times), index), times)
+    for index, target in enumerate(report.problem.tour.targets):
+        states = report.problem.tour.target_states(np.full(len(times), index), times)
         tracks.append(([target.name], [times, states, none]))
     return trajectories_csv(["craft"], tracks)
 
 
 def report_lines(report: Report) -> Iterator[Part]:
     """Yield the cost, the visits and the extent of the search, for the screen."""
-    path, nodes = report.scene.path, report.scene.path.nodes
+    path, nodes = report.path, report.path.nodes
     yield f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"
-    yield f"axes: {report.scene.axes_text}"
+    yield f"axes: {report.axes_text}"
     if report.best.objective > path.cost:
         yield f"cost including the price of time = {report.best.objective:.8g} m^2/s^3"
-    unit, per_s = report.scene.time_unit
+    unit, per_s = report.time_unit
     table = number_table(
         "target", "meet", f"time\n{unit}", "relative speed\nm/s", "dI/dt\nm^2/s^4", "costate jump\nm/s^3", left=2
     )
     relative = np.linalg.norm(path.arrival_states[:, 3:] - nodes.arrive[:, 3:], axis=1)
-    for index, name in enumerate(report.scene.names):
+    for index, name in enumerate(report.names):
         rendezvous = bool(nodes.rendezvous[index])
         table.add_row(
             name,

@@ -12,7 +12,7 @@ from experiments.common.screen import BeginProgress
 from experiments.multipoint.command import Multipoint
 from experiments.multipoint.file import MultipointProblem
 from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.report import Report, Scene, report_json, report_lines, trajectories
+from experiments.multipoint.report import Report, report_json, report_lines, trajectories
 from rendezvous.multipoint import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
 from rendezvous.piecewise import max_control
 
@@ -34,8 +34,7 @@ def solve(problem: MultipointProblem, options: Multipoint, begin: BeginProgress)
             f"{problem.name}: max_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
             f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
         )
-    scene = Scene(problem.orbit_rate_rad_s is not None, problem.tour, best.order, best.path)
-    return Report(problem, options.order, times, scene, best, peak)
+    return Report(problem, options.order, times, best, peak)
 
 
 def _best(

@@ -87,10 +87,9 @@ def test_html_in_names_is_text(open_page: Open, reports: dict[str, Any], name: s
         costs = (replace(first, craft=replace(first.craft, name=HOSTILE)), *others)
         worse = replace(worse, solution=replace(report.solution, costs=costs))
     if name == "multipoint":
-        tour = report.scene.tour
-        first, *others = tour.targets
+        first, *others = problem.target
         targets = (replace(first, name=f"{HOSTILE}{CLOSING}"), *others)
-        worse = replace(worse, scene=replace(report.scene, tour=replace(tour, targets=targets)))
+        worse = replace(worse, problem=replace(problem, target=targets))
     html = OPTIONS[name][0].to_html(worse)
     assert HOSTILE not in html
     assert CLOSING not in html
@@ -158,7 +157,7 @@ def test_hover_in_a_pursuit_shows_its_numbers(open_page: Open, pages: dict[str, 
 
 def test_visits_end_at_their_targets(open_page: Open, pages: dict[str, str], reports: dict[str, Any]) -> None:
     opened = open_page(pages["multipoint"])
-    path = reports["multipoint"].scene.path
+    path = reports["multipoint"].path
     for time_s, state in zip(path.nodes.arrive_s.tolist(), path.arrival_states, strict=True):
         opened.page.evaluate(f"player.show(nearest(DATA.time_s, {time_s!r}))")
         assert opened.shown_at() == f"t = {time_s:g}\xa0s"
