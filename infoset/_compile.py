@@ -31,5 +31,5 @@ def constants(number: int) -> tuple[int, ...]:
 
 (ZERO,) = constants(1)
 """Start of a count that is passed from kernel to kernel."""
-FALSE = cast(bool, np.bool_(False))
-"""The same for a flag."""
+FALSE, TRUE = cast(bool, np.bool_(False)), cast(bool, np.bool_(True))
+"""The same for flags."""

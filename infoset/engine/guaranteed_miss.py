@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import ZERO, allocation_free, entry, inlined
+from infoset._compile import TRUE, ZERO, allocation_free, entry, inlined
 from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.concave_bounds import bound_between
@@ -353,6 +353,9 @@ def bound_all(leaving: Leaving, past: Past, outlines: Outlines, pieces: Records,
                 piece = pieces[count]
                 piece.near, piece.far, piece.step, piece.bound = leaving.near[w, b], leaving.far[w, b], w, np.inf
                 count += 1
+                if past.errors is not None and leaving.known[w, b] > 0.0:
+                    # The measurements that cut this label are those that the windows apply at first.
+                    run(leaving.known[w, b], past)
         while count > 0:
             worst = 0
             for i in range(count):
@@ -368,7 +371,7 @@ def bound_all(leaving: Leaving, past: Past, outlines: Outlines, pieces: Records,
             count -= 1
             pieces[worst] = pieces[count]
             until = EventLog(log.kinds, log.values, log.applies, leaving.events[step], leaving.elapsed[step])
-            window = Past(until, past.errors, past.laws, past.room, near, far)
+            window = Past(until, past.errors, past.laws, past.room, near, far, TRUE)
             living = living_part(leaving.known[step, b], window)
             if living.exists:
                 replayed = replay_labels(living, window, outlines)

@@ -42,6 +42,8 @@ FIRST, MIDDLE, LAST = constants(3)
 LABEL_RESOLUTION = 1e-13
 """Accuracy of the ends of the living labels, relative to the labels: some 500 ulp, so that probes differ; 1 um of range
 in the scenario of 1997."""
+COARSE = 1.0 / 64.0
+"""Accuracy of an end in a window for Phi, relative to the living labels there: bounds hold up to the dead label."""
 NARROWEST = 1e-15
 """Width of an interval of living labels that the search may miss, relative to the labels: 5 to 9 ulp. The slack of the
 cuts makes the labels next to that of a true state live over a wider interval."""
@@ -82,10 +84,11 @@ def locate_end(
     weight_dead = overlap
     weight_living = past.room.living_overlaps[emptied, died]
     side = 0
-    before = 0.0
+    before, first = 0.0, living
     for probes in range(MAX_PROBES):
         width = abs(living - end)
-        if width <= resolution:
+        coarse = past.errors is not None and past.thinned
+        if width <= resolution or (coarse and width <= COARSE * abs(living - first)):
             break
         slow = probes % 4 == 3 and width > 0.125 * before
         if probes % 4 == 0:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from infoset._compile import ZERO, allocation_free, constants, entry, inlined, pasted
+from infoset._compile import FALSE, ZERO, allocation_free, constants, entry, inlined, pasted
 from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.chain_storage import Chains, copy_section, empty_sections, view_of, working_room
@@ -26,11 +26,14 @@ from infoset.engine.section_life import (
 )
 from infoset.engine.section_window import (
     Rate,
+    apply_stretch,
     half_time,
     measure_in_window,
     measure_rate_section,
     middle_of,
+    new_stretch,
     new_window,
+    stretch_after,
     window_after,
 )
 
@@ -72,6 +75,8 @@ class Workspace(NamedTuple):
         With rates: `turned` and the room of (13), m/s and m, of the window of the last replay that lived.
     points : ndarray, shape (n, 2)
         Vertices of a section.
+    cuts : ndarray of bool, shape (E,)
+        With rates, the measurements that have cut the section of a single label, in replays of all events.
     known : recarray of PROBED, shape (K,)
         Replayed labels.
     four : recarray of PROBED, shape (4,)
@@ -89,6 +94,7 @@ class Workspace(NamedTuple):
     living_overlaps: Floats
     drifts: Floats
     points: Floats
+    cuts: Flags
     known: Records
     four: Records
     latest: Floats
@@ -111,6 +117,8 @@ class Past(NamedTuple):
     nearest, farthest : float
         With rates, the window of labels, m, on which sections are convex. The empty window, from infinity to minus
         infinity, makes the window of each label the label itself.
+    thinned : bool
+        With rates, whether replays leave out the measurements that have not cut the section of a label so far.
     """
 
     log: EventLog
@@ -119,6 +127,7 @@ class Past(NamedTuple):
     room: Workspace
     nearest: float
     farthest: float
+    thinned: bool
 
 
 def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
@@ -132,12 +141,13 @@ def past_of(history: History, laws: Laws, slots: int = 1) -> Past:
         living_overlaps=np.empty((channels, events)),
         drifts=np.zeros((channels, 2)),
         points=working_room(),
+        cuts=np.zeros(events, dtype=bool),
         known=np.recarray(slots + 2, PROBED),
         four=np.recarray(4, PROBED),
         latest=np.empty((2, 4)),
         windows=np.recarray(MAX_HALVED_WINDOWS + 2, WINDOW),
     )
-    return Past(history.log, history.errors_if_any, laws, room, np.inf, -np.inf)
+    return Past(history.log, history.errors_if_any, laws, room, np.inf, -np.inf, FALSE)
 
 
 @allocation_free
@@ -145,15 +155,15 @@ def select(past: Past, b: int) -> None:
     """Copy the events of an engagement to the contiguous arrays that replays read."""
     log, values, applies = past.log, past.room.values, past.room.applies
     for event in range(log.number):
-        applies[event] = log.applies[event, b]
+        applies[event], past.room.cuts[event] = log.applies[event, b], log.kinds[event] == WIDENING
         for channel in range(values.shape[0]):
             values[channel, event] = log.values[event, channel, b]
 
 
 @allocation_free
 def with_window(past: Past, nearest: float, farthest: float) -> Past:
-    """Return a history with another window of labels."""
-    return Past(past.log, past.errors, past.laws, past.room, nearest, farthest)
+    """Return a history with another window of labels, whose replays leave out no measurement."""
+    return Past(past.log, past.errors, past.laws, past.room, nearest, farthest, FALSE)
 
 
 @inlined
@@ -195,19 +205,28 @@ def replay(
     of it, only if an argument is None.
     """
     kinds, applies, points = past.log.kinds, past.room.applies, past.room.points
-    values, overlaps = past.room.values, past.room.overlaps[law.channel]
+    values, overlaps, cuts = past.room.values, past.room.overlaps[law.channel], past.room.cuts
     own = values[law.channel]
     first, elapsed, sight = done
     middle, room = label, 0.0
     if errors is not None:
         window = new_window(min(label, past.nearest), max(label, past.farthest), law)
+        stretch = new_stretch(elapsed)
         middle, room = middle_of(window), window.fastest * half_time(window, law)
     section = replayed_section(past, law.channel, PROBE, middle)
     if first == 0:
         start_section(section, room, law)
     for event in range(first, until):
         across = across_of(values, event, law)
-        if kinds[event] == PREDICTION:
+        if errors is not None and past.thinned and applies[event] and cuts[event]:
+            apply_stretch(section, stretch, elapsed, law, points)
+            stretch = new_stretch(elapsed)
+        if errors is not None and past.thinned and not cuts[event]:
+            elapsed += kinds[event] == PREDICTION
+            if not applies[event]:
+                continue
+            stretch = stretch_after(stretch, kinds[event], own[event], across, window.fastest, elapsed, law)
+        elif kinds[event] == PREDICTION:
             if chains.is_crowded(section):
                 chains.reduce_outward(section, time_to_go(middle, elapsed, law), points)
             elapsed += 1
@@ -219,7 +238,9 @@ def replay(
                 living, overlaps[event] = measure_section(section, elapsed, own[event], across, law)
             else:
                 angles = own[event], across
+                lowest, highest = chains.heights(section, time_to_go(middle, elapsed, law))
                 living, overlaps[event] = measure_in_window(section, label, elapsed, angles, window, law)
+                cuts[event] |= overlaps[event] < highest - lowest
             if not living:
                 return event, done
         elif kinds[event] == IMPULSE:
@@ -228,13 +249,17 @@ def replay(
             widen_section(section, elapsed, law)
         elif errors is not None:
             rate = Rate(own[event], errors[event], sight)
+            highest, lowest = chains.max_and_min_miss(section, time_to_go(middle, elapsed, law))
             living, overlaps[event] = measure_rate_section(section, label, elapsed, rate, window, law, points)
+            cuts[event] |= overlaps[event] < highest - lowest
             if not living:
                 return event, done
         if errors is not None:
             sight = sight_after(sight, kinds[event], own[event], across, applies[event], law)
             window = window_after(window, kinds[event], own[event], across, errors[event], elapsed, law)
     if errors is not None:
+        if past.thinned:
+            apply_stretch(section, stretch, elapsed, law, points)
         past.room.drifts[law.channel, 0] = window.turned
         past.room.drifts[law.channel, 1] = window.loose * half_time(window, law)
     return ALIVE, Replayed(until, elapsed, sight)

@@ -17,7 +17,7 @@ from infoset.engine import chains
 from infoset.engine.chains import SectionView
 from infoset.engine.history import IMPULSE, PREDICTION, RATE, LastSight
 from infoset.engine.section_law import SectionLaw
-from infoset.engine.section_life import CUT_SLACK, impulse_doubt, range_of, slope_band, time_to_go
+from infoset.engine.section_life import CUT_SLACK, SUM_SLACK, impulse_doubt, range_of, slope_band, time_to_go
 
 
 class Window(NamedTuple):
@@ -42,6 +42,26 @@ class Window(NamedTuple):
     loose: float
     fastest: float
     most: float
+
+
+class Stretch(NamedTuple):
+    """Events without a cut, from step `began` on, which are applied at once; times are those since the beginning.
+
+    Parameters
+    ----------
+    began : int
+        Step of the last cut.
+    bounds, moments : float
+        Sum of the bounds of changes of V, m/s, and of bound times time, m.
+    turned, impulses : float
+        Sum of the impulses, m/s, and of impulse times time, m.
+    """
+
+    began: int
+    bounds: float
+    moments: float
+    turned: float
+    impulses: float
 
 
 class Rate(NamedTuple):
@@ -95,6 +115,46 @@ def window_after(
         widest = 1.0 + steepest * steepest if law.exact_angles else 1.0
         most = min(most, (abs(value) + error) * widest * range_of(far, elapsed, law) * tau)
     return Window(near, far, turned, loose, fastest, most)
+
+
+@inlined
+def new_stretch(began: int) -> Stretch:
+    """Return a stretch without events."""
+    return Stretch(began, 0.0, 0.0, 0.0, 0.0)
+
+
+@inlined
+def stretch_after(
+    stretch: Stretch, kind: int, value: float, across: float, fastest: float, elapsed: int, law: SectionLaw
+) -> Stretch:
+    """Return a stretch after one more event that applies; `fastest` is that of `Window`."""
+    began, bounds, moments, turned, impulses = stretch
+    time, bound = law.step * (elapsed - began), 0.0
+    if kind == PREDICTION:
+        bound = law.half_v + SUM_SLACK * fastest
+    elif kind == IMPULSE:
+        bound = impulse_doubt(value, across, law)
+        turned += value
+        impulses += value * time
+    return Stretch(began, bounds + bound, moments + bound * time, turned, impulses)
+
+
+@allocation_free
+def apply_stretch(section: SectionView, stretch: Stretch, elapsed: int, law: SectionLaw, points: Floats) -> None:
+    """Move a section over a stretch to step `elapsed`: impulses at once, and the bounds of changes of V at both ends.
+
+    By Lemma 9a, two segments along the levels of both ends contain those of all changes of V between them.
+    """
+    before, now = time_to_go(section.label, stretch.began, law), time_to_go(section.label, elapsed, law)
+    late = stretch.moments / (before - now) if elapsed > stretch.began else stretch.bounds
+    if chains.is_crowded(section):
+        chains.reduce_outward(section, before, points)
+    chains.spread(section, before, max(stretch.bounds - late, 0.0))
+    chains.shift(section, before, -stretch.turned)
+    for chain in (section.right, section.left):
+        chains.move(chain, 0.0, stretch.impulses)
+    chains.turn(section, now)
+    chains.spread(section, now, late)
 
 
 @inlined
