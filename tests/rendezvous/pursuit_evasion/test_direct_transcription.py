@@ -74,7 +74,7 @@ def test_no_steering_captures_the_fixed_path_earlier(seed: int, solved: Solution
         constraints={"type": "eq", "fun": lambda unknown: gaps(unknown[None])[0], "jac": slopes},
         bounds=[(-3.0, 3.0)] * (size - 1) + [(1.0, 6.0)],
         method="SLSQP",
-        options={"maxiter": 200, "ftol": 1e-12},
+        options={"maxiter": 400, "ftol": 1e-12},
     )
     assert np.abs(gaps(found.x[None])).max() * units.length_m < 1.0
     capture_s = float(found.x[-1]) * units.time_s
