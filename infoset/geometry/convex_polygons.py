@@ -235,29 +235,26 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
     def support_function(self, direction: ArrayLike) -> Floats:
         """Return max(direction . p), shape (...); -inf for the empty set. O(n); rounded as one scalar product."""
-        one, directions = self._and_vectors("direction", direction)
-        return one._measure(kernels.support, directions)[..., 0]
+        return self._measure_at(kernels.support, "direction", direction)[..., 0]
 
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a direction, shape (..., 2). O(n)."""
-        one, directions = self._and_vectors("direction", direction)
-        return one._known(one._measure(kernels.support, directions)[..., 1:], "support vector")
+        return self._known(self._measure_at(kernels.support, "direction", direction)[..., 1:], "support vector")
 
     def margin(self, point: ArrayLike) -> Floats:
         """Return the signed distance of a point, shape (2,) or (..., 2), from the boundary, positive inside.
 
         -inf for the empty set. O(n), within rounding of the coordinates.
         """
-        one, points = self._and_vectors("point", point)
-        return one._measure(kernels.margin, points)[..., 0]
+        return self._measure_at(kernels.margin, "point", point)[..., 0]
 
     def contains(self, point: ArrayLike, tolerance: float = 0.0) -> Flags:
         """Return whether a point, shape (2,) or (..., 2), is inside, on the boundary, or within a distance of the set.
 
         O(n). Exact for a tolerance of 0: rounding does not affect the answer.
         """
-        one, points = self._and_vectors("point", point)
-        return np.asarray(one._measure(kernels.nearest, points)[..., 2] <= not_negative("tolerance", tolerance))
+        distance = self._measure_at(kernels.nearest, "point", point)[..., 2]
+        return np.asarray(distance <= not_negative("tolerance", tolerance))
 
     def is_subset(self, other: ConvexPolygons, tolerance: float = 0.0) -> Flags:
         """Return whether all points of the set are in the other one, or within a distance of it, shape (...).
@@ -318,8 +315,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
     def closest_point(self, point: ArrayLike) -> Floats:
         """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside. O(n), rounded."""
-        one, points = self._and_vectors("point", point)
-        return one._known(one._measure(kernels.nearest, points)[..., :2], "closest point")
+        return self._known(self._measure_at(kernels.nearest, "point", point)[..., :2], "closest point")
 
     def hausdorff_distance(self, other: ConvexPolygons) -> Floats:
         """Return the Hausdorff distance, shape (...); inf between an empty and a nonempty set. O(n m), rounded."""

@@ -286,11 +286,11 @@ class PolygonArrays:
         shape = empty.shape + (1,) * (values.ndim - empty.ndim)
         return np.ma.masked_array(values, np.broadcast_to(empty.reshape(shape), values.shape))
 
-    def _and_vectors(self, name: str, value: ArrayLike) -> tuple[Self, Floats]:
-        """Return the polygons and a vector for each; a single polygon is broadcast to the batch of the vectors."""
+    def _measure_at(self, kernel: Callable[..., None], name: str, value: ArrayLike) -> Floats:
+        """Apply a kernel that measures at a vector for each polygon; a single polygon is measured at all vectors."""
         values = real_values(name, value)
         one = self if self.shape else self.broadcast_to(values.shape[:-1])
-        return one, one._each(name, values, 2)
+        return one._measure(kernel, one._each(name, values, 2))
 
     def _each(self, name: str, value: ArrayLike, *last: int) -> Floats:
         """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`.
