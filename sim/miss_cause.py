@@ -50,12 +50,12 @@ class DecisionLog:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._decisions: list[tuple[int, Flags, Floats, PredictedMiss]] = []
+        self._decisions: list[tuple[int, Flags, Floats, Floats]] = []
         self._executed: list[Floats] = []
 
     def decide(self, step: int, tracking: Flags, budget_left_m_s: Floats, miss: PredictedMiss) -> None:
         """Record a step in which impulses can be decided, before the decision."""
-        self._decisions.append((step, tracking, budget_left_m_s, miss))
+        self._decisions.append((step, tracking, budget_left_m_s, np.stack([miss.lower_m, miss.upper_m])))
 
     def execute(self, impulse_m_s: Floats) -> None:
         """Record the executed impulses of a step, shape (C, B)."""
@@ -69,54 +69,49 @@ class DecisionLog:
         """
         thruster = self._scenario.thruster
         steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + thruster.delay_steps
+        tracking = _rows([flags for _, flags, *_ in self._decisions], arrival_s.shape) > 0.0
+        budget_m_s = _rows([left for _, _, left, _ in self._decisions], arrival_s.shape)
+        ends_m = _with_end(_rows([ends for *_, ends in self._decisions], (2, *lateral_miss_m.shape)))
         times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
         executed = _with_end(_rows(self._executed, lateral_miss_m.shape))
         changes = executed[np.minimum(steps, len(executed) - 1)]
         changes *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
         miss = _with_end(np.cumsum(changes[::-1], axis=0)[::-1]) + lateral_miss_m
-        tracking = _rows([flags for _, flags, *_ in self._decisions], arrival_s.shape) > 0.0
         causes, last = np.full(len(missed), None, dtype=object), _last(tracking)
         if missed.any():
-            causes[missed] = self._causes(miss[..., missed], times_s, arrival_s[missed], tracking[:, missed], missed)
-        lower, upper = self._possible(last, np.arange(len(missed)))
+            flights = (each[..., missed] for each in (miss, tracking, budget_m_s, ends_m))
+            causes[missed] = self._causes(*flights, times_s, arrival_s[missed])
+        lower_m, upper_m = _chosen(ends_m, last)
         return {
             "causes": tuple(causes),
             "unguided_miss_m": modulus(miss[0]),
             "engine_corrects_m": max_correctable_m(times_s, thruster, arrival_s),
             "budget_corrects_m": max_correctable_m(times_s, thruster, arrival_s, budget=thruster.budget_m_s),
-            "last_possible_m": np.ma.MaskedArray(modulus(0.5 * (upper - lower)), mask=last < 0),
+            "last_possible_m": np.ma.MaskedArray(modulus(0.5 * (upper_m - lower_m)), mask=last < 0),
         }
 
-    def _possible(self, rows: Integers, runs: Integers) -> tuple[Floats, Floats]:
-        """Return the ends of the possible misses of runs, shape (C, n), at a decision of each; zeros without one."""
-        ends = np.zeros((2, len(self._scenario.set_model.axes), len(runs)))
-        for index, (row, run) in enumerate(zip(rows.tolist(), runs.tolist(), strict=True)):
-            if row >= 0:
-                miss = self._decisions[row][-1]
-                ends[:, :, index] = miss.lower_m[:, run], miss.upper_m[:, run]
-        return ends[0], ends[1]
-
     def _causes(
-        self, miss: Floats, times_s: Floats, arrival_s: Floats, tracking: Flags, missed: Flags
+        self, miss: Floats, tracking: Flags, budget_m_s: Floats, ends_m: Floats, times_s: Floats, arrival_s: Floats
     ) -> list[MissCause]:
-        """Return the causes of misses; `miss` has the shape (K + 1, C, n), its last row is that of the flight.
+        """Return the causes of n misses.
 
-        The modulus of `miss` less the authority does not decrease: an impulse changes both by at most its own share.
+        `miss`, shape (K + 1, C, n), has the misses without the impulses from each decision on, and at last that of the
+        flight; its modulus less the authority does not decrease: an impulse changes both by at most its own share.
+        `ends_m`, shape (K + 1, 2, C, n), are the ends of the possible misses at the decisions.
         """
-        runs, radius_m, at = np.flatnonzero(missed), self._scenario.radius_m or 0.0, np.arange(miss.shape[2])
-        budget = _rows([left for _, _, left, _ in self._decisions], missed.shape)[:, missed]
+        radius_m, at = self._scenario.radius_m or 0.0, np.arange(miss.shape[2])
         sizes, decisions = modulus(miss.swapaxes(0, 1)), np.arange(len(times_s))[:, None]
         corrects_m = partial(max_correctable_m, times_s, self._scenario.thruster, arrival_s)
-        possible = tracking & (sizes[:-1] - corrects_m(decisions, budget) <= radius_m)
+        possible = tracking & (sizes[:-1] - corrects_m(decisions, budget_m_s) <= radius_m)
         critical, last, exists = _last(possible), _last(tracking), possible.any(axis=0)
         then = np.minimum(critical + 1, len(times_s))
         now_m, then_m = corrects_m(critical), corrects_m(then)
-        ends = [self._possible(rows, runs) for rows in (critical, last)]
-        farthest_m = modulus(np.maximum(ends[0][1], -ends[0][0]))
+        lower_m, upper_m = _chosen(ends_m, critical)
+        farthest_m = modulus(np.maximum(upper_m, -lower_m))
         # More than the half-width of the possible misses if they exclude the true one.
         unknown_m, unknown_at_last_m = (
             np.maximum(modulus(0.5 * (upper - lower)), modulus(miss[rows, :, at].T - 0.5 * (lower + upper)))
-            for rows, (lower, upper) in zip((critical, last), ends, strict=True)
+            for rows, (lower, upper) in ((rows, _chosen(ends_m, rows)) for rows in (critical, last))
         )
         # What the impulse that is best for all possible misses leaves beyond the later ones.
         beyond_m = np.maximum(unknown_m - np.where(critical < last, then_m, 0.0), farthest_m - now_m)
@@ -163,6 +158,11 @@ def _rows(values: Sequence[Floats] | Sequence[Flags], shape: tuple[int, ...]) ->
 def _with_end(rows: Floats) -> Floats:
     """Return rows with one more of zeros: after the last decision."""
     return np.append(rows, np.zeros((1, *rows.shape[1:])), axis=0)
+
+
+def _chosen(rows: Floats, chosen: Integers) -> Floats:
+    """Return one row for each of n flights, shape (2, C, n), from rows of shape (K + 1, 2, C, n); -1 is the last."""
+    return np.moveaxis(rows[chosen, :, :, np.arange(len(chosen))], 0, -1)
 
 
 def _last(flags: Flags) -> Integers:

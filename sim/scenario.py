@@ -328,16 +328,21 @@ def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
     return f"{type(own).__module__}.{type(own).__qualname__}"
 
 
+def need_scenario(scenario: object) -> None:
+    """Raise TypeError, with the functions that take a name, if an argument is no scenario."""
+    if not isinstance(scenario, Scenario):
+        raise TypeError(
+            f"scenario must be a Scenario: got {shown(scenario)}; experiments.simulate and the other functions of "
+            "experiments take names and files, and experiments.load_scenario reads them"
+        )
+
+
 def with_strategy(scenario: Scenario, strategy: Strategy | str | None) -> tuple[Scenario, Strategy | None]:
     """Return the scenario with a strategy if it is a registered name, and the strategy if it is an object.
 
     TypeError if the scenario is none.
     """
-    if not isinstance(scenario, Scenario):
-        raise TypeError(
-            f"scenario must be a Scenario: got {shown(scenario)}; experiments.simulate takes names and files, and "
-            "experiments.load_scenario reads them"
-        )
+    need_scenario(scenario)
     if isinstance(strategy, str):
         return replace(scenario, strategy=strategy), None
     return scenario, strategy

@@ -10,7 +10,7 @@ import numpy as np
 
 from infoset.arrays import Floats
 from sim.bound.pair_of_motions import UNLIMITED, Approach, TruthPair
-from sim.scenario import Scenario
+from sim.scenario import Scenario, need_scenario
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
 """The bound oscillates with the label; the period is the distance travelled between two measurements."""
@@ -71,6 +71,8 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
 
     Raises
     ------
+    TypeError
+        If `scenario` is no `Scenario`.
     BoundError
         If a linear program is not solved.
 
@@ -100,6 +102,7 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     both axes, each by the most that its program allows: |(dy(T), dz(T))| replaces |dz(T)|, so the bound is never below
     that of one axis.
     """
+    need_scenario(scenario)
     model = scenario.set_model
     slow, fast = max(model.bounds.vx_m_s), min(model.bounds.vx_m_s)
     speeds = sorted({fast, min(max(-model.closing_speed_m_s, fast), slow), slow})

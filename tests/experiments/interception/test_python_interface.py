@@ -48,7 +48,7 @@ def test_the_search_and_the_bound_take_names(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_name_given_to_sim_says_which_functions_take_names() -> None:
     name: Any = NAME
-    for function in (sim.simulate, sim.fly_one, sim.find_worst):
+    for function in (sim.simulate, sim.fly_one, sim.find_worst, sim.lower_bound):
         with pytest.raises(TypeError, match=r"got 'asteroid-1997-single'; experiments\.simulate .*load_scenario"):
             function(name)
 
