@@ -21,18 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.interception.scenario_file import load_scenario
-from guidance import TieRule, make_strategy
-from guidance.scripted_noise import ScriptedNoise
+from guidance import make_strategy
 from infoset import InformationSet, InitialSet, Model, RateSensor
 from infoset.engine.section_law import section_laws
-from sim import Scenario
+from sim import Results, Scenario
 from sim.adversary import Objective, _Search
-from sim.draws import Draws
 from sim.engagement import Engagements, Step
 from sim.gravity import on_board_model
-from sim.planned_flights import Flown, Plans, by_axis
 from sim.scenario import of_model
-from sim.target import GivenTarget
 
 Floats = NDArray[np.float64]
 LABELS = 200
@@ -42,40 +38,11 @@ SHOWN = 6
 class PhiSearch(_Search):
     """The search of `infoset adversary` with Phi in place of the miss."""
 
-    def engagements(self, flown: Flown) -> Engagements:
-        """Return the flights again, at t = 0, with Phi."""
-        plans, draws = flown.plans, self._draws
-        size = len(plans)
-        position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
-        drawn = draws.execution, draws.target, draws.pointing, draws.images
-        repeated = (None if each is None else np.repeat(each, size, axis=-2) for each in drawn)
-        execution, target, pointing, images = repeated
-        tie = np.repeat(draws.tie, size, axis=-2)
-        errors = {
-            name: by_axis(flown.errors[:, row], self.scenario.sensors.get(name))
-            for row, name in enumerate(self._space.names)
-        }
-        accelerations = by_axis(flown.accelerations_m_s2) if self._space.has_accelerations else None
-        return Engagements(
-            self.scenario,
-            Draws(position_m, velocity_m_s, {}, tie, execution, target, pointing, images=images),
-            self._strategy,
-            noise=ScriptedNoise(errors),
-            target=None if accelerations is None else GivenTarget(accelerations),
-        )
+    guarantee = True
 
-    def _fly(self, plans: Plans, tie: TieRule | None) -> Flown:
-        flown = super()._fly(plans, tie)
-        flight = self.engagements(flown)
-        while flight.flying:
-            flight.advance()
-        phi_m = flight.results(np.arange(len(plans))).guaranteed_miss_m
-        return replace(flown, value=np.where(np.isfinite(flown.value), phi_m.filled(-np.inf), -np.inf))
-
-    def best(self, number: int) -> list[Flown]:
-        """Return the flights with the maximum Phi found."""
-        assert self._elite is not None
-        return [self._elite.take(np.array([index])) for index in range(min(number, len(self._elite.value)))]
+    def value_m(self, flight: Engagements, results: Results) -> Floats:
+        """Return Phi, m."""
+        return results.guaranteed_miss_m.filled(-np.inf)
 
 
 class Watched:
@@ -142,8 +109,9 @@ def great_flights(scenario: Scenario, budget: int, seed: int, shown: int) -> Ite
     search = PhiSearch(scenario, make_strategy(scenario.strategy), Objective.FIXED_TRUTH, seed, keep_set=True)
     with ThreadPoolExecutor(1) as pool:
         search.run(budget, pool, None)
-    for flown in search.best(shown):
-        flight, watched = search.engagements(flown), Watched()
+    assert search.elite is not None
+    for index in range(min(shown, len(search.elite))):
+        flight, watched = search.engagements(search.elite.take(slice(index, index + 1))), Watched()
         while flight.flying:
             flight.advance(watched.observe)
         results = flight.results(np.arange(1))

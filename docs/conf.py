@@ -75,7 +75,6 @@ nitpick_ignore = [
         "rendezvous.multipoint.segments": ("LinearPath",),
         "sim.covariance": ("Covariance",),
         "sim.engagement": ("Step",),
-        "sim.target": ("GivenTarget", "TargetMotion"),
         "rendezvous.pursuit_evasion._pair": ("Node",),
         "rendezvous.pursuit_evasion.paths": ("SteeredPath",),
         "rendezvous.reachability.sets": ("ExactSets", "LiftedSets"),

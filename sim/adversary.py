@@ -5,28 +5,29 @@ A simulated miss is a lower bound of what the strategy can guarantee. It does no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import functools
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 
-from guidance import Strategy, TieRule, make_strategy
-from guidance.scripted_noise import ScriptedNoise
-from infoset import StateBox
+from guidance import GameNoise, LineOfSight, MeasurementNoise, Strategy, make_strategy
+from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
+from infoset import InformationSetView, StateBox
 from infoset.arrays import Floats
 from infoset.limits import COUNT, WHOLE
+from infoset.sensors import Measurements, Sensor
+from sim.adversary_plans import ANGLE, Game, Planner, Plans, by_axis
 from sim.closed_form import worst_shift_m
-from sim.draws import Draws, draw
+from sim.draws import draw
 from sim.engagement import Engagements
-from sim.first_plans import FirstPlans
-from sim.plan_changes import PlanChanges
-from sim.planned_flights import Flown, PlannedNoise, PlannedTarget, Plans, PlanSpace, by_axis
 from sim.record import Record, fly_one
-from sim.results import Outcome
+from sim.results import Results
 from sim.scenario import Scenario, with_strategy
-from sim.target import GivenTarget, constant_side
+from sim.target import constant_side
 
 WORST_FOUND = "worst-found"
 """Name of the noise with the errors that a search found, in records."""
@@ -74,16 +75,11 @@ class WorstEngagement:
         What the search maximised.
     any_state_miss_m : float
         Maximum miss of a state that the set contained when control ended for its label, m.
-    miss_m : float
-        Miss of the simulated true state, m.
-    truth_kept : bool
-        Whether the true state was inside its section after every measurement.
-    position_m, velocity_m_s : ndarray, shape (2,) or (3,)
-        Start: (z, x) and (V_z, V_x); (y, z, x) and (V_y, V_z, V_x) in space.
-    errors : mapping of str to ndarray, shape (C, steps), for ranges (steps,)
-        Measurement errors by sensor in units of their bounds, zero where nothing was measured. `ScriptedNoise` with
-        these errors repeats the engagement, bit for bit.
-    accelerations_m_s2 : ndarray, shape (C, steps), or None
+    result : Results
+        Results of the engagement, a batch of one.
+    noise : ScriptedNoise
+        Measurement errors, which repeat the engagement bit for bit.
+    accelerations_m_s2 : ndarray, shape (C, 1, steps), or None
         Accelerations of the target, m/s^2. None if the target is that of the scenario.
     max_acceleration_m_s2 : mapping of str to float
         Maximum acceleration of the searched targets by lateral axis, m/s^2; empty if the target is that of the
@@ -92,8 +88,6 @@ class WorstEngagement:
         Kind of the first plan from which the engagement was derived.
     sets_emptied : int
         Number of simulated engagements whose set became empty. If it is zero, `keep_set` makes no difference.
-    lateral_miss_m : mapping of str to float
-        Position at the closest approach by lateral axis, m.
     history : tuple of (int, float)
         Evaluations and maximum value so far, m, at each increase.
     """
@@ -103,39 +97,29 @@ class WorstEngagement:
     strategy: str
     objective: Objective
     any_state_miss_m: float
-    miss_m: float
-    outcome: Outcome
-    truth_kept: bool
-    position_m: Floats
-    velocity_m_s: Floats
-    errors: Mapping[str, Floats]
+    result: Results
+    noise: ScriptedNoise
     accelerations_m_s2: Floats | None
     max_acceleration_m_s2: Mapping[str, float]
     construction: str
     changes: int
     evaluations: int
     sets_emptied: int
-    lateral_miss_m: Mapping[str, float]
     history: tuple[tuple[int, float], ...]
+
+    @property
+    def miss_m(self) -> float:
+        """Miss of the simulated true state, m."""
+        return float(self.result.miss_m[0])
 
     @property
     def value_m(self) -> float:
         """What the search maximised, m."""
         return self.any_state_miss_m if self.objective is Objective.ANY_STATE else self.miss_m
 
-    def noise(self) -> ScriptedNoise:
-        """Return the errors as the noise of a batch of one."""
-        return ScriptedNoise({name: errors[..., None, :] for name, errors in self.errors.items()})
-
-    def target(self) -> GivenTarget | None:
-        """Return the accelerations as the target of a batch of one; None if the target is that of the scenario."""
-        given = self.accelerations_m_s2
-        return None if given is None else GivenTarget(given[..., None, :])
-
     def start(self) -> dict[str, float]:
         """Return the start by the names of `StateBox`: z_m, x_m, vz_m_s, vx_m_s; in space also y_m, vy_m_s."""
-        names = state_names(self.scenario)
-        return dict(zip(names, [*self.position_m.tolist(), *self.velocity_m_s.tolist()], strict=True))
+        return start_of(self.scenario, np.concatenate([self.result.position_m[0], self.result.velocity_m_s[0]]))
 
     def record(self, strategy: Strategy | None = None) -> Record:
         """Simulate the engagement again and return its record.
@@ -145,7 +129,8 @@ class WorstEngagement:
         strategy : Strategy or None
             None is the scenario's. A strategy different from that of the search has a different miss.
         """
-        record = fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise(), target=self.target())
+        target = self.accelerations_m_s2
+        record = fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise, target_m_s2=target)
         return replace(record, noise=WORST_FOUND)
 
 
@@ -190,15 +175,15 @@ def find_worst(
     Notes
     -----
     A quarter of the budget is for first plans: game noise with its four tie rules and, before a cut-off or
-    scheduled impulses, its shift; noise that keeps the upper or the lower extreme in a random or blockwise order,
-    constant and extremal errors, and errors that show the middle between the true motion and one with the same
-    measurements. The plans with the maximum misses are then changed, by a few steps, blocks, switching times or
-    coordinates of the start, and compete with their changes. In the first part of the search, the number of plans
-    from one first plan is limited. In space, both axes have errors of their own, and a change of the angle errors
-    is along one axis or both.
+    scheduled impulses, its shift; noise that keeps the upper or the lower extreme in a random or blockwise order;
+    constant errors, extremal errors in blocks, and errors that show the middle between the true motion and one with the
+    same measurements. The errors become those of the plan. The plans with the maximum misses are then changed, by
+    blocks of errors, switching times or coordinates of the start, and compete with their changes. In the first part of
+    the search, the number of plans from one first plan is limited. In space, both axes have errors of their own, and a
+    change of the angle errors is along one axis or both.
 
     In the guaranteed model the targets accelerate at the bound of the model, `set_model.disturbance_m_s2`, with signs
-    that belong to the plan: constant, in blocks, or that of the true predicted miss. They replace the target of the
+    that belong to the plan, constant or in blocks. They replace the target of the
     scenario; if its acceleration is greater than the bound, they accelerate as much. In the model `paper` the bound is
     fictitious, and the target is that of the scenario.
 
@@ -222,137 +207,145 @@ def find_worst(
 class _Search:
     """A search in progress."""
 
+    guarantee = False
+
     def __init__(
         self, scenario: Scenario, strategy: Strategy | None, objective: Objective, seed: int, keep_set: bool
     ) -> None:
         self.scenario = replace(scenario, dispersion=scenario.set_model.bounds, covariance=None)
         self.evaluations = self.sets_emptied = 0
         self.history: list[tuple[int, float]] = []
+        self.elite: Plans | None = None
         self._objective, self._seed, self._keep_set = objective, seed, keep_set
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._strategy_name = scenario.strategy if strategy is None else type(strategy).__name__
         self._shift_m = worst_shift_m(scenario)
         # All other random numbers are those of run 0, so that the worst engagement can be repeated alone.
-        self._draws = draw(self.scenario, [0], seed)
-        self._space = PlanSpace.of(self.scenario, self._draws.steps)
-        random = np.random.default_rng(seed)
-        self._first_plans, self._changes = FirstPlans(self._space, random), PlanChanges(self._space, random)
-        self._elite: Flown | None = None
+        self._draws = functools.cache(lambda size: draw(self.scenario, [0] * size, seed))
+        self._planner = Planner(self.scenario, self._draws(1).steps, seed)
 
     def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
-        first = self._first_plans.make(max(1, round(FIRST_SHARE * budget)))
-        flights = [chunk for plans, tie in first for chunk in _in_chunks(plans, tie)]
+        first = self._planner.first(max(1, round(FIRST_SHARE * budget)))
+        flights = [chunk for plans, game in first for chunk in _in_chunks(plans, game)]
         while flights:
-            for outcomes in pool.map(lambda flight: self._fly(*flight), flights):
-                self._select(outcomes, young=self.evaluations < YOUNG_SHARE * budget)
+            for plans, emptied in pool.map(self._evaluate, *zip(*flights, strict=True)):
+                self.evaluations += len(plans)
+                self.sets_emptied += emptied
+                self._select(plans, young=self.evaluations < YOUNG_SHARE * budget)
                 if progress is not None:
                     progress(self.evaluations / budget)
             size = min(GENERATION, budget - self.evaluations)
-            assert self._elite is not None
-            flights = _in_chunks(self._changes.children(self._elite, size), None) if size > 0 else []
+            assert self.elite is not None
+            flights = _in_chunks(self._planner.children(self.elite, size), None) if size > 0 else []
 
     def worst(self) -> WorstEngagement:
-        elite = self._elite
-        if elite is None or not np.isfinite(elite.value[0]):
+        if self.elite is None or not np.isfinite(self.elite.value[0]):
             raise NothingCountsError("in every simulated engagement the set became empty, or the miss was not finite")
-        start = elite.plans.start[0]
-        ends = {name: (value, value) for name, value in zip(state_names(self.scenario), start.tolist(), strict=True)}
-        position_m, velocity_m_s = np.split(start, 2)
-        errors = {
-            name: by_axis(elite.errors[:1, row], self.scenario.sensors.get(name))[..., 0, :]
-            for row, name in enumerate(self._space.names)
-        }
-        maximum: dict[str, float] = {}
-        if self._space.has_accelerations:
-            maximum = dict(zip(self.scenario.set_model.axes, self._space.acceleration_m_s2.tolist(), strict=True))
+        best, planner = self.elite.take(slice(0, 1)), self._planner
+        flight = self.engagements(best)
+        while flight.flying:
+            flight.advance()
+        result = flight.results(np.arange(1))
+        start = start_of(self.scenario, best.start[0])
+        maximum = planner.acceleration_m_s2
         return WorstEngagement(
-            scenario=replace(self.scenario, dispersion=StateBox(**ends)),
+            scenario=replace(self.scenario, dispersion=StateBox(**{name: (x, x) for name, x in start.items()})),
             seed=self._seed,
             strategy=self._strategy_name,
             objective=self._objective,
-            any_state_miss_m=float(elite.any_state_miss_m[0]),
-            miss_m=float(elite.miss_m[0]),
-            outcome=elite.outcomes[0],
-            truth_kept=bool(elite.truth_kept[0]),
-            position_m=position_m,
-            velocity_m_s=velocity_m_s,
-            errors=errors,
-            accelerations_m_s2=by_axis(elite.accelerations_m_s2[:1])[..., 0, :] if maximum else None,
-            max_acceleration_m_s2=maximum,
-            construction=self._first_plans.constructions[int(elite.plans.lineage[0])],
-            changes=int(elite.plans.changes[0]),
+            any_state_miss_m=float(flight.any_state_miss_m(result)[0]),
+            result=result,
+            noise=self._scripted(best),
+            accelerations_m_s2=self._target_m_s2(best),
+            max_acceleration_m_s2=(
+                dict(zip(self.scenario.set_model.axes, maximum.tolist(), strict=True)) if maximum.any() else {}
+            ),
+            construction=planner.constructions[int(best.lineage[0])],
+            changes=int(best.changes[0]),
             evaluations=self.evaluations,
             sets_emptied=self.sets_emptied,
-            lateral_miss_m=dict(zip(self.scenario.set_model.axes, elite.lateral_miss_m[0].tolist(), strict=True)),
             history=tuple(self.history),
         )
 
-    def _fly(self, plans: Plans, tie: TieRule | None) -> Flown:
-        size = len(plans)
+    def engagements(self, plans: Plans, game: Game | None = None) -> Engagements:
+        """Return plans in flight; the errors of a game become those of the plans."""
         position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
-        of_draws = self._draws.execution, self._draws.target, self._draws.pointing, self._draws.images
-        execution, target, pointing, images = (
-            None if drawn is None else np.repeat(drawn, size, axis=-2) for drawn in of_draws
-        )
-        tie_draws = np.repeat(self._draws.tie, size, axis=-2)
-        draws = Draws(position_m, velocity_m_s, {}, tie_draws, execution, target, pointing, images=images)
-        side, planned = constant_side(self.scenario.target, target), None
-        if self._space.has_accelerations:
-            planned = PlannedTarget(plans, self._space.acceleration_m_s2)
-            side = by_axis(plans.sides[:, :, 0])  # of game noise, whose targets keep it
-        noise = PlannedNoise(plans, tie, self._space.names, self._shift_m, side)
-        flight = Engagements(self.scenario, draws, self._strategy, noise=noise, target=planned, guarantee=False)
+        draws = replace(self._draws(len(plans)), position_m=position_m, velocity_m_s=velocity_m_s)
+        noise: MeasurementNoise = self._scripted(plans)
+        target_m_s2, side = self._target_m_s2(plans), constant_side(self.scenario.target, draws.target)
+        if game is not None:
+            side = side if target_m_s2 is None else by_axis(plans.sides[:, :, 0])
+            choosing = game(by_axis(plans.errors[:, ANGLE]).copy(), self._shift_m, side)
+            noise = _Recorded(choosing, plans, self._planner.sensors)
+        strategy, guarantee = self._strategy, self.guarantee
+        return Engagements(self.scenario, draws, strategy, noise=noise, target_m_s2=target_m_s2, guarantee=guarantee)
+
+    def _scripted(self, plans: Plans) -> ScriptedNoise:
+        sensors = enumerate(self._planner.sensors)
+        return ScriptedNoise({sensor.name: by_axis(plans.errors[:, row], sensor) for row, sensor in sensors})
+
+    def _target_m_s2(self, plans: Plans) -> Floats | None:
+        maximum = self._planner.acceleration_m_s2
+        return by_axis(maximum[:, None] * plans.sides) if maximum.any() else None
+
+    def value_m(self, flight: Engagements, results: Results) -> Floats:
+        """Return what the search maximises, m, shape (B,)."""
+        return flight.any_state_miss_m(results) if self._objective is Objective.ANY_STATE else results.miss_m
+
+    def _evaluate(self, plans: Plans, game: Game | None) -> tuple[Plans, int]:
+        """Return plans with their values, and the number of engagements whose set became empty."""
+        flight = self.engagements(plans, game)
         while flight.flying:
             flight.advance()
-        results = flight.results(np.arange(size))
-        any_state_m = flight.any_state_miss_m(results)
-        value = any_state_m if self._objective is Objective.ANY_STATE else results.miss_m
+        results = flight.results(np.arange(len(plans)))
+        value = self.value_m(flight, results)
         counts = np.isfinite(value) & ~(self._keep_set & results.set_emptied)
-        if tie is not None:  # the errors of the game become the plan
-            plans.sequence[:], plans.prescribed[:] = noise.errors, True
-        return Flown(
-            plans,
-            value=np.where(counts, value, -np.inf),
-            miss_m=results.miss_m,
-            any_state_miss_m=any_state_m,
-            errors=noise.errors,
-            accelerations_m_s2=np.zeros_like(plans.sides) if planned is None else planned.accelerations_m_s2,
-            outcomes=np.array(results.outcomes, dtype=object),
-            set_emptied=results.set_emptied,
-            truth_kept=results.truth_kept,
-            lateral_miss_m=results.lateral_miss_m,
-        )
+        return replace(plans, value=np.where(counts, value, -np.inf)), int(results.set_emptied.sum())
 
-    def _select(self, outcomes: Flown, young: bool) -> None:
+    def _select(self, plans: Plans, young: bool) -> None:
         """Update the elite and the history with new flights."""
-        self.evaluations += len(outcomes.value)
-        self.sets_emptied += int(outcomes.set_emptied.sum())
-        rivals = outcomes if self._elite is None else self._elite.join(outcomes)
-        order = np.argsort(-rivals.value, kind="stable")
+        rivals = plans if self.elite is None else self.elite.join(plans)
         kept: list[int] = []
-        of_lineage: dict[int, int] = {}
-        for index in order.tolist():
-            lineage = int(rivals.plans.lineage[index])
+        of_lineage: Counter[int] = Counter()
+        for index in np.argsort(-rivals.value, kind="stable").tolist():
+            lineage = int(rivals.lineage[index])
             same = bool(kept) and rivals.value[index] == rivals.value[kept[-1]]
-            full = young and of_lineage.get(lineage, 0) >= LINEAGE_SHARE
-            if not same and not full:
+            if not same and not (young and of_lineage[lineage] >= LINEAGE_SHARE):
                 kept.append(index)
-                of_lineage[lineage] = of_lineage.get(lineage, 0) + 1
+                of_lineage[lineage] += 1
             if len(kept) == ELITE:
                 break
-        self._elite = rivals.take(np.array(kept))
-        maximum = float(self._elite.value[0])
+        self.elite = rivals.take(np.array(kept))
+        maximum = float(self.elite.value[0])
         if np.isfinite(maximum) and (not self.history or maximum > self.history[-1][1]):
             self.history.append((self.evaluations, maximum))
 
 
-def state_names(scenario: Scenario) -> list[str]:
-    """Return the names of the coordinates of a start in their order: `StateBox` has them."""
+@dataclass(frozen=True)
+class _Recorded:
+    """Game noise whose errors are written into plans: `ScriptedNoise` with them repeats the measurements."""
+
+    game: GameNoise
+    plans: Plans
+    sensors: Sequence[Sensor]
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
+        """Return the measurements of a step."""
+        errors = errors_made(sight, self.game.measure(sight, predicted))
+        for row, sensor in enumerate(self.sensors):
+            if sensor.name in errors:
+                self.plans.errors[:, row, :, sight.step] = np.atleast_2d(errors[sensor.name]).T
+        return measure_with_errors(sight, errors)
+
+
+def start_of(scenario: Scenario, start: Floats) -> dict[str, float]:
+    """Return the coordinates of a start by their names in `StateBox`."""
     axes = (*scenario.set_model.axes, "x")
-    return [*(f"{axis}_m" for axis in axes), *(f"v{axis}_m_s" for axis in axes)]
+    names = [*(f"{axis}_m" for axis in axes), *(f"v{axis}_m_s" for axis in axes)]
+    return dict(zip(names, start.tolist(), strict=True))
 
 
-def _in_chunks(plans: Plans, tie: TieRule | None) -> list[tuple[Plans, TieRule | None]]:
+def _in_chunks(plans: Plans, game: Game | None) -> list[tuple[Plans, Game | None]]:
     """Split plans into equal parts of at most `CHUNK`."""
     parts = np.array_split(np.arange(len(plans)), -(-len(plans) // CHUNK))
-    return [(plans.take(part), tie) for part in parts]
+    return [(plans.take(part), game) for part in parts]

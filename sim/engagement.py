@@ -35,7 +35,7 @@ from sim.label_ends import LabelEnds
 from sim.miss_cause import DecisionLog
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
-from sim.target import TargetMotion, acceleration_m_s2, constant_side
+from sim.target import acceleration_m_s2, constant_side
 from sim.truth_section import TruthSection
 
 Pending = tuple[tuple[float, Floats], ...]
@@ -77,9 +77,9 @@ class Step:
 class Engagements:
     """A batch of engagements in flight.
 
-    `strategy`, `truth`, `noise` and `target` replace the strategy, the Kepler motion, the measurement noise and the
-    target's acceleration of the scenario.
-    `guarantee` computes the bound Phi in the guaranteed model; it takes 2 to 3.5 times as long.
+    `strategy`, `truth`, `noise` and `target_m_s2`, shape (C, B, steps), replace the strategy, the Kepler motion, the
+    measurement noise and the accelerations of the targets of the scenario. `guarantee` computes the bound Phi in the
+    guaranteed model; it takes 2 to 3.5 times as long.
 
     One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the true motion advances,
     and its closest approach is detected. Of the true motion, the strategy gets the measurements only.
@@ -93,7 +93,7 @@ class Engagements:
         truth: KeplerMotion | None = None,
         noise: NoiseSource | None = None,
         *,
-        target: TargetMotion | None = None,
+        target_m_s2: Floats | None = None,
         guarantee: bool = True,
     ) -> None:
         self.scenario = scenario
@@ -101,7 +101,7 @@ class Engagements:
         self._draws = draws
         self._batch = batch = len(draws.position_m)
         self._noise = _make_noise(scenario, draws) if noise is None else _noise_of_batch(noise)
-        self._target = target
+        self._target_m_s2 = target_m_s2
         self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._model = model = on_board_model(scenario)
@@ -270,8 +270,8 @@ class Engagements:
 
     def _manoeuvre(self, sight: Sight) -> Floats | None:
         """Return the acceleration of the targets over this step; None without a target that manoeuvres."""
-        if self._target is not None:
-            return self._target.acceleration_m_s2(self.step, self._true_predicted_miss(sight))
+        if self._target_m_s2 is not None:
+            return np.asarray(self._target_m_s2[:, :, self.step])
         target, draws = self.scenario.target, self._draws.target
         if target is None or draws is None:
             return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 
@@ -123,7 +122,7 @@ class KeplerMotion:
         return Sight(
             alpha_rad=np.arctan2(lateral, x),
             omega_rad_s=_ratio(speed * x - v_x * lateral, lateral * lateral + x * x),
-            range_m=np.sqrt(_dot(position, position)),
+            range_m=np.sqrt((position * position).sum(axis=0)),
             slope=slope,
             slope_rate_per_s=_ratio(speed - v_x * slope, x),
         )
@@ -411,7 +410,3 @@ def advance_all(
 def _ratio(over: Floats, under: Floats) -> Floats:
     """Return the quotient; zero where the divisor is zero, where no section exists."""
     return np.divide(over, under, out=np.zeros(over.shape), where=under != 0.0)
-
-
-def _dot(first: Floats, second: Floats) -> Floats:
-    return reduce(np.add, first * second)

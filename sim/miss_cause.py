@@ -79,8 +79,8 @@ class DecisionLog:
         miss = _with_end(np.cumsum(changes[::-1], axis=0)[::-1]) + lateral_miss_m
         causes, last = np.full(len(missed), None, dtype=object), _last(tracking)
         if missed.any():
-            flights = (each[..., missed] for each in (miss, tracking, budget_m_s, ends_m))
-            causes[missed] = self._causes(*flights, times_s, arrival_s[missed])
+            at_decisions = miss[..., missed], tracking[:, missed], budget_m_s[:, missed], ends_m[..., missed]
+            causes[missed] = self._causes(*at_decisions, times_s, arrival_s[missed])
         lower_m, upper_m = _chosen(ends_m, last)
         return {
             "causes": tuple(causes),

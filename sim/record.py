@@ -10,15 +10,14 @@ import numpy as np
 
 from guidance import Strategy
 from guidance.noise import NoiseSource
-from infoset import Section
+from infoset import PredictedMiss, Section
 from infoset.arrays import Flags, Floats
 from infoset.limits import WHOLE
-from infoset.sensors import Measurements
+from infoset.sensors import Measurements, Sensor
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.results import Results, ending
 from sim.scenario import Scenario, noise_name, strategy_name, with_noise, with_strategy
-from sim.target import TargetMotion
 from sim.versions import versions
 
 
@@ -128,7 +127,7 @@ def fly_one(
     seed: int = 0,
     strategy: Strategy | str | None = None,
     noise: NoiseSource | str | None = None,
-    target: TargetMotion | None = None,
+    target_m_s2: Floats | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Record:
     """Simulate one engagement and return the record of its steps.
@@ -143,8 +142,8 @@ def fly_one(
         A strategy of your own, the name of a registered one, or None for the scenario's.
     noise : MeasurementNoise, callable, str or None
         A noise of your own or the name of a kind, as for `simulate`; None is the scenario's.
-    target : TargetMotion or None
-        Accelerations of the target, for a batch of one; None is the scenario's target.
+    target_m_s2 : ndarray, shape (C, 1, steps), or None
+        Accelerations of the target, m/s^2; None is the scenario's target.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
 
@@ -159,50 +158,45 @@ def fly_one(
     scenario, own_strategy = with_strategy(scenario, strategy)
     scenario, own_noise = with_noise(scenario, noise)
     draws = draw(scenario, [run], seed)
-    flight = Engagements(scenario, draws, own_strategy, noise=own_noise, target=target)
-    sensors = scenario.sensors
-    rows: list[dict[str, Any]] = []
-    measured: dict[str, list[Floats]] = {name: [] for name in sensors}
+    flight = Engagements(scenario, draws, own_strategy, noise=own_noise, target_m_s2=target_m_s2)
+    steps: list[Step] = []
     sections: list[tuple[Section, ...]] = []
-    shapes = {name: (len(scenario.set_model.axes),) if sensor.is_lateral else () for name, sensor in sensors.items()}
 
     def record(step: Step) -> None:
-        miss = step.predicted_miss
-        interval = np.stack([miss.lower_m, miss.upper_m], axis=-1)[:, 0]
-        rows.append(
-            {
-                "time_s": np.float64(step.time_s),
-                "true_range_m": step.sight.range_m[0],
-                "true_angle_rad": step.sight.alpha_rad[:, 0],
-                "true_rate_rad_s": step.sight.omega_rad_s[:, 0],
-                "predicted_miss_m": np.where(miss.exists[0], interval, np.nan),
-                "impulse_m_s": step.impulse_m_s[:, 0],
-            }
-        )
-        for name, shape in shapes.items():
-            values = step.measured.get(name)
-            measured[name].append(np.full(shape, np.nan) if values is None else values[..., 0])
+        steps.append(step)
         sections.append(tuple(step.information.sections()))
+
+    def rows(value: Callable[[Step], Any]) -> Floats:
+        return np.array([value(step) for step in steps], dtype=np.float64)
+
+    def interval(miss: PredictedMiss) -> Floats:
+        ends = np.stack([miss.lower_m, miss.upper_m], axis=-1)[:, 0]
+        return np.where(miss.exists[0], ends, np.nan)
+
+    def measured(sensor: Sensor) -> Floats:
+        unknown = np.full((len(scenario.set_model.axes), 1) if sensor.is_lateral else 1, np.nan)
+        return rows(lambda step: step.measured.get(sensor.name, unknown)[..., 0])
 
     while flight.flying:
         flight.advance(record)
         if progress is not None:
             progress(min(1.0, flight.step / draws.steps))
-    name = strategy_name(scenario, own_strategy)
-    own = None if own_noise is None else noise_name(own_noise)
     at_step, label = flight.inconsistency
-    inconsistency = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None
-    columns: dict[str, Any] = {field: np.array([row[field] for row in rows]) for field in rows[0]}
     return Record(
         scenario,
         seed,
         run,
-        name,
+        strategy_name(scenario, own_strategy),
         flight.results(np.array([run])),
-        **columns,
-        measured={name: np.array(values) for name, values in measured.items()},
+        time_s=rows(lambda step: step.time_s),
+        true_range_m=rows(lambda step: step.sight.range_m[0]),
+        true_angle_rad=rows(lambda step: step.sight.alpha_rad[:, 0]),
+        true_rate_rad_s=rows(lambda step: step.sight.omega_rad_s[:, 0]),
+        measured={name: measured(sensor) for name, sensor in scenario.sensors.items()},
+        predicted_miss_m=rows(lambda step: interval(step.predicted_miss)),
+        impulse_m_s=rows(lambda step: step.impulse_m_s[:, 0]),
         truth_margin_m=np.array([margin.filled(np.nan)[0] for margin in flight.truth_margins_m()]),
         sections=tuple(sections),
-        noise=own,
-        inconsistency=inconsistency,
+        noise=None if own_noise is None else noise_name(own_noise),
+        inconsistency=Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None,
     )

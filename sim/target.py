@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -12,30 +10,6 @@ from infoset.arrays import Floats
 from sim.scenario import Manoeuvre, Target
 
 ROUNDING = 1e-12
-
-
-class TargetMotion(Protocol):
-    """Lateral acceleration of the targets of a batch, in place of that of the scenario."""
-
-    def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
-        """Return the acceleration over a step, m/s^2, shape (C, B); see `acceleration_m_s2`."""
-
-
-@dataclass(frozen=True)
-class GivenTarget:
-    """Targets whose accelerations are given in advance.
-
-    Parameters
-    ----------
-    accelerations_m_s2 : ndarray, shape (C, B, steps)
-        Lateral acceleration in each step, m/s^2.
-    """
-
-    accelerations_m_s2: Floats
-
-    def acceleration_m_s2(self, step: int, predicted_miss_m: Floats) -> Floats:
-        """Return the acceleration over a step, m/s^2, shape (C, B)."""
-        return np.asarray(self.accelerations_m_s2[:, :, step])
 
 
 def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:

@@ -16,7 +16,6 @@ from sim.draws import Draws
 from sim.engagement import Engagements
 from sim.results import Results
 from sim.scenario import Scenario
-from sim.target import GivenTarget
 
 STEPS_BEYOND = 2
 """Maximum number of simulated steps after the one in which x = 0."""
@@ -84,10 +83,10 @@ def fly_pair(
     """
     acceleration_m_s2 = pair.acceleration_m_s2
     nothing = np.zeros((*acceleration_m_s2.shape[:-1], STEPS_BEYOND))
-    target = GivenTarget(np.concatenate([acceleration_m_s2, nothing], axis=-1))
-    draws = Draws(pair.position_m, pair.velocity_m_s, {}, np.zeros_like(target.accelerations_m_s2))
+    target_m_s2 = np.concatenate([acceleration_m_s2, nothing], axis=-1)
+    draws = Draws(pair.position_m, pair.velocity_m_s, {}, np.zeros_like(target_m_s2))
     noise = PairNoise(pair.last_common_step)
-    flight = Engagements(scenario, draws, strategy, noise=noise, target=target)
+    flight = Engagements(scenario, draws, strategy, noise=noise, target_m_s2=target_m_s2)
     impulses: list[Floats] = []
     while flight.flying:
         flight.advance(lambda step: impulses.append(np.where(step.tracking, step.impulse_m_s, 0.0)))

@@ -74,8 +74,6 @@ def engagement(
     guaranteed = model is Model.GUARANTEED
     return Scenario(
         name="stress",
-        description="",
-        sun=None,
         nominal_range_m=range_m,
         dispersion=bounds,
         **of_model(
@@ -93,7 +91,6 @@ def engagement(
                 disturbance_y_m_s2=along_y,
             )
         ),
-        range_sensor=None,
         thruster=thruster,
     )
 

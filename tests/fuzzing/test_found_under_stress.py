@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from guidance import NoiseKind, Thruster
-from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, Model, RateSensor, SetModel, StateBox
 from sim import Manoeuvre, Outcome, Scenario, Sun, Target
 from sim.draws import draw
 from sim.engagement import Engagements, Step
@@ -27,27 +27,9 @@ def hostile(
     """A flight from 1000 km without impulses."""
     box = StateBox((-z_m, z_m), (1e6, 1.01e6), (-vz_m_s, vz_m_s), (-speed_m_s * 1.000001, -speed_m_s * 0.999999))
     sensor = AngleSensor(step_s, at_nominal_rad, at_zero_rad, 1e6)
-    model = SetModel(
-        speed_m_s,
-        step_s,
-        box,
-        sensor,
-        disturbance_m_s2=0.0,
-        range_threshold_m=2e4,
-        sections=5,
-        fewest_sections=3,
-        initial_set=InitialSet.BOX,
-        model=Model.GUARANTEED,
-    )
+    model = SetModel(speed_m_s, step_s, box, sensor, range_threshold_m=2e4, sections=5, fewest_sections=3)
     return Scenario(
-        name="hostile",
-        description="",
-        sun=None,
-        nominal_range_m=1e6,
-        dispersion=box,
-        **of_model(model),
-        range_sensor=None,
-        thruster=Thruster(0.0, 1.0, 1.0),
+        name="hostile", nominal_range_m=1e6, dispersion=box, **of_model(model), thruster=Thruster(0.0, 1.0, 1.0)
     )
 
 

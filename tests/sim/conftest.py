@@ -26,12 +26,10 @@ def asteroid() -> Scenario:
     )
     return Scenario(
         name="asteroid",
-        description="",
         sun=Sun(1.324948e20, 150e9, np.pi / 2),
         nominal_range_m=5801.3e3,
         dispersion=StateBox((-1e3, 1e3), (5701.3e3, 5901.3e3), (-100.0, 100.0), (-58.1e3, -57.9e3)),
         **of_model(model),
-        range_sensor=None,
         thruster=Thruster(1000.0, 0.25, 7.5),
     )
 
@@ -58,7 +56,6 @@ def comet() -> Scenario:
     )
     return Scenario(
         name="comet",
-        description="",
         sun=Sun(1.324948e20, 60e9, 0.3),
         nominal_range_m=1550e3,
         dispersion=StateBox((-1e3, 2e3), (1500e3, 1600e3), (-30.0, 20.0), (-20.02e3, -19.98e3)),

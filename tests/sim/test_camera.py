@@ -32,25 +32,12 @@ def camera_scenario(**fields: Any) -> Scenario:
     law = {"centroid_error_m": CENTROID_M, **fields}
     camera = Camera(EVERY_S, PIXEL_RAD, **law)
     box = StateBox((-1e4, 1e4), (3590.0 * SPEED_M_S, 3610.0 * SPEED_M_S), (-2.0, 2.0), (-6141.0, -6139.0))
-    model = SetModel(
-        SPEED_M_S,
-        EVERY_S / 2,
-        box,
-        camera,
-        range_threshold_m=1e3,
-        sections=5,
-        fewest_sections=3,
-        initial_set=InitialSet.BOX,
-        model=Model.GUARANTEED,
-    )
+    model = SetModel(SPEED_M_S, EVERY_S / 2, box, camera, range_threshold_m=1e3, sections=5, fewest_sections=3)
     return Scenario(
         name="camera",
-        description="",
-        sun=None,
         nominal_range_m=3600.0 * SPEED_M_S,
         dispersion=box,
         **of_model(model),
-        range_sensor=None,
         thruster=Thruster(20.0, 0.001, 0.5),
     )
 
@@ -173,18 +160,7 @@ def measured_set(centroid_m: float, alpha_rad: Callable[[float], float]) -> Info
     at_start = (FIRST_S * SPEED_M_S, FIRST_S * SPEED_M_S)
     box = StateBox((-1e6, 1e6), at_start, (-1e3, 1e3), (-SPEED_M_S, -SPEED_M_S))
     threshold_m = max(1e3, 10.0 * centroid_m)
-    model = SetModel(
-        SPEED_M_S,
-        EVERY_S,
-        box,
-        camera,
-        disturbance_m_s2=0.0,
-        range_threshold_m=threshold_m,
-        sections=1,
-        fewest_sections=1,
-        initial_set=InitialSet.BOX,
-        model=Model.GUARANTEED,
-    )
+    model = SetModel(SPEED_M_S, EVERY_S, box, camera, range_threshold_m=threshold_m, sections=1, fewest_sections=1)
     information = InformationSet(model)
     while True:
         before_s = FIRST_S - information.time_s

@@ -97,11 +97,8 @@ def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
         box,
         AngleSensor(1.0, error_rad, (0.5 if rising else 2.0) * error_rad, 5e5),
         disturbance_m_s2=0.05,
-        range_threshold_m=0.0,
         sections=5,
         fewest_sections=2,
-        initial_set=InitialSet.BOX,
-        model=Model.GUARANTEED,
         execution_error_relative=0.02,
     )
     return model, section_laws(model)[0]
@@ -183,16 +180,7 @@ def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(a
     step_s, range_m = 19.0, 2.5e6
     box = StateBox((0.0, 0.0), (range_m, 1.2 * range_m), (-0.1, -0.1), (-58.1e3, -57.9e3))
     model = SetModel(
-        58e3,
-        step_s,
-        box,
-        AngleSensor(step_s, 0.00015, 0.00023, 5.8e6),
-        disturbance_m_s2=1.0,
-        range_threshold_m=5e3,
-        sections=29,
-        fewest_sections=5,
-        initial_set=InitialSet.BOX,
-        model=Model.GUARANTEED,
+        58e3, step_s, box, AngleSensor(step_s, 0.00015, 0.00023, 5.8e6), disturbance_m_s2=1.0, range_threshold_m=5e3
     )
     scenario = replace(
         asteroid, sun=None, nominal_range_m=range_m, dispersion=box, **of_model(model), range_sensor=None
@@ -210,18 +198,7 @@ def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_le
     dispersion = StateBox((4.95e5, 5.5e5), (1.09e6, 1.1e6), (1080.0, 1200.0), (-e, -e))
     # One angle only, at t = 0.
     sensor = AngleSensor(200.0, 1e-3, 1e-3, range_m)
-    model = SetModel(
-        e,
-        1.0,
-        box,
-        sensor,
-        disturbance_m_s2=0.0,
-        range_threshold_m=1e3,
-        sections=11,
-        fewest_sections=3,
-        initial_set=InitialSet.BOX,
-        model=Model.GUARANTEED,
-    )
+    model = SetModel(e, 1.0, box, sensor, range_threshold_m=1e3, sections=11, fewest_sections=3)
     scenario = replace(
         asteroid,
         sun=None,
@@ -254,7 +231,7 @@ def test_phi_is_extrapolated_from_labels_with_sections_only(
     e, x_m, error_rad = 58e3, (5010.0, 33e3), 2.3e-4
     box = StateBox((-max_z_m, max_z_m), x_m, (0.0, 0.0), (-e, -e))
     sensor = AngleSensor(0.5, error_at_33_km_rad, error_rad, x_m[1])
-    model = SetModel(e, 0.5, box, sensor, range_threshold_m=5e3, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
+    model = SetModel(e, 0.5, box, sensor, range_threshold_m=5e3)
     information = InformationSet(model)
     information.measure_angle(measured_rad)
     information.shift(impulse_m_s)
@@ -277,7 +254,7 @@ def test_phi_of_an_exactly_known_range_and_speed(max_z_m: float) -> None:
     e = 1e3
     box = StateBox((-max_z_m, max_z_m), (2e4, 2e4), (0.0, 0.0), (-e, -e))
     sensor = AngleSensor(0.9, 1e-3, 1e-3, 2e4)
-    model = SetModel(e, 0.9, box, sensor, range_threshold_m=500.0, initial_set=InitialSet.BOX, model=Model.GUARANTEED)
+    model = SetModel(e, 0.9, box, sensor, range_threshold_m=500.0)
     information = InformationSet(model)
     while information.tracking.any():
         information.measure_angle(0.0)
@@ -293,7 +270,7 @@ def test_the_direction_of_an_impulse_is_uncertain_at_an_exactly_known_closing_sp
     """An impulse of 10 m/s along y, turned by 0.1 rad at most, changes V_z by up to 10 sin(0.1) m/s."""
     box = StateBox((-1.0, 1.0), (1e4, 2e4), (0.0, 0.0), (-1e3, -1e3), (-1.0, 1.0), (0.0, 0.0))
     sensor = AngleSensor(1.0, 1e-3, 1e-3, 1e4)
-    model = SetModel(1e3, 1.0, box, sensor, initial_set=InitialSet.BOX, model=Model.GUARANTEED, pointing_error_rad=0.1)
+    model = SetModel(1e3, 1.0, box, sensor, pointing_error_rad=0.1)
     information = InformationSet(model)
     information.shift([[10.0], [0.0]])
     for section in information.sections():
@@ -316,22 +293,13 @@ def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
         step_s,
         box,
         AngleSensor(step_s, error_rad, at_zero_rad, range_m),
-        disturbance_m_s2=0.0,
         range_threshold_m=1e4,
-        sections=29,
         fewest_sections=3,
         initial_set=InitialSet.RECTANGLE,
         model=Model.PAPER,
     )
     scenario = Scenario(
-        name="",
-        description="",
-        sun=None,
-        nominal_range_m=range_m,
-        dispersion=box,
-        **of_model(model),
-        range_sensor=None,
-        thruster=Thruster(0.0, 0.1, 1.0),
+        name="", nominal_range_m=range_m, dispersion=box, **of_model(model), thruster=Thruster(0.0, 0.1, 1.0)
     )
     draws = draw(scenario, range(6), 170)
     signs = np.where(draws.errors["angle"] >= 0.0, 1.0, -1.0)

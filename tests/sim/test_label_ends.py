@@ -52,7 +52,6 @@ def without_control(asteroid: Scenario, kind: Model, x_m: tuple[float, float]) -
                 angle_sensor=AngleSensor(0.5, 0.2, 0.2, nominal_range_m=1e6),
                 model=kind,
                 initial_set=InitialSet.BOX,
-                disturbance_m_s2=0.0,
                 sections=5,
                 range_threshold_m=5e3,
             )

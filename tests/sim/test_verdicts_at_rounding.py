@@ -17,7 +17,6 @@ from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements
 from sim.scenario import of_model
-from sim.target import GivenTarget
 
 CASES = Path(__file__).parent / "cases"
 ULP = 2.0**-52
@@ -96,8 +95,8 @@ def narrow_labels(share: float) -> Engagements:
     position_m, velocity_m_s = stored.arrays["position"], stored.arrays["velocity"]
     known = replace(draw(scenario, [0], 0), position_m=position_m, velocity_m_s=velocity_m_s, images=None)
     given = stored.arrays["acc"].reshape(1, 1, -1)
-    target = GivenTarget(np.pad(given, ((0, 0), (0, 0), (0, max(0, known.steps - given.shape[-1])))))
-    return Engagements(scenario, known, strategy=stored, noise=stored, target=target)
+    target = np.pad(given, ((0, 0), (0, 0), (0, max(0, known.steps - given.shape[-1]))))
+    return Engagements(scenario, known, strategy=stored, noise=stored, target_m_s2=target)
 
 
 @pytest.mark.parametrize("share", [3e-8, 1e-7, 1e-6, 1e-4])

@@ -64,9 +64,9 @@ def _summary(worst: WorstMisses, chosen: WorstEngagement, options: Adversary) ->
         **worst.misses(),
         "worst_any_state_miss_m": chosen.any_state_miss_m,
         "worst_miss_m": chosen.miss_m,
-        **{f"worst_miss_{axis}_m": value for axis, value in chosen.lateral_miss_m.items()},
-        "outcome": chosen.outcome.value,
-        "truth_kept": chosen.truth_kept,
+        **{f"worst_miss_{axis}_m": value for axis, value in _lateral_m(chosen).items()},
+        "outcome": chosen.result.outcomes[0].value,
+        "truth_kept": bool(chosen.result.truth_kept[0]),
         "evaluations": chosen.evaluations,
         "record": None if options.record is None else str(options.record),
         "found_from": chosen.construction,
@@ -82,12 +82,17 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
     return [
         ("maximum miss of any state of the set, m", lambda found: number(found.any_state_miss_m)),
         ("miss of the simulated truth, m", lambda found: number(found.miss_m)),
-        (f"miss along {', '.join(axes[:-1])}, m", lambda found: ", ".join(map(number, found.lateral_miss_m.values()))),
-        ("outcome", lambda found: found.outcome.value),
-        ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
-        (f"initial {position}, km", lambda found: _texts(found.position_m / M_PER_KM)),
-        (f"initial {velocity}, km/s", lambda found: _texts(found.velocity_m_s / M_PER_KM)),
+        (f"miss along {', '.join(axes[:-1])}, m", lambda found: ", ".join(map(number, _lateral_m(found).values()))),
+        ("outcome", lambda found: found.result.outcomes[0].value),
+        ("true state always in the set", lambda found: "yes" if found.result.truth_kept[0] else "no"),
+        (f"initial {position}, km", lambda found: _texts(found.result.position_m[0] / M_PER_KM)),
+        (f"initial {velocity}, km/s", lambda found: _texts(found.result.velocity_m_s[0] / M_PER_KM)),
     ]
+
+
+def _lateral_m(found: WorstEngagement) -> dict[str, float]:
+    """Return the position of the true state at the closest approach by lateral axis, m."""
+    return dict(zip(found.scenario.set_model.axes, found.result.lateral_miss_m[0].tolist(), strict=True))
 
 
 def _texts(values: NDArray[np.float64]) -> str:

@@ -51,12 +51,12 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert found["worst_miss_m"] == worst.miss_m
     assert worst.value_m == found["worst_of_search_m"] >= found["worst_of_search_set_kept_m"]
     assert found["worst_of_search_set_kept_m"] == find_worst(scenario, budget=BUDGET, seed=5, keep_set=True).value_m
-    assert list(found["start"].values()) == [*worst.position_m.tolist(), *worst.velocity_m_s.tolist()]
+    assert list(found["start"].values()) == [*worst.start().values()]
 
     record = load_record(tmp_path / "worst.npz")
     assert float(record.result.miss_m[0]) == worst.miss_m
     assert record.noise == record.noise_name == "worst-found"
-    assert record.result.position_m[0].tolist() == worst.position_m.tolist()
+    assert record.result.position_m[0].tolist() == worst.result.position_m[0].tolist()
     assert record.scenario == worst.scenario
     code, out, _ = infoset("replay", "worst.npz", "--out", "figures")
     assert code == 0

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from guidance import Thruster
-from infoset import AngleSensor, Camera, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, Camera, Model, RangeSensor, RateSensor, SetModel, StateBox
 from sim import Scenario, Sun
 from sim.bound.coasting import coasting
 from sim.bound.lower_bound import pair_at
@@ -41,17 +41,13 @@ def slow_flight(range_km: float, *, cut_off_s: float | None = 2000.0, strength: 
         range_threshold_m=1e5,
         sections=3,
         fewest_sections=1,
-        initial_set=InitialSet.BOX,
-        model=Model.GUARANTEED,
     )
     return Scenario(
         name="slow",
-        description="",
         sun=Sun(strength * SUN, 60e9, 0.5 * np.pi),
         nominal_range_m=range_m,
         dispersion=box,
         **of_model(model),
-        range_sensor=None,
         thruster=Thruster(30.0, 1e-4, 2.0, last_impulse_s=cut_off_s),
     )
 
@@ -265,12 +261,10 @@ def near_a_planet() -> Scenario:
     model = SetModel(12e3, 10.0, box, AngleSensor(10.0, 1e-4, 1e-4, 2e7), disturbance_m_s2=1e-5, model=Model.PAPER)
     return Scenario(
         name="planet",
-        description="",
         sun=Sun(3.986e14, 6e7, 2.5),
         nominal_range_m=2e7,
         dispersion=box,
         **of_model(model),
-        range_sensor=None,
         thruster=Thruster(40.0, 0.0, 1.0),
     )
 

@@ -39,12 +39,9 @@ def toy(vz_m_s: float = 1e3, max_impulse_m_s: float = 0.5, z_m: float = 1e5) -> 
     )
     return Scenario(
         name="toy",
-        description="",
-        sun=None,
         nominal_range_m=2000.0,
         dispersion=model.bounds,
         **of_model(model),
-        range_sensor=None,
         thruster=Thruster(1000.0, 0.0, max_impulse_m_s),
     )
 

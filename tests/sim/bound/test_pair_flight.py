@@ -114,7 +114,6 @@ def random_scenario(number: int) -> Scenario:
     )
     return Scenario(
         name=f"random {number}",
-        description="",
         sun=Sun(1.3e20, draws.uniform(50e9, 200e9), draws.uniform(-np.pi, np.pi)) if draws.integers(2) else None,
         nominal_range_m=nominal,
         dispersion=box,

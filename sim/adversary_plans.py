@@ -1,0 +1,271 @@
+"""Plans of an adversary (start, errors and target of each engagement): random ones, and changes of the best ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import partial
+
+import numpy as np
+
+from guidance import GameNoise, TieRule
+from guidance.game_noise import SwitchingNoise
+from infoset import BearingSensor
+from infoset.arrays import Floats, Integers
+from infoset.sensors import Sensor
+from sim.scenario import Manoeuvre, Scenario, corners
+from sim.target import amplitudes_m_s2
+
+MAX_CHANGES = 3
+"""Maximum number of changes from a plan to the next."""
+LATE_STEPS = 12.0
+"""Mean distance from the end, in steps, of the changes near the end."""
+ANGLE = 0
+"""Row of the errors of the angles."""
+
+
+Game = Callable[[Floats, Floats | None, Floats | None], GameNoise]
+"""Makes game noise from its choices, its shift and the sides of the targets."""
+
+
+@dataclass(frozen=True)
+class Plans:
+    """Plans of n engagements.
+
+    Parameters
+    ----------
+    start : ndarray, shape (n, 4) or (n, 6)
+        (z, x, V_z, V_x) at t = 0, m and m/s; (y, z, x, V_y, V_z, V_x) in space.
+    errors : ndarray, shape (n, rows, axes, steps)
+        Measurement errors in units of their bounds, one row per sensor, for each lateral axis. A sensor that does not
+        measure by axis uses the first.
+    sides : ndarray, shape (n, axes, steps)
+        Sign of the target's acceleration.
+    lineage, changes : ndarray of int, shape (n,)
+        Index of the first plan from which a plan was derived, and number of changes since then.
+    value : ndarray, shape (n,)
+        What the search maximises, m; -inf if the engagement does not count, or before it is simulated.
+    """
+
+    start: Floats
+    errors: Floats
+    sides: Floats
+    lineage: Integers
+    changes: Integers
+    value: Floats
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def take(self, which: Integers | slice) -> Plans:
+        """Return copies of some plans."""
+        return Plans(*(getattr(self, field.name)[which].copy() for field in fields(self)))
+
+    def join(self, other: Plans) -> Plans:
+        """Return these plans and others."""
+        return Plans(*(np.concatenate([getattr(part, of.name) for part in (self, other)]) for of in fields(self)))
+
+
+def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
+    """Return values of shape (n, C, ...) as a sensor uses them: (C, n, ...) if it measures by axis, otherwise (n, ...).
+
+    None is the angle sensor.
+    """
+    return np.moveaxis(values, 1, 0) if sensor is None or sensor.is_lateral else values[:, 0]
+
+
+class Planner:
+    """Random plans of a scenario whose flights have a number of steps.
+
+    In the guaranteed model the target accelerates at the bound of the model, or at that of the scenario's target if
+    that is greater. In the model `paper` the disturbance is fictitious.
+
+    Attributes
+    ----------
+    sensors : tuple of Sensor
+        Sensors of the rows of the errors, that of the angles first.
+    acceleration_m_s2 : ndarray, shape (axes,)
+        Acceleration of the target along each axis, m/s^2; zero if the target is that of the scenario.
+    constructions : list of str
+        Construction of each first plan so far, by lineage.
+    """
+
+    def __init__(self, scenario: Scenario, steps: int, seed: int) -> None:
+        model, target = scenario.set_model, scenario.target
+        self._model, self._steps, self._random = model, steps, np.random.default_rng(seed)
+        others = [sensor for name, sensor in scenario.sensors.items() if name != BearingSensor.name]
+        self.sensors: tuple[Sensor, ...] = (scenario.bearing_sensor, *others)
+        self._lower, self._upper = corners(model.bounds)
+        self._axes = len(model.axes)
+        self.acceleration_m_s2: Floats = np.zeros(self._axes)
+        if model.is_guaranteed:
+            self.acceleration_m_s2 = np.array([model.axis(axis).disturbance_m_s2 for axis in model.axes])
+            if target is not None and target.manoeuvre is not Manoeuvre.NONE:
+                self.acceleration_m_s2 = np.maximum(self.acceleration_m_s2, amplitudes_m_s2(target, self._axes))
+        self.constructions: list[str] = []
+        self._changes: list[Callable[[Plans, int, Plans], None]] = [
+            self._flip,
+            self._move_switch,
+            self._roll,
+            self._give_block,
+            self._move_error,
+            self._cross,
+            self._move_start,
+            self._move_start,
+            self._move_start,
+        ]
+        if self.acceleration_m_s2.any():
+            self._changes.append(self._turn_target)
+
+    def first(self, count: int) -> list[tuple[Plans, Game | None]]:
+        """Return first plans, in equal numbers for each construction, with the game noise that chooses the errors.
+
+        Their errors of the angles are then the choices of this noise.
+        """
+        makers: list[tuple[str, Game | None, Callable[[Floats], Floats]]] = [
+            *((f"game noise, tie {tie.value}", partial(GameNoise, tie), self._coins) for tie in TieRule),
+            ("extremes kept in random order", partial(SwitchingNoise, TieRule.RANDOM), self._coins),
+            ("extremes kept in blocks", partial(SwitchingNoise, TieRule.RANDOM), self._blocks),
+            ("extremal errors in blocks", None, self._blocks),
+            ("constant errors", None, self._constant),
+            ("middle of a pair", None, self._pair),
+        ]
+        shares = [len(part) for part in np.array_split(np.arange(count), len(makers))]
+        plans: list[tuple[Plans, Game | None]] = []
+        for (name, game, maker), share in zip(makers, shares, strict=True):
+            if share == 0:
+                continue
+            start = self._starts(share)
+            others = self._random.choice([-1.0, 0.0, 1.0], (share, len(self.sensors) - 1, self._axes, 1))
+            errors = [maker(start)[:, None], np.repeat(others, self._steps, axis=3)]
+            # Game noise with a shift knows the sign of a constant acceleration.
+            in_blocks = (self._random.random((share, 1, 1)) < 0.5) & (not name.startswith("game"))
+            sides = np.where(in_blocks, self._blocks(start), self._coins(start)[:, :, :1])
+            lineage = len(self.constructions) + np.arange(share)
+            self.constructions += [name] * share
+            untried = np.full(share, -np.inf)
+            plans.append((Plans(start, np.concatenate(errors, axis=1), sides, lineage, 0 * lineage, untried), game))
+        return plans
+
+    def children(self, elite: Plans, count: int) -> Plans:
+        """Return changed plans of the elite; plans with a greater miss are chosen more often."""
+        ranks = np.floor(len(elite) * self._random.random(count) ** 2).astype(np.int64)
+        plans = elite.take(ranks)
+        for i in range(count):
+            for _ in range(int(self._random.integers(1, MAX_CHANGES + 1))):
+                change = self._changes[int(self._random.integers(len(self._changes)))]
+                change(plans, i, elite)
+        plans.changes[:] += 1
+        return plans
+
+    def _starts(self, count: int) -> Floats:
+        """Return starts in B x D; in a quarter of them, some coordinates are at an end of their interval."""
+        share = self._random.random((count, len(self._lower)))
+        at_end = (self._random.random(share.shape) < 0.5) & (self._random.random((count, 1)) < 0.5)
+        return self._lower + (self._upper - self._lower) * np.where(at_end, np.round(share), share)
+
+    def _coins(self, start: Floats) -> Floats:
+        return np.asarray(self._random.choice([-1.0, 1.0], (len(start), self._axes, self._steps)))
+
+    def _blocks(self, start: Floats) -> Floats:
+        one = (len(start), self._axes, 1)
+        switches = self._random.random((*one[:2], self._steps)) < 10.0 ** self._random.uniform(-2.5, -0.5, one)
+        return np.asarray(self._random.choice([-1.0, 1.0], one) * (-1.0) ** np.cumsum(switches, axis=2))
+
+    def _constant(self, start: Floats) -> Floats:
+        return np.repeat(self._random.uniform(-1.0, 1.0, (len(start), self._axes, 1)), self._steps, axis=2)
+
+    def _pair(self, start: Floats) -> Floats:
+        """Return errors that show the middle between the true motion and another straight one.
+
+        Shortly before the end the two are two bounds apart and can be distinguished; after that the measurements are
+        exact. In space, the two differ along both axes.
+        """
+        model, step_s, one = self._model, self._model.step_s, (len(start), self._axes, 1)
+        x, closing = start[:, self._axes, None, None], -start[:, -1, None, None]
+        ranges = np.maximum(x - closing * step_s * np.arange(self._steps), 0.0)
+        bound = ranges * np.concatenate(
+            [model.angle_sensor.axis(axis).error_bound(ranges) for axis in model.axes], axis=1
+        )
+        time_left = self._random.uniform(1.0, 12.0, (len(start), 1, 1)) * step_s
+        apart_at = np.clip(np.round((x / closing - time_left) / step_s), 1, self._steps - 1).astype(int)
+        begin = self._random.uniform(-1.0, 1.0, one) * bound[..., :1]
+        end = self._random.choice([-1.0, 1.0], one) * np.take_along_axis(
+            bound, np.repeat(apart_at, self._axes, axis=1), axis=2
+        )
+        half = begin + (end - begin) * np.arange(self._steps) / apart_at
+        errors = np.divide(half, bound, out=np.zeros_like(half), where=bound > 0.0)
+        return np.where(np.arange(self._steps) <= apart_at, np.clip(errors, -1.0, 1.0), 0.0)
+
+    def _last_step(self, plans: Plans, i: int) -> int:
+        """Return the last step before the closest approach of a start, plus one."""
+        x, vx = float(plans.start[i, self._axes]), float(plans.start[i, -1])
+        return min(self._steps - 1, int(x / (-vx * self._model.step_s)) + 1)
+
+    def _step(self, plans: Plans, i: int) -> int:
+        """Return a random step: anywhere or near the end, with equal probability."""
+        last = self._last_step(plans, i)
+        if self._random.random() < 0.5:
+            return int(self._random.integers(last + 1))
+        return max(0, last - int(self._random.exponential(LATE_STEPS)))
+
+    def _span(self, plans: Plans, i: int) -> slice:
+        """Return a random block of steps; short ones are more frequent."""
+        begin = self._step(plans, i)
+        return slice(begin, begin + 1 + int(10.0 ** self._random.uniform(0.0, 2.0)))
+
+    def _some_axes(self) -> slice:
+        """Return one lateral axis or both."""
+        return slice(0, 1) if self._axes == 1 else slice(*((0, 1), (1, 2), (0, 2))[int(self._random.integers(3))])
+
+    def _flip(self, plans: Plans, i: int, elite: Plans) -> None:
+        """Change the sign of the errors of the angles in a block."""
+        plans.errors[i, ANGLE, self._some_axes(), self._span(plans, i)] *= -1.0
+
+    def _move_switch(self, plans: Plans, i: int, elite: Plans) -> None:
+        """Move one switching time by a few steps; if both axes are moved, one of the first."""
+        errors = plans.errors[i, ANGLE, self._some_axes()]
+        switches = np.flatnonzero(np.diff(np.sign(errors[0, : self._last_step(plans, i) + 1])))
+        if switches.size:
+            at, by = int(self._random.choice(switches)), int(self._random.integers(1, 5))
+            if self._random.random() < 0.5:
+                errors[:, at + 1 : at + 1 + by] *= -1.0
+            else:
+                errors[:, max(0, at + 1 - by) : at + 1] *= -1.0
+
+    def _roll(self, plans: Plans, i: int, elite: Plans) -> None:
+        """Move the whole plan by a few steps."""
+        by = int(self._random.choice([-3, -2, -1, 1, 2, 3]))
+        plans.errors[i], plans.sides[i] = (np.roll(part[i], by, axis=-1) for part in (plans.errors, plans.sides))
+
+    def _give_block(self, plans: Plans, i: int, elite: Plans) -> None:
+        """Set the errors of a block."""
+        values = [-1.0, 0.0, 1.0, self._random.uniform(-1.0, 1.0)]
+        plans.errors[i, ..., self._span(plans, i)] = self._random.choice(values, (len(self.sensors), self._axes, 1))
+
+    def _move_error(self, plans: Plans, i: int, elite: Plans) -> None:
+        """Change the size of the errors of a block."""
+        errors = plans.errors[i, ..., self._span(plans, i)]
+        by = self._random.normal(0.0, 10.0 ** self._random.uniform(-2.0, 0.0), (len(self.sensors), self._axes, 1))
+        errors[:] = np.clip(errors + by, -1.0, 1.0)
+
+    def _cross(self, plans: Plans, i: int, elite: Plans) -> None:
+        """Replace the end of the plan by that of another plan of the elite."""
+        other, begin = int(self._random.integers(len(elite))), self._step(plans, i)
+        plans.errors[i, ..., begin:] = elite.errors[other, ..., begin:]
+        plans.sides[i, :, begin:] = elite.sides[other, :, begin:]
+
+    def _move_start(self, plans: Plans, i: int, elite: Plans) -> None:
+        """Move the start in some coordinates or in all, or set some coordinates to an end."""
+        width = self._upper - self._lower
+        which = self._random.random(len(width)) < self._random.choice([0.25, 1.0])
+        moved = plans.start[i] + width * 10.0 ** self._random.uniform(-5.0, -0.5) * self._random.normal(size=len(width))
+        if self._random.random() < 0.1:
+            moved = np.where(self._random.random(len(width)) < 0.5, self._lower, self._upper)
+        plans.start[i] = np.clip(np.where(which, moved, plans.start[i]), self._lower, self._upper)
+
+    def _turn_target(self, plans: Plans, i: int, elite: Plans) -> None:
+        """Give the target's acceleration another sign in a block, or from a step on, along one axis or both."""
+        span = self._span(plans, i)
+        span = slice(span.start, span.stop if self._random.random() < 0.5 else None)
+        plans.sides[i, self._some_axes(), span] = self._random.choice([-1.0, 1.0])
