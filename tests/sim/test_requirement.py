@@ -138,7 +138,7 @@ def test_a_requirement_without_a_quantile_is_that_of_p99(text: str) -> None:
     "text",
     [
         *("hit", "hit<0.95", "hit>=1", "hit>=0", "hit>=95", "hit>=nan", "hit p50>=0.9", "hit=>0.9", "hit>=99%"),
-        *("", "miss_m", "miss_m 10", "miss_m>10", "miss_m<0", "miss_m<1e400", "miss_m<10 m", "miss<10"),
+        *("", "miss_m", "miss_m 10", "miss_m>10", "miss_m<0", "miss_m<1e400", "miss_m<10 m", "miss<10", "p99<10"),
         *("miss_m p0<10", "miss_m p100<10", "miss_m p٩٩<10"),
     ],
 )

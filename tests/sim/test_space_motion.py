@@ -1,4 +1,4 @@
-"""Motion, random numbers and bounds of engagements in space: the plane, symmetries and an independent integrator."""
+"""Motion, random numbers and bounds of engagements in space: the plane and symmetries."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from infoset import Model, SetModel
 from infoset.arrays import Floats
@@ -103,45 +102,6 @@ def test_the_orbit_is_across_the_sun_and_toward_x() -> None:
         np.testing.assert_allclose([toward @ toward, orbit @ orbit, toward @ orbit], [1.0, 1.0, 0.0], atol=4e-16)
         np.testing.assert_allclose(np.linalg.det(np.array([toward, orbit, [0.0, 0.0, 1.0]])), 0.0, atol=2e-16)
         assert orbit[2] > 0.0
-
-
-def relative_by_scipy(position: Floats, velocity: Floats, sun: Sun, duration_s: float) -> Floats:
-    """Relative (y, z, x) and its rate from the heliocentric equations of both craft.
-
-    The unknowns are the displacement of the spacecraft from its start and the relative position: heliocentric
-    positions of the two have rounding errors of 3e-5 m.
-    """
-    angles = sun.direction_rad, sun.elevation_rad
-    toward = np.array([np.sin(angles[1]), np.cos(angles[1]) * np.sin(angles[0]), np.cos(angles[1]) * np.cos(angles[0])])
-    orbit = np.array([0.0, 0.0, 1.0]) - toward[2] * toward
-    orbit /= np.linalg.norm(orbit)
-
-    def attraction(place: Floats) -> Floats:
-        return -sun.gravitational_parameter_m3_s2 * place / np.linalg.norm(place) ** 3
-
-    def rates(_: float, state: Floats) -> Floats:
-        moved, speed, relative, relative_speed = state.reshape(4, 3)
-        craft = moved - sun.distance_m * toward
-        pull = attraction(craft)
-        return np.concatenate([speed, pull, relative_speed, attraction(craft + relative) - pull])
-
-    speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m) * orbit
-    start = np.concatenate([np.zeros(3), speed, position, velocity])
-    solution = solve_ivp(rates, (0.0, duration_s), start, method="DOP853", rtol=1e-13, atol=1e-12, max_step=5.0)
-    return np.asarray(solution.y[6:, -1])
-
-
-@pytest.mark.parametrize("direction", [90.0, -35.0, 160.0])
-@pytest.mark.parametrize("elevation", [0.0, 25.0, -70.0, 90.0])
-def test_motion_agrees_with_an_independent_integrator(direction: float, elevation: float) -> None:
-    sun = replace(SUN, direction_rad=np.radians(direction), elevation_rad=np.radians(elevation))
-    position, velocity = np.array([[5000.0, -8000.0, 6e6]]), np.array([[-40.0, 90.0, -58_900.0]])
-    motion = KeplerMotion(position, velocity, sun)
-    for _ in range(200):
-        motion.advance(0.5)
-    expected = relative_by_scipy(position[0], velocity[0], sun, 100.0)
-    np.testing.assert_allclose(motion.position_m[0], expected[:3], rtol=0.0, atol=1e-6)
-    np.testing.assert_allclose(motion.velocity_m_s[0], expected[3:], rtol=0.0, atol=1e-8)
 
 
 def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
