@@ -89,17 +89,6 @@ def image_times_s(scenario: Scenario) -> list[float]:
     return [time_s for time_s in before_s if camera.measures_at(time_s)]
 
 
-def images_s(scenario: Scenario) -> tuple[float, float]:
-    """Return the times before the arrival of the first image and of the last one before the last decision, s.
-
-    A ValueError is raised if there are fewer than two such images.
-    """
-    before_s = image_times_s(scenario)
-    if len(before_s) < 2:
-        raise ValueError("a bound of the miss needs two images before the last impulse: take more images, or earlier")
-    return before_s[0], before_s[-1]
-
-
 def last_possible_miss_m(scenario: Scenario) -> float | None:
     """Return half the maximum width of the interval of misses that all images leave possible at the last decision, m.
 
@@ -177,14 +166,16 @@ def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> floa
         raise ValueError("the closed form is that of a camera: the scenario must have the table camera")
     if camera.miss_probability > 0.0:
         raise ValueError("the closed form is that of a camera that loses no image: set camera.miss_probability = 0")
-    first_s, last_s = images_s(scenario)
+    before_s = image_times_s(scenario)
+    if len(before_s) < 2:
+        raise ValueError("a bound of the miss needs two images before the last impulse: take more images, or earlier")
     along = (
         possible_miss_m(
             model.closing_speed_m_s,
             camera.constant_error_rad,
             camera.centroid_error_m,
-            first_s,
-            last_s,
+            before_s[0],
+            before_s[-1],
             disturbance_m_s2=model.axis(axis).disturbance_m_s2,
             constant_bias=constant_bias,
         )

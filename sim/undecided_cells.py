@@ -20,46 +20,30 @@ GROWTH = 1.05
 """A sample grows by at least this factor between two checks of a quantile: one after each chunk would cost O(N^2)."""
 
 
-class QuantileSample:
-    """Runs of one noise of a cell, whose quantile is checked after certain numbers of its chunks.
+class Sample:
+    """Runs of one noise of a cell, by which a rule is decided.
 
-    The numbers depend neither on the workers nor on their speed: a campaign stops at the same run on one worker and on
-    a hundred, in one session and in ten. O(N log N) over a campaign.
+    A quantile is checked after certain numbers of chunks, which depend neither on the workers nor on their speed: a
+    campaign stops at the same run on one worker and on a hundred, in one session and in ten. O(N log N) over a
+    campaign. A requirement is checked after each run.
     """
 
-    def __init__(self, rule: StoppingRule, chunks: int) -> None:
+    def __init__(self, rule: StoppingRule | AnyRequirement, chunks: int) -> None:
         self.decided = False
-        self._rule = rule
-        self._last = chunks
-        self._values: list[Floats] = []
-        self._next_check = 1
+        self._rule, self._last = rule, chunks
+        self._count, self._next_check = 0, 1
+        self._values: Floats = np.empty(0)
 
     def add(self, values: Floats) -> None:
         """Add the values of a chunk; NaN is unknown."""
-        self._values.append(values[~np.isnan(values)])
-        count = len(self._values)
-        if count == min(self._next_check, self._last):
-            self._next_check = max(count + 1, math.ceil(GROWTH * count))
-            self.decided = self._rule.met_by(np.concatenate(self._values))
-
-
-class ShareSample:
-    """Runs of one noise of a cell, whose share that satisfies a requirement is judged by a confidence sequence."""
-
-    def __init__(self, required: AnyRequirement) -> None:
-        self.decided = False
-        self._required = required
-        self._runs = self._holding = 0
-
-    def add(self, values: Floats) -> None:
-        """Add the values of a chunk."""
-        if not values.size:
-            return
-        required = self._required
-        counts = self._holding + np.cumsum(required.holds(values))
-        runs = np.arange(self._runs + 1, self._runs + values.size + 1)
-        self.decided |= bool(decides(runs, counts, required.share).any())
-        self._runs, self._holding = int(runs[-1]), int(counts[-1])
+        self._count += 1
+        before, self._values = len(self._values), np.append(self._values, values[~np.isnan(values)])
+        if not isinstance(self._rule, StoppingRule):
+            runs, counts = np.arange(1, len(self._values) + 1), np.cumsum(self._rule.holds(self._values))
+            self.decided |= bool(decides(runs[before:], counts[before:], self._rule.share).any())
+        elif self._count == min(self._next_check, self._last):
+            self._next_check = max(self._count + 1, math.ceil(GROWTH * self._count))
+            self.decided = self._rule.met_by(self._values)
 
 
 @dataclass
@@ -67,7 +51,7 @@ class _Cell:
     """Progress of a cell: its chunks, the number of judged ones, and the judged runs of each noise."""
 
     chunks: list[range]
-    samples: dict[str, QuantileSample | ShareSample]
+    samples: dict[str, Sample]
     judged: int = 0
     waiting: dict[Sequence[int], Results] = field(default_factory=dict)
 
@@ -89,16 +73,7 @@ class UndecidedCells:
         for cell, runs in folder.manifest.chunks():
             chunks[cell].append(runs)
         noises = [kind.value for kind in folder.manifest.noise.kinds]
-        self._cells = [
-            _Cell(
-                each,
-                {
-                    noise: QuantileSample(rule, len(each)) if isinstance(rule, StoppingRule) else ShareSample(rule)
-                    for noise in noises
-                },
-            )
-            for each in chunks
-        ]
+        self._cells = [_Cell(each, {noise: Sample(rule, len(each)) for noise in noises}) for each in chunks]
         for cell in range(len(self._cells)):
             self._advance(cell)
 

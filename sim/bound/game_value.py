@@ -84,15 +84,10 @@ def value_reserve(scenario: Scenario, lower: LowerBound) -> ValueReserve | str:
     -----
     docs/guarantee.md, Lemma 22, has the proof. Cost: one information set.
     """
-    course = _course(scenario)
-    exact = replace(course, min_impulse_m_s=0.0, threshold_m=0.0, is_small=True)
-    steps = (
-        exact,
-        replace(exact, is_small=False),
-        replace(exact, is_small=False, min_impulse_m_s=course.min_impulse_m_s),
-        course,
-    )
-    misses_m, impulses_m_s = zip(*(_guarantee(each) for each in steps), strict=True)
+    course, minimum_m_s = _course(scenario), scenario.thruster.min_impulse_m_s
+    small, tangent, dead_zone = (True, 0.0, 0.0), (False, 0.0, 0.0), (False, minimum_m_s, 0.0)
+    steps = (small, tangent, dead_zone, (False, minimum_m_s, course.threshold_m))
+    misses_m, impulses_m_s = zip(*(_guarantee(scenario, course, *each) for each in steps), strict=True)
     if max(impulses_m_s) > scenario.thruster.budget_m_s:
         return f"budget below the {max(impulses_m_s):.3g} m/s that symmetric-miss may need"
     return ValueReserve(*np.diff([lower.bound_m, *misses_m]).tolist())
@@ -106,20 +101,17 @@ class _Course:
     after it; `later_m` is what these add. `first_m` is the maximum possible miss at the start.
     """
 
-    scenario: Scenario
     range_m: Floats
     measured: Flags
     may_decide: Flags
     half_width_m: Floats
     later_m: Floats
     first_m: float
-    min_impulse_m_s: float
     threshold_m: float
-    is_small: bool
 
 
 def _course(scenario: Scenario) -> _Course:
-    model, thruster = on_board_model(scenario), scenario.thruster
+    model = on_board_model(scenario)
     box, e, step_s = model.bounds, model.closing_speed_m_s, model.step_s
     z_m, vz_m_s = (0.5 * float(np.ptp(ends)) for ends in (box.z_m, box.vz_m_s))
     centred = StateBox((-z_m, z_m), box.x_m, (-vz_m_s, vz_m_s), box.vx_m_s)
@@ -143,39 +135,37 @@ def _course(scenario: Scenario) -> _Course:
     # The set has the accelerations of a step as velocities at its ends (Lemma 3).
     arms_m = model.acceleration_m_s2 * step_s * ranges_m / e
     return _Course(
-        scenario=scenario,
         range_m=ranges_m,
         measured=measured,
         may_decide=np.ones(steps, dtype=bool) if given is None else np.isin(np.arange(steps), given),
         half_width_m=half_width_m,
         later_m=np.cumsum(arms_m[::-1])[::-1] - arms_m,
         first_m=max(abs(z + v * box.x_m[0] / e) for z in box.z_m for v in box.vz_m_s) + arms_m.sum() - 0.5 * arms_m[0],
-        min_impulse_m_s=thruster.min_impulse_m_s,
         threshold_m=max(model.min_range_m, nearest_m),
-        is_small=False,
     )
 
 
-def _guarantee(course: _Course) -> tuple[float, float]:
+def _guarantee(
+    scenario: Scenario, course: _Course, is_small: bool, minimum_m_s: float, threshold_m: float
+) -> tuple[float, float]:
     """Return the maximum miss of `symmetric-miss`, m, and the maximum sum of its impulses, m/s."""
-    scenario, model = course.scenario, course.scenario.set_model
-    maximum, minimum, e = scenario.thruster.max_impulse_m_s, course.min_impulse_m_s, model.closing_speed_m_s
-    decides = course.may_decide & (course.range_m >= course.threshold_m)
+    model, maximum_m_s = scenario.set_model, scenario.thruster.max_impulse_m_s
+    e, decides = model.closing_speed_m_s, course.may_decide & (course.range_m >= threshold_m)
     to_go_s, speed_m_s = course.range_m / e, max(abs(v) for v in model.bounds.vz_m_s)
     worst_m, wider, last_to_go_s = course.first_m, 1.0, math.inf
     by_parts_m_s = spent_m_s = 0.0
     for i in range(len(to_go_s)):
-        if course.measured[i] and not course.is_small:
+        if course.measured[i] and not is_small:
             slope = (worst_m / to_go_s[i] + speed_m_s) / e
             wider = max(wider, _wider(model.angle_sensor, float(course.range_m[i]), slope))
         if decides[i]:
             # Impulse i is at most (maximum miss before - after) / tau_i, whose sum is taken by parts, and at most mu2.
             by_parts_m_s += worst_m * (1.0 / to_go_s[i] - 1.0 / last_to_go_s)
-            spent_m_s = min(by_parts_m_s, spent_m_s + maximum)
-            middle_m = wider * course.half_width_m[i] + course.later_m[i] + minimum * to_go_s[i]
-            worst_m = min(worst_m, max(middle_m, worst_m - maximum * to_go_s[i]))
+            spent_m_s = min(by_parts_m_s, spent_m_s + maximum_m_s)
+            middle_m = wider * course.half_width_m[i] + course.later_m[i] + minimum_m_s * to_go_s[i]
+            worst_m = min(worst_m, max(middle_m, worst_m - maximum_m_s * to_go_s[i]))
             last_to_go_s = to_go_s[i]
-            speed_m_s += maximum
+            speed_m_s += maximum_m_s
         speed_m_s += model.disturbance_m_s2 * model.step_s
     return float(worst_m), float(spent_m_s)
 

@@ -13,7 +13,7 @@ from infoset.limits import MAXIMUM, MINIMUM
 from sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
 from sim.requirement import HitRequirement, parse_requirement
 from sim.statistics import level_name
-from sim.undecided_cells import QuantileSample
+from sim.undecided_cells import Sample
 
 RULE = StoppingRule(QuantileName("miss_m", 0.5), 0.5)
 
@@ -72,7 +72,7 @@ def samples(chunks: int, size: int) -> list[Floats]:
 
 def decided_after(rule: StoppingRule, chunks: Sequence[Floats]) -> int | None:
     """Return the number of chunks after which the rule is met."""
-    sample = QuantileSample(rule, len(chunks))
+    sample = Sample(rule, len(chunks))
     for number, values in enumerate(chunks, start=1):
         sample.add(values)
         if sample.decided:
