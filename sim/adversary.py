@@ -175,12 +175,11 @@ def find_worst(
     Notes
     -----
     A quarter of the budget is for first plans: game noise with its four tie rules and, before a cut-off or
-    scheduled impulses, its shift; noise that keeps the upper or the lower extreme in a random or blockwise order;
-    constant errors, extremal errors in blocks, and errors that show the middle between the true motion and one with the
-    same measurements. The errors become those of the plan. The plans with the maximum misses are then changed, by
-    blocks of errors, switching times or coordinates of the start, and compete with their changes. In the first part of
-    the search, the number of plans from one first plan is limited. In space, both axes have errors of their own, and a
-    change of the angle errors is along one axis or both.
+    scheduled impulses, its shift; and noise that keeps the upper or the lower extreme in a random or blockwise order.
+    The errors become those of the plan. The plans with the maximum misses are then changed, by blocks of errors,
+    switching times or coordinates of the start, and compete with their changes. In the first part of the search, the
+    number of plans from one first plan is limited. In space, both axes have errors of their own, and a change of the
+    angle errors is along one axis or both.
 
     In the guaranteed model the targets accelerate at the bound of the model, `set_model.disturbance_m_s2`, with signs
     that belong to the plan, constant or in blocks. They replace the target of the

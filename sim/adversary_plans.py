@@ -103,13 +103,11 @@ class Planner:
             if target is not None and target.manoeuvre is not Manoeuvre.NONE:
                 self.acceleration_m_s2 = np.maximum(self.acceleration_m_s2, amplitudes_m_s2(target, self._axes))
         self.constructions: list[str] = []
-        self._changes: list[Callable[[Plans, int, Plans], None]] = [
+        self._changes: list[Callable[[Plans, int], None]] = [
             self._flip,
             self._move_switch,
-            self._roll,
             self._give_block,
             self._move_error,
-            self._cross,
             self._move_start,
             self._move_start,
             self._move_start,
@@ -117,34 +115,32 @@ class Planner:
         if self.acceleration_m_s2.any():
             self._changes.append(self._turn_target)
 
-    def first(self, count: int) -> list[tuple[Plans, Game | None]]:
-        """Return first plans, in equal numbers for each construction, with the game noise that chooses the errors.
+    def first(self, count: int) -> list[tuple[Plans, Game]]:
+        """Return first plans, in equal numbers for each construction, with the game noise that chooses their errors.
 
-        Their errors of the angles are then the choices of this noise.
+        The errors of the angles are the choices of this noise: between ties, or of the extreme that it keeps.
         """
-        makers: list[tuple[str, Game | None, Callable[[Floats], Floats]]] = [
+        switching = partial(SwitchingNoise, TieRule.RANDOM)
+        makers: list[tuple[str, Game, Callable[[int], Floats]]] = [
             *((f"game noise, tie {tie.value}", partial(GameNoise, tie), self._coins) for tie in TieRule),
-            ("extremes kept in random order", partial(SwitchingNoise, TieRule.RANDOM), self._coins),
-            ("extremes kept in blocks", partial(SwitchingNoise, TieRule.RANDOM), self._blocks),
-            ("extremal errors in blocks", None, self._blocks),
-            ("constant errors", None, self._constant),
-            ("middle of a pair", None, self._pair),
+            ("extremes kept in random order", switching, self._coins),
+            ("extremes kept in blocks", switching, self._blocks),
         ]
         shares = [len(part) for part in np.array_split(np.arange(count), len(makers))]
-        plans: list[tuple[Plans, Game | None]] = []
-        for (name, game, maker), share in zip(makers, shares, strict=True):
+        plans: list[tuple[Plans, Game]] = []
+        for (name, game, choices), share in zip(makers, shares, strict=True):
             if share == 0:
                 continue
-            start = self._starts(share)
-            others = self._random.choice([-1.0, 0.0, 1.0], (share, len(self.sensors) - 1, self._axes, 1))
-            errors = [maker(start)[:, None], np.repeat(others, self._steps, axis=3)]
+            errors = np.zeros((share, len(self.sensors), self._axes, self._steps))
+            errors[:, ANGLE] = choices(share)
             # Game noise with a shift knows the sign of a constant acceleration.
-            in_blocks = (self._random.random((share, 1, 1)) < 0.5) & (not name.startswith("game"))
-            sides = np.where(in_blocks, self._blocks(start), self._coins(start)[:, :, :1])
+            in_blocks = (self._random.random((share, 1, 1)) < 0.5) & (game is switching)
+            sides = np.where(in_blocks, self._blocks(share), self._coins(share)[:, :, :1])
             lineage = len(self.constructions) + np.arange(share)
             self.constructions += [name] * share
-            untried = np.full(share, -np.inf)
-            plans.append((Plans(start, np.concatenate(errors, axis=1), sides, lineage, 0 * lineage, untried), game))
+            plans.append(
+                (Plans(self._starts(share), errors, sides, lineage, 0 * lineage, np.full(share, -np.inf)), game)
+            )
         return plans
 
     def children(self, elite: Plans, count: int) -> Plans:
@@ -154,7 +150,7 @@ class Planner:
         for i in range(count):
             for _ in range(int(self._random.integers(1, MAX_CHANGES + 1))):
                 change = self._changes[int(self._random.integers(len(self._changes)))]
-                change(plans, i, elite)
+                change(plans, i)
         plans.changes[:] += 1
         return plans
 
@@ -164,38 +160,13 @@ class Planner:
         at_end = (self._random.random(share.shape) < 0.5) & (self._random.random((count, 1)) < 0.5)
         return self._lower + (self._upper - self._lower) * np.where(at_end, np.round(share), share)
 
-    def _coins(self, start: Floats) -> Floats:
-        return np.asarray(self._random.choice([-1.0, 1.0], (len(start), self._axes, self._steps)))
+    def _coins(self, count: int) -> Floats:
+        return np.asarray(self._random.choice([-1.0, 1.0], (count, self._axes, self._steps)))
 
-    def _blocks(self, start: Floats) -> Floats:
-        one = (len(start), self._axes, 1)
+    def _blocks(self, count: int) -> Floats:
+        one = (count, self._axes, 1)
         switches = self._random.random((*one[:2], self._steps)) < 10.0 ** self._random.uniform(-2.5, -0.5, one)
         return np.asarray(self._random.choice([-1.0, 1.0], one) * (-1.0) ** np.cumsum(switches, axis=2))
-
-    def _constant(self, start: Floats) -> Floats:
-        return np.repeat(self._random.uniform(-1.0, 1.0, (len(start), self._axes, 1)), self._steps, axis=2)
-
-    def _pair(self, start: Floats) -> Floats:
-        """Return errors that show the middle between the true motion and another straight one.
-
-        Shortly before the end the two are two bounds apart and can be distinguished; after that the measurements are
-        exact. In space, the two differ along both axes.
-        """
-        model, step_s, one = self._model, self._model.step_s, (len(start), self._axes, 1)
-        x, closing = start[:, self._axes, None, None], -start[:, -1, None, None]
-        ranges = np.maximum(x - closing * step_s * np.arange(self._steps), 0.0)
-        bound = ranges * np.concatenate(
-            [model.angle_sensor.axis(axis).error_bound(ranges) for axis in model.axes], axis=1
-        )
-        time_left = self._random.uniform(1.0, 12.0, (len(start), 1, 1)) * step_s
-        apart_at = np.clip(np.round((x / closing - time_left) / step_s), 1, self._steps - 1).astype(int)
-        begin = self._random.uniform(-1.0, 1.0, one) * bound[..., :1]
-        end = self._random.choice([-1.0, 1.0], one) * np.take_along_axis(
-            bound, np.repeat(apart_at, self._axes, axis=1), axis=2
-        )
-        half = begin + (end - begin) * np.arange(self._steps) / apart_at
-        errors = np.divide(half, bound, out=np.zeros_like(half), where=bound > 0.0)
-        return np.where(np.arange(self._steps) <= apart_at, np.clip(errors, -1.0, 1.0), 0.0)
 
     def _last_step(self, plans: Plans, i: int) -> int:
         """Return the last step before the closest approach of a start, plus one."""
@@ -218,11 +189,11 @@ class Planner:
         """Return one lateral axis or both."""
         return slice(0, 1) if self._axes == 1 else slice(*((0, 1), (1, 2), (0, 2))[int(self._random.integers(3))])
 
-    def _flip(self, plans: Plans, i: int, elite: Plans) -> None:
+    def _flip(self, plans: Plans, i: int) -> None:
         """Change the sign of the errors of the angles in a block."""
         plans.errors[i, ANGLE, self._some_axes(), self._span(plans, i)] *= -1.0
 
-    def _move_switch(self, plans: Plans, i: int, elite: Plans) -> None:
+    def _move_switch(self, plans: Plans, i: int) -> None:
         """Move one switching time by a few steps; if both axes are moved, one of the first."""
         errors = plans.errors[i, ANGLE, self._some_axes()]
         switches = np.flatnonzero(np.diff(np.sign(errors[0, : self._last_step(plans, i) + 1])))
@@ -233,29 +204,18 @@ class Planner:
             else:
                 errors[:, max(0, at + 1 - by) : at + 1] *= -1.0
 
-    def _roll(self, plans: Plans, i: int, elite: Plans) -> None:
-        """Move the whole plan by a few steps."""
-        by = int(self._random.choice([-3, -2, -1, 1, 2, 3]))
-        plans.errors[i], plans.sides[i] = (np.roll(part[i], by, axis=-1) for part in (plans.errors, plans.sides))
-
-    def _give_block(self, plans: Plans, i: int, elite: Plans) -> None:
+    def _give_block(self, plans: Plans, i: int) -> None:
         """Set the errors of a block."""
         values = [-1.0, 0.0, 1.0, self._random.uniform(-1.0, 1.0)]
         plans.errors[i, ..., self._span(plans, i)] = self._random.choice(values, (len(self.sensors), self._axes, 1))
 
-    def _move_error(self, plans: Plans, i: int, elite: Plans) -> None:
+    def _move_error(self, plans: Plans, i: int) -> None:
         """Change the size of the errors of a block."""
         errors = plans.errors[i, ..., self._span(plans, i)]
         by = self._random.normal(0.0, 10.0 ** self._random.uniform(-2.0, 0.0), (len(self.sensors), self._axes, 1))
         errors[:] = np.clip(errors + by, -1.0, 1.0)
 
-    def _cross(self, plans: Plans, i: int, elite: Plans) -> None:
-        """Replace the end of the plan by that of another plan of the elite."""
-        other, begin = int(self._random.integers(len(elite))), self._step(plans, i)
-        plans.errors[i, ..., begin:] = elite.errors[other, ..., begin:]
-        plans.sides[i, :, begin:] = elite.sides[other, :, begin:]
-
-    def _move_start(self, plans: Plans, i: int, elite: Plans) -> None:
+    def _move_start(self, plans: Plans, i: int) -> None:
         """Move the start in some coordinates or in all, or set some coordinates to an end."""
         width = self._upper - self._lower
         which = self._random.random(len(width)) < self._random.choice([0.25, 1.0])
@@ -264,7 +224,7 @@ class Planner:
             moved = np.where(self._random.random(len(width)) < 0.5, self._lower, self._upper)
         plans.start[i] = np.clip(np.where(which, moved, plans.start[i]), self._lower, self._upper)
 
-    def _turn_target(self, plans: Plans, i: int, elite: Plans) -> None:
+    def _turn_target(self, plans: Plans, i: int) -> None:
         """Give the target's acceleration another sign in a block, or from a step on, along one axis or both."""
         span = self._span(plans, i)
         span = slice(span.start, span.stop if self._random.random() < 0.5 else None)

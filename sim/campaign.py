@@ -209,7 +209,8 @@ class Campaign:
         running: dict[tuple[int, int], float] = {}
 
         def task_of(cell: int, runs: range) -> Task:
-            task = self._task(cell, runs)
+            scenario, noise = (self.cells or (self.scenario,))[cell], self._own_noise or self._noise
+            task = Task(scenario, runs, self.seed, noise, self.guarantee, self.strategy, cell)
             if progress is None or not within_chunks:
                 return task
 
@@ -229,7 +230,3 @@ class Campaign:
                     progress(done / total)
         if cells is not None and cells.runs:
             folder.stop(cells.runs)
-
-    def _task(self, cell: int, runs: range) -> Task:
-        scenario = (self.cells or (self.scenario,))[cell]
-        return Task(scenario, runs, self.seed, self._own_noise or self._noise, self.guarantee, self.strategy, cell)

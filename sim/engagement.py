@@ -275,16 +275,13 @@ class Engagements:
         target, draws = self.scenario.target, self._draws.target
         if target is None or draws is None:
             return None
-        predicted = self._true_predicted_miss(sight)
+        # Signed misses of the true states without further impulses.
+        left_s = np.maximum(self._arrival_s - self.step * self.scenario.set_model.step_s, 0.0)
+        predicted = np.asarray((sight.omega_rad_s * sight.range_m - self._impulse) * left_s)
         if isinstance(self._noise, GameNoise):
             side = self._noise.truth_side
             predicted = np.where(side == 0.0, predicted, side)
         return acceleration_m_s2(target, draws, self.step, self.scenario.set_model.step_s, predicted)
-
-    def _true_predicted_miss(self, sight: Sight) -> Floats:
-        """Return the signed misses of the true states without further impulses, m, shape (C, B)."""
-        left_s = np.maximum(self._arrival_s - self.step * self.scenario.set_model.step_s, 0.0)
-        return np.asarray((sight.omega_rad_s * sight.range_m - self._impulse) * left_s)
 
     def _pending(self) -> Pending:
         """Return the impulses that are decided and not given yet, with the times from now to them, s."""

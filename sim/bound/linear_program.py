@@ -141,7 +141,8 @@ class PairProgram:
             for value, unit, width in zip((solved.x[0], solved.x[count]), (metre, metre * second), widths, strict=True)
         )
         # The solution violates the limits by up to the solver's tolerances; scaling makes it satisfy them exactly.
-        difference = self.motion.difference(*self._alone(offset, velocity, acceleration))[:, :-1]
+        axis = np.eye(self.motion.axes - 1)[self.axis]
+        difference = self.motion.difference(offset * axis, velocity * axis, axis[:, None] * acceleration)[:, :-1]
         positions, speeds = difference[self.axis], difference[self.motion.axes + self.axis]
         sizes = np.abs(np.concatenate([positions, positions + speeds * self._to_go_s]))
         allowed = np.concatenate([limits / metre, miss_limits / metre])
@@ -153,11 +154,6 @@ class PairProgram:
     def _to_go_s(self) -> Floats:
         """Return x/c at the steps, s."""
         return np.asarray(self.motion.range_m / self.motion.closing_speed_m_s[:-1])
-
-    def _alone(self, offset: float, velocity: float, acceleration: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return a start and an acceleration of this axis with zeros for the other one."""
-        axis = np.eye(self.motion.axes - 1)[self.axis]
-        return offset * axis, velocity * axis, axis[:, None] * acceleration
 
     def _responses(self, at: Integers, since: Integers) -> tuple[tuple[Floats, Floats], ...]:
         """Return position and velocity along the axis at steps, by those at earlier steps and by an acceleration.
