@@ -33,14 +33,6 @@ def hostile(
     )
 
 
-def rising_error() -> Scenario:
-    return hostile(3e5, 1e3, 25.0, 0.012, 0.01, vz_m_s=1.0)
-
-
-def gravity_and_known_speed() -> Scenario:
-    return replace(hostile(3e5, 1.5e2, 100.0, 1e-7, 1e-7), sun=SUN)
-
-
 def rate_and_manoeuvre() -> Scenario:
     scenario = hostile(1e3, 1e3, 25.0, 0.01, 0.01, vz_m_s=1.0)
     return replace(
@@ -52,21 +44,17 @@ def rate_and_manoeuvre() -> Scenario:
     )
 
 
-def sharp_sensor() -> Scenario:
-    return hostile(1e5, 1e3, 2.0, 1e-10, 1e-10, vz_m_s=10.0)
-
-
 @pytest.mark.parametrize(
     "scenario",
     [
         # The error is that of the distance x/cos(alpha), not of the label's x.
-        rising_error(),
+        hostile(3e5, 1e3, 25.0, 0.012, 0.01, vz_m_s=1.0),
         # A changing V_x moves V = omega x - e alpha where z is not zero.
-        gravity_and_known_speed(),
+        replace(hostile(3e5, 1.5e2, 100.0, 1e-7, 1e-7), sun=SUN),
         # A rate's band and the half of the disturbance that the section holds already do not commute.
         rate_and_manoeuvre(),
         # The truth's own rounding must not add up over its substeps.
-        sharp_sensor(),
+        hostile(1e5, 1e3, 2.0, 1e-10, 1e-10, vz_m_s=10.0),
     ],
     ids=["rising-error", "gravity-and-known-speed", "rate-and-manoeuvre", "sharp-sensor"],
 )

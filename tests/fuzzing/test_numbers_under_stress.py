@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -82,18 +81,6 @@ def assert_works(scenario: Scenario, draws: Draws, steps: int | None = None) -> 
     return there
 
 
-def through_a_file(scenario: Scenario) -> Scenario:
-    """The scenario as its file is read."""
-    again = read_text(Scenario, to_toml(scenario), "stress.toml")
-    assert again == scenario
-    return again
-
-
-def bounded(scenario: Scenario) -> int:
-    """So few steps that the truth is integrated in a few thousand substeps."""
-    return min(FEW_STEPS, max(2, int(1e3 / scenario.set_model.step_s)))
-
-
 # The grid -------------------------------------------------------------------------------------------------------
 
 GRID = list(itertools.product(ANGLES_RAD, RANGES_M, SPEEDS_M_S, SECTIONS, STEPS_S))
@@ -102,23 +89,20 @@ GRID = list(itertools.product(ANGLES_RAD, RANGES_M, SPEEDS_M_S, SECTIONS, STEPS_
 Combination = tuple[float, float, float, int, float]
 
 
-def assert_works_or_is_refused(combination: Combination, model: Model, in_space: bool = False) -> bool:
-    angle_rad, range_m, speed_m_s, sections, step_s = combination
-    make = partial(engagement, angle_rad, range_m, speed_m_s, sections, step_s, model, in_space=in_space)
-    if 1.1 * range_m / (speed_m_s * (1.0 - 1e-3)) / step_s > 1e5:
-        with pytest.raises(ValueError, match="at most 100000 steps"):
-            make()
-        return False
-    found = through_a_file(make())
-    assert_works(found, numbers(found, sections, batch=2), bounded(found))
-    return True
-
-
 @EXAMPLES
 @given(st.sampled_from(GRID), st.sampled_from(Model), st.booleans())
 def test_combinations_work_or_are_refused(combination: Combination, model: Model, in_space: bool) -> None:
-    assume(model is Model.GUARANTEED or combination[0] <= SMALL_ANGLE_RAD)
-    assert_works_or_is_refused(combination, model, in_space)
+    angle_rad, range_m, speed_m_s, sections, step_s = combination
+    assume(model is Model.GUARANTEED or angle_rad <= SMALL_ANGLE_RAD)
+    if 1.1 * range_m / (speed_m_s * (1.0 - 1e-3)) / step_s > 1e5:
+        with pytest.raises(ValueError, match="at most 100000 steps"):
+            engagement(*combination, model, in_space=in_space)
+        return
+    scenario = engagement(*combination, model, in_space=in_space)
+    assert read_text(Scenario, to_toml(scenario), "stress.toml") == scenario
+    # So few steps that the truth is integrated in a few thousand substeps.
+    steps = min(FEW_STEPS, max(2, int(1e3 / step_s)))
+    assert_works(scenario, numbers(scenario, sections, batch=2), steps)
 
 
 WHOLE_FLIGHTS = [
@@ -130,14 +114,6 @@ WHOLE_FLIGHTS = [
 ]
 
 
-def assert_whole_flight_works(
-    combination: Combination, model: Model, in_space: bool = False, *, camera: bool = False
-) -> None:
-    scenario = engagement(*combination, model, in_space=in_space, camera=camera)
-    there = assert_works(scenario, numbers(scenario, 1, batch=2))
-    assert there.ended
-
-
 @EXAMPLES
 @given(
     st.sampled_from([flight for flight in WHOLE_FLIGHTS if flight[-1] <= 30.0 and flight[3] < 500]),
@@ -145,7 +121,8 @@ def assert_whole_flight_works(
     st.booleans(),
 )
 def test_whole_flights_work_however_few_their_steps(combination: Combination, in_space: bool, camera: bool) -> None:
-    assert_whole_flight_works(combination, Model.GUARANTEED, in_space, camera=camera)
+    scenario = engagement(*combination, in_space=in_space, camera=camera)
+    assert assert_works(scenario, numbers(scenario, 1, batch=2)).ended
 
 
 # Scale ----------------------------------------------------------------------------------------------------------
