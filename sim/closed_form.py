@@ -47,18 +47,12 @@ def possible_miss_m(
 
     Notes
     -----
-    Let 2 d be the difference of two motions with the same images, and u the time before the last image. Then |d| is at
-    most b0 + p e u, with the bound b0 = p e t_c + c of the last image, and the second derivative of d at most nu. From
-    d = b0 at the last image and a slope s/2 there, d is at most b0 - s u / 2 + nu u^2 / 2 before it, which must not be
-    below -b0 - p e u. So s is at most 4 b0 / u + 2 p e + nu u at each image. The minimum value of this is at
-    u = 2 sqrt(b0 / nu), or at the first image, u = t_f - t_c, if that is later; and the miss is
-    M = b0 + s t_c / 2 + nu t_c^2 / 2:
+    The bound of the last image is b0 = p e t_c + c. The miss is, by Lemma 17 of docs/guarantee.md,
 
         2 p e t_c + c + 2 t_c sqrt(nu b0) + nu t_c^2 / 2   if 2 sqrt(b0 / nu) <= t_f - t_c,
         b0 + (2 b0 / u + p e + nu u / 2) t_c + nu t_c^2 / 2   with u = t_f - t_c otherwise.
 
-    A constant centroid error is the same difference c at all images: b0 is then p e t_c, and c is added to M.
-    docs/guarantee.md contains the proof (Lemma 17).
+    A constant centroid error is the same difference c at all images: b0 is then p e t_c, and c is added to the miss.
     """
     arc_s = first_image_s - last_image_s
     if np.any(arc_s <= 0.0):

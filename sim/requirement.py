@@ -142,7 +142,7 @@ def parse_requirement(text: str) -> AnyRequirement:
         )
     if match["share"] is not None:
         return HitRequirement(float(match["share"]), MissCause(match["cause"]) if match["cause"] else None)
-    quantile = QuantileName.parse(f"{match['quantity']} p{match['level'] or _DEFAULT_LEVEL}")
+    quantile = QuantileName.of_percent(match["quantity"], match["level"] or _DEFAULT_LEVEL)
     return Requirement(quantile, float(match["bound"]))
 
 

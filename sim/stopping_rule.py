@@ -16,8 +16,7 @@ from sim.statistics import estimate_quantiles, level_name, number_text
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 
 DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
-_QUANTILE = re.compile(rf"\s*(?P<quantity>\w+)\s+p(?P<level>{DIGITS})\s*")
-_RULE = re.compile(rf"(?P<quantile>.*\S)\s+ci\s*<\s*(?P<width>{DIGITS})\s*")
+_RULE = re.compile(rf"\s*(?P<quantity>\w+)\s+p(?P<percent>{DIGITS})\s+ci\s*<\s*(?P<width>{DIGITS})\s*")
 
 
 @dataclass(frozen=True)
@@ -49,10 +48,9 @@ class QuantileName:
         return f"{self.quantity} {level_name(self.level)}"
 
     @classmethod
-    def parse(cls, text: str) -> QuantileName:
-        """Read `miss_m p99`; raise ValueError for any other text."""
-        match = _matched(_QUANTILE, text, 'a quantity and a quantile, for example "miss_m p99"')
-        return cls(match["quantity"], float(Decimal(match["level"]) / 100))
+    def of_percent(cls, quantity: str, percent: str) -> QuantileName:
+        """Return the quantile of a level in percent, as text."""
+        return cls(quantity, float(Decimal(percent) / 100))
 
 
 @dataclass(frozen=True)
@@ -79,8 +77,10 @@ class StoppingRule(Checked):
     @classmethod
     def parse(cls, text: str) -> StoppingRule:
         """Read `miss_m p99 ci<0.5`; raise ValueError for any other text."""
-        match = _matched(_RULE, text, 'a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"')
-        return cls(QuantileName.parse(match["quantile"]), float(match["width"]))
+        match = _RULE.fullmatch(text[:100])
+        if match is None:
+            raise ValueError('must be a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"')
+        return cls(QuantileName.of_percent(match["quantity"], match["percent"]), float(match["width"]))
 
     @property
     def quantity(self) -> str:
@@ -97,10 +97,3 @@ class StoppingRule(Checked):
             return False
         (estimate,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)
         return estimate.width is not None and estimate.width < self.width
-
-
-def _matched(pattern: re.Pattern[str], text: str, wanted: str) -> re.Match[str]:
-    match = pattern.fullmatch(text[:100])
-    if match is None:
-        raise ValueError(f"must be {wanted}")
-    return match

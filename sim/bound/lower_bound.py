@@ -84,23 +84,13 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     interval of V_x and for the nominal closing speed, and refines the best labels. Cost: about 600 linear programs of
     about 110 variables, 6 ms each.
 
-    The order in a step is measure, decide, fire. Equal measurements up to step s give equal impulses up to step s.
-    Later impulses may differ, and each changes z at x = 0 by at most mu2 x_j / |V_x|. The distance of the two along z
-    at x = 0 is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two has at least half of it.
-    The sum uses the earliest impulses that the budget allows, because they change z most. One motion alone has at least
-    |z(T)| less the sum over all impulses; the start of that motion is the corner of the box with the maximum |z(T)|.
-    The miss is the minimum distance of the flight, which is shorter than the distance at x = 0 by at most the factor
-    |V_x| / |(V_x, W)|, with the maximum velocity W across x. The linear programs neglect the square of the slope of
-    the line of sight; the difference that they find is reduced until all measurements can be the same.
-    docs/guarantee.md has the proof.
-
-    The manoeuvres of a pair may differ. Under gravity the difference of the two follows the state-transition matrices
-    of the motion in their middle. The bound has a reserve for the second order and for what impulses change in gravity,
-    and is zero if gravity is too strong for the proof of the reserve.
+    Equal measurements up to step s give equal impulses up to step s. Later impulses change the distance of the two
+    across x at x = 0 by at most their common limit, and one of the two has at least half of the rest; for one motion
+    alone all impulses count. docs/guarantee.md has the proof, with the reserves for gravity and for the slope of the
+    line of sight.
 
     In space, each axis has a linear program, and the impulses limit the modulus. The two motions of a pair differ along
-    both axes, each by the most that its program allows: |(dy(T), dz(T))| replaces |dz(T)|, so the bound is never below
-    that of one axis.
+    both axes, each by the most that its program allows, so the bound is never below that of one axis.
     """
     need_scenario(scenario)
     model = scenario.set_model
