@@ -107,11 +107,10 @@ class Engagements:
         self._model = model = on_board_model(scenario)
         lateral = len(model.axes), batch
         self._state = self._strategy.start(lateral)
-        arrival_s = self._truth.arrival_s()
         self._information = InformationSet(model, batch, guarantee=guarantee)
         self._view = self._information.view()
         self._truth_section = TruthSection(model, batch)
-        self._arrival_s = arrival_s
+        self._arrival_s = self._truth.arrival_s()
         self._sensors = scenario.sensors
         self._every = {name: model.steps_in(sensor.period_s) for name, sensor in self._sensors.items()}
         self._measured: dict[str, Floats] = {}
@@ -170,19 +169,8 @@ class Engagements:
         if self.step in self._number_of_burn:
             self._burns_m_s[:, self._number_of_burn[self.step]] = given
         if observe is not None:
-            observe(
-                Step(
-                    self.step,
-                    self.step * model.step_s,
-                    tracking,
-                    self._flying.copy(),
-                    sight,
-                    measured,
-                    miss,
-                    self._impulse,
-                    self._view,
-                )
-            )
+            time_s, flying = self.step * model.step_s, self._flying.copy()
+            observe(Step(self.step, time_s, tracking, flying, sight, measured, miss, self._impulse, self._view))
         executed = self._executed(self._impulse)
         self._truth.fire(executed)
         self._decisions.execute(executed)

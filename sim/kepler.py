@@ -88,16 +88,16 @@ class KeplerMotion:
         self._motion[:, VELOCITY, :, RELATIVE] = velocity_m_s
         self._manoeuvre = np.zeros((batch, axes - 1))
         self._scratch = np.empty((3, *self._motion.shape[1:]))
-        self._gravitational_parameter = 0.0
-        # An acceleration with this error over the whole flight changes the position by POSITION_ERROR_M.
-        self._acceleration_error = POSITION_ERROR_M * (velocity_m_s[:, X] / position_m[:, X]) ** 2
+        parameter = 0.0
         if sun is not None:
             toward_sun, along_orbit = sun_and_orbit(sun)
             speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
             self._motion[:, POSITION, :, SPACECRAFT] = -sun.distance_m * toward_sun[-axes:]
             self._motion[:, VELOCITY, :, SPACECRAFT] = speed * along_orbit[-axes:]
-            self._gravitational_parameter = float(sun.gravitational_parameter_m3_s2)
-        accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
+            parameter = float(sun.gravitational_parameter_m3_s2)
+        # An acceleration with this error over the whole flight changes the position by POSITION_ERROR_M.
+        self._gravity = parameter, POSITION_ERROR_M * (velocity_m_s[:, X] / position_m[:, X]) ** 2
+        accelerate_all(self._motion, self._manoeuvre, parameter)
 
     @property
     def position_m(self) -> Floats:
@@ -139,14 +139,7 @@ class KeplerMotion:
         some nanoseconds.
         """
         arrival_s = np.empty(len(self._motion))
-        arrive_all(
-            self._motion,
-            self._manoeuvre,
-            self._gravitational_parameter,
-            self._acceleration_error,
-            self._scratch,
-            arrival_s,
-        )
+        arrive_all(self._motion, self._manoeuvre, *self._gravity, self._scratch, arrival_s)
         return arrival_s
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
@@ -156,18 +149,10 @@ class KeplerMotion:
         """
         if manoeuvre_m_s2 is not None:
             self._manoeuvre = np.ascontiguousarray(manoeuvre_m_s2.T)
-            accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
+            accelerate_all(self._motion, self._manoeuvre, self._gravity[0])
         batch, _, axes, _ = self._motion.shape
         passage = passed, arrival, closest = np.zeros(batch, dtype=bool), np.zeros(batch), np.zeros((axes, batch))
-        advance_all(
-            self._motion,
-            self._manoeuvre,
-            self._gravitational_parameter,
-            self._acceleration_error,
-            float(step_s),
-            self._scratch,
-            passage,
-        )
+        advance_all(self._motion, self._manoeuvre, *self._gravity, float(step_s), self._scratch, passage)
         minimum = np.where(passed, np.hypot.reduce(closest), np.inf)
         return Passage(passed, minimum, arrival, closest[:X])
 
