@@ -9,13 +9,14 @@ import pytest
 
 from guidance import GameNoise, NoiseKind, Situation, TieRule
 from guidance.scripted_noise import ScriptedNoise
-from infoset import InitialSet, Model, RateSensor
+from infoset import RateSensor
 from sim import Outcome, Scenario
 from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
 from sim.closed_form import worst_shift_m
 from sim.draws import draw
 from sim.engagement import Engagements
 from sim.scenario import corners, of_model
+from tests.guaranteed import guaranteed
 
 BUDGET = 40
 
@@ -29,11 +30,6 @@ def coarse(asteroid: Scenario) -> Scenario:
 @pytest.fixture(scope="module")
 def worst(coarse: Scenario) -> WorstEngagement:
     return find_worst(coarse, budget=BUDGET, seed=1)
-
-
-def guaranteed(scenario: Scenario) -> Scenario:
-    model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    return replace(scenario, **of_model(model))
 
 
 def assert_flies_again(found: WorstEngagement) -> None:

@@ -15,6 +15,7 @@ from sim import Results, Scenario, fly_one, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.scenario import of_model
+from tests.guaranteed import guaranteed
 from tests.space import in_space
 
 E, RANGE = 58e3, 5800e3
@@ -38,12 +39,6 @@ def known(asteroid: Scenario) -> Scenario:
 
 def with_thruster(scenario: Scenario, **fields: Any) -> Scenario:
     return replace(scenario, thruster=replace(scenario.thruster, **fields))
-
-
-def guaranteed(scenario: Scenario) -> Scenario:
-    return replace(
-        scenario, **of_model(replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX))
-    )
 
 
 def impulses(scenario: Scenario, seed: int = 0, strategy: Strategy | None = None) -> dict[float, float]:

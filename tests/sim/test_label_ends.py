@@ -14,15 +14,11 @@ from sim import Manoeuvre, Outcome, Results, Scenario, Target
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.scenario import of_model
+from tests.guaranteed import guaranteed
 from tests.space import in_space
 
 RUNS = 16
 EXACT = ScriptedNoise({})
-
-
-def guaranteed(scenario: Scenario) -> Scenario:
-    model = replace(scenario.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX, sections=9)
-    return replace(scenario, **of_model(model))
 
 
 def fly(
@@ -91,7 +87,7 @@ def test_the_truth_is_one_of_the_states_and_phi_bounds_them(
 ) -> None:
     """Without a cut-off and with budget left, control ends at the range threshold, where Phi bounds all states."""
     given = request.getfixturevalue(name if name in ("ranging", "comet") else "asteroid")
-    scenario = guaranteed(in_space(given) if name == "space" else given)
+    scenario = guaranteed(in_space(given) if name == "space" else given, sections=9)
     target = Target(Manoeuvre.WORST_CASE, scenario.set_model.disturbance_m_s2) if name == "target" else None
     scenario = replace(scenario, noise=noise, tie=TieRule.RANDOM, target=target)
     results, any_state_m = fly(scenario)
@@ -104,7 +100,7 @@ def test_the_truth_is_one_of_the_states_and_phi_bounds_them(
 
 def test_after_a_cut_off_measurements_do_not_narrow_the_choice(asteroid: Scenario) -> None:
     """The truth may be any state of the set at the last impulse: many metres more than the sections that arrive."""
-    scenario = guaranteed(asteroid)
+    scenario = guaranteed(asteroid, sections=9)
     late = replace(scenario, thruster=replace(scenario.thruster, last_impulse_s=20.0), noise=NoiseKind.GAME)
     flight = Engagements(late, draw(late, range(RUNS), 0))
     last_step = late.impulse_steps[-1]  # type: ignore[index]

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from guidance import LineOfSight, NoiseKind
-from infoset import InformationSetView, InitialSet, Model, RangeSensor, Recovery, Sensor
+from infoset import InformationSetView, RangeSensor, Recovery, Sensor
 from infoset.arrays import Flags, Floats
 from infoset.sensors import Cuttable, Geometry, Measurements
 from sim import Outcome, Scenario, fly_one, lower_bound, simulate
 from sim.scenario import of_model
+from tests.guaranteed import guaranteed
 from tests.space import in_space
 
 
@@ -80,8 +81,7 @@ class WithStreaks(Scenario):
 
 @pytest.mark.parametrize("noise", NoiseKind)
 def test_a_new_kind_of_sensor_is_one_class(brief: Scenario, noise: NoiseKind) -> None:
-    model = replace(brief.set_model, model=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    plain = replace(brief, noise=noise, **of_model(model))
+    plain = replace(guaranteed(brief), noise=noise)
     streaks = WithStreaks(**{field.name: getattr(plain, field.name) for field in fields(plain)})
     record = fly_one(streaks)
     assert record.measures("streak")[:4].tolist() == [True, False, True, False]

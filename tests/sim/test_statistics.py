@@ -84,13 +84,6 @@ def test_the_interval_of_hits_ends_where_the_binomial_tails_are_half_the_rest(
         assert found.upper == 1.0
 
 
-@pytest.mark.parametrize("runs", [1, 20, 59, 1000])
-def test_no_hit_and_all_hits_have_closed_forms(runs: int) -> None:
-    none, every = estimate_hits(0, runs), estimate_hits(runs, runs)
-    assert every.lower == pytest.approx(0.025 ** (1.0 / runs), rel=1e-12)
-    assert none.upper == pytest.approx(1.0 - 0.025 ** (1.0 / runs), rel=1e-9)
-
-
 @pytest.mark.parametrize(("level", "fewest"), [(0.5, 2), (0.1, 10), (0.9, 10), (0.99, 100), (0.999, 1000), (1.0, 1)])
 def test_a_quantile_needs_values_beyond_it(level: float, fewest: int) -> None:
     assert shows(fewest, level)
