@@ -76,7 +76,13 @@ class StoppingRule(Checked):
 
     @classmethod
     def parse(cls, text: str) -> StoppingRule:
-        """Read `miss_m p99 ci<0.5`; raise ValueError for any other text."""
+        """Read `miss_m p99 ci<0.5`.
+
+        Raises
+        ------
+        ValueError
+            For any other text.
+        """
         match = _RULE.fullmatch(text[:100])
         if match is None:
             raise ValueError('must be a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"')

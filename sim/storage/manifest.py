@@ -206,14 +206,18 @@ def read_manifest(folder: Path) -> Manifest:
         )
     try:
         with reporting(file):
-            value = json.loads(file.read_bytes())
-        if not isinstance(value, dict) or value.pop("schema", None) != SCHEMA:
-            raise ValueError(f"schema: must be {SCHEMA}, the only one that this version of infoset reads")
-        return from_json(Manifest, value)
+            return _parsed(file.read_bytes())
     except (ValueError, RecursionError) as error:
         raise StorageError(
             f"{file}: is not a readable manifest: {str(error)[:300]}; restore it from a copy, or use a new folder"
         ) from None
+
+
+def _parsed(content: bytes) -> Manifest:
+    value = json.loads(content)
+    if not isinstance(value, dict) or value.pop("schema", None) != SCHEMA:
+        raise ValueError(f"schema: must be {SCHEMA}, the only one that this version of infoset reads")
+    return from_json(Manifest, value)
 
 
 def _flat(value: Any, path: str = "") -> dict[str, Any]:

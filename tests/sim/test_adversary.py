@@ -140,7 +140,7 @@ def test_a_strategy_of_ones_own(coarse: Scenario) -> None:
         def decide(self, situation: Situation, state: None) -> np.ndarray:
             return np.zeros((1, situation.information.batch))
 
-    found = find_worst(coarse, strategy=Idle(), budget=10, objective=Objective.FIXED_TRUTH)
+    found = find_worst(coarse, strategy=Idle(), budget=BUDGET, objective=Objective.FIXED_TRUTH)
     assert found.strategy == "Idle"
     assert found.miss_m > 5e3
     record = found.record(Idle())
