@@ -29,8 +29,8 @@ COLLINEAR = 1e-9
 """Distance of a ray from the plane of two others that contains it. A wrong one adds only points of the set."""
 TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
-_SWEEPS = 15
-"""Number of times that a vertex moves to the outer sides of all of its facets: more only help at sharp corners."""
+_RADIAL = 1e-13
+"""The same up to which a vertex of more than n facets moves away from the centre: others need several steps."""
 MAX_CROSSINGS = 50_000
 """Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
 EPS = float(np.finfo(np.float64).eps)
@@ -425,22 +425,56 @@ def _along(row: Floats, step: Floats) -> tuple[float, float]:
     return along, square
 
 
+@_kernels.allocation_free
+def _least_factor(facets: Floats, mine: Integers, needs: Floats, step: Floats) -> float:
+    """Return the minimum factor of a step away from the centre that moves a point by its needs across its facets."""
+    factor = 0.0
+    for m in range(len(mine)):
+        along, _ = _along(facets[mine[m]], step)
+        if along > 0.0 and needs[m] > factor * along:
+            factor = needs[m] / along
+    return factor
+
+
+@_kernels.allocation_free
+def _solve(table: Floats, result: Floats) -> None:
+    """Write the solution of the linear equations (a, b), a x = b, to a zero result, which stays zero if singular."""
+    n = len(table)
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            best = i if abs(table[i, k]) > abs(table[best, k]) else best
+        if table[best, k] == 0.0:
+            return
+        for j in range(k, n + 1):
+            table[k, j], table[best, j] = table[best, j], table[k, j]
+        for i in range(k + 1, n):
+            factor = table[i, k] / table[k, k]
+            for j in range(k, n + 1):
+                table[i, j] -= factor * table[k, j]
+    for k in range(n - 1, -1, -1):
+        value = table[k, n]
+        for j in range(k + 1, n):
+            value -= table[k, j] * result[j]
+        result[k] = value / table[k, k]
+
+
 @_kernels.compiled
 def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bool, most: float) -> Floats:
     """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
-    its outer side covers the set. A point that is exactly on its facets stays. The others move to the outer sides of
-    their facets, one after the other (Agmon and Motzkin), and for what is left, at a sharp corner or in a `flat` set,
-    away from the centre. No point moves by more than `most`: where rounding moves facets more than the vertex, the hull
-    may lack the very tip.
+    its outer side covers the set. A point that is exactly on its facets stays. The others move to the common point of n
+    facets that are moved outward by rounding; to the outer sides of more than n facets, one after the other (Agmon and
+    Motzkin); and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves by more
+    than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
     v, n = points.shape
     result, middle, away, step = points.copy(), np.zeros(n), np.empty(n), np.empty(n)
     for i in range(v):
         for j in range(n):
             middle[j] += points[i, j] / v
-    mine, needs = np.empty(len(facets), np.int64), np.empty(len(facets))
+    mine, needs, table = np.empty(len(facets), np.int64), np.empty(len(facets)), np.empty((n, n + 1))
     for i in range(v):
         moved, count = 0.0, _members(bits[i], mine)
         for attempt in range(3 if chosen[i] else 0):
@@ -453,32 +487,38 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                 for j in range(n):
                     terms += abs(facets[f, j] * points[i, j])
                 needs[m] = 0.4 * attempt * EPS * terms - high  # rounding of coordinates
-            if not inside or moved >= most:
+            if not inside:
                 break
             for j in range(n):
                 away[j], step[j] = points[i, j] - middle[j], 0.0
-            rounding = 0.0  # far below that of the coordinates
-            for _ in range(0 if flat else _SWEEPS):
-                done, rounding = True, EPS * math.sqrt(_along(step, step)[0])
-                for m in range(count):
-                    along, square = _along(facets[mine[m]], step)
-                    gap = needs[m] - along
-                    if gap > rounding:
-                        for j in range(n):
-                            step[j] += (gap + 0.25 * abs(needs[m])) / square * facets[mine[m], j]
-                        done = False
-                if done:
-                    break
-            factor = 0.0
-            for m in range(count):
-                depth = _along(facets[mine[m]], away)[0]
-                left = needs[m] - _along(facets[mine[m]], step)[0] - rounding
-                if depth > 0.0 and left > factor * depth:
-                    factor = left / depth
+            factor = _least_factor(facets, mine[:count], needs, away)
+            if not flat and (count == n or factor * math.sqrt(_along(away, away)[0]) > _RADIAL):
+                if count == n:
+                    for m in range(n):
+                        table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
+                    _solve(table, step)
+                rounding = 0.0
+                for _ in range(15):  # more would only help at sharp corners
+                    done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
+                    for m in range(count):
+                        along, square = _along(facets[mine[m]], step)
+                        gap = needs[m] - along
+                        if gap > rounding:
+                            part = (gap + 0.25 * abs(needs[m])) / square
+                            for j in range(n):
+                                step[j] += part * facets[mine[m], j]
+                            done = False
+                    if done:
+                        break
+                for m in range(count):  # what is left, at sharp corners, away from the centre
+                    needs[m] -= _along(facets[mine[m]], step)[0] + rounding
+                factor = _least_factor(facets, mine[:count], needs, away)
             for j in range(n):
                 step[j] += factor * away[j]
             length = math.sqrt(_along(step, step)[0])
-            share = min(1.0, (most - moved) / max(length, 1e-300))
+            if length == 0.0 or moved >= most:
+                break
+            share = min(1.0, (most - moved) / length)
             moved += share * length
             for j in range(n):
                 result[i, j] += share * step[j]
