@@ -50,17 +50,6 @@ def test_links_lead_somewhere(page: Page) -> None:
             assert anchor in anchors(source), f"{page.name}: {link}: no such heading"
 
 
-def test_tables_of_contents_name_pages_that_exist(page: Page) -> None:
-    for block in page.blocks("{toctree}"):
-        for line in block.text.splitlines():
-            if line and not line.startswith(":"):
-                entry = _TOCTREE_ENTRY.match(line)
-                assert entry is not None, line
-                stem = page.path.parent / entry[1]
-                found = [source_of(stem.with_name(stem.name + ending)) for ending in (".md", ".rst")]
-                assert any(found), f"{page.name}: {line}"
-
-
 def test_every_page_of_the_site_is_in_a_table_of_contents(pages: list[Page]) -> None:
     site = [page for page in pages if page.name.startswith("docs/")]
     listed = {

@@ -149,6 +149,26 @@ def test_from_points_takes_any_order_with_repeats_and_inner_points() -> None:
     assert hull.area() == 17.5
 
 
+STAR = [(math.cos(turn), math.sin(turn)) for turn in 0.8 * math.pi * np.arange(5)]
+
+
+@pytest.mark.parametrize(
+    ("ring", "vertex"),
+    [
+        ([(0, 0), (4, 0), (4, 4), (3, 1)], 3),
+        ([(0, 0), (0.5, 2.0**-60), (1, 0), (0.5, 1)], 1),
+        ([(0, 0), (1, 1), (1, 0), (0, 1)], 0),
+        (STAR, 3),
+    ],
+)
+def test_a_ring_is_refused_where_it_is_not_convex_and_the_constructor_takes_its_hull(ring: Any, vertex: int) -> None:
+    with pytest.raises(ValueError, match=f"the ring is not convex: vertex {vertex},"):
+        ConvexPolygons.from_vertices(ring)
+    with pytest.raises(ValueError, match=rf"vertex {vertex} of polygon \[1\]"):
+        ConvexPolygons.from_vertices([[ring[0]] * len(ring), ring])
+    assert ConvexPolygons(ring, len(ring)).equals(ConvexPolygons.from_points(ring))
+
+
 @pytest.mark.parametrize(
     ("points", "wanted"),
     [
