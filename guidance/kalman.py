@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from guidance.estimate import MissEstimate
+from guidance.patient import LAST_SECONDS_S
 from guidance.situation import Situation
 from infoset import BearingSensor, RangeSensor, SetModel
 from infoset.arrays import Floats
-from infoset.limits import COUNT, Checked, NotNegative
+from infoset.limits import Checked, NotNegative
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a state: lateral offset, its rate, range, closing speed and lateral acceleration."""
+MEMBERS = 9
+"""Number M of filters."""
 
 
 class KalmanBank:
-    """A bank of M extended Kalman filters for each engagement and lateral axis, one for each interval of the ranges.
+    """A bank of M = 9 extended Kalman filters for each engagement and lateral axis, one for each interval of the range.
 
     Parameters
     ----------
@@ -26,10 +29,6 @@ class KalmanBank:
         Numbers (C, B) of lateral axes and engagements.
     is_augmented : bool
         Estimate the lateral acceleration of the target.
-    members : int
-        Number M of filters.
-    process_noise : float
-        As in `Kalman`, in units of the bound's standard deviation.
 
     Attributes
     ----------
@@ -63,16 +62,11 @@ class KalmanBank:
     Zarchan (2012), Tactical and Strategic Missile Guidance, chapter 9, for the acceleration.
     """
 
-    name: ClassVar[str] = "kalman"
-
-    def __init__(
-        self, shape: tuple[int, int], is_augmented: bool = False, members: int = 9, process_noise: float = 1.0
-    ) -> None:
+    def __init__(self, shape: tuple[int, int], is_augmented: bool = False) -> None:
         size = 5 if is_augmented else 4
-        self.mean = np.zeros((*shape, members, size))
-        self.covariance = np.zeros((*shape, members, size, size))
-        self.log_weight = np.zeros((*shape, members))
-        self._process_noise = process_noise
+        self.mean = np.zeros((*shape, MEMBERS, size))
+        self.covariance = np.zeros((*shape, MEMBERS, size, size))
+        self.log_weight = np.zeros((*shape, MEMBERS))
 
     def update(self, situation: Situation) -> None:
         """Predict over the previous step, and update with the new measurements."""
@@ -132,10 +126,10 @@ class KalmanBank:
         return self.mean.shape[-1] > ACCELERATION
 
     def _set_prior(self, situation: Situation) -> None:
-        model, members = situation.information.model, self.mean.shape[2]
+        model = situation.information.model
         bounds = model.bounds
-        edges = np.linspace(*bounds.x_m, members + 1)
-        stretch = (bounds.x_m[1] - bounds.x_m[0]) / members
+        edges = np.linspace(*bounds.x_m, MEMBERS + 1)
+        stretch = (bounds.x_m[1] - bounds.x_m[0]) / MEMBERS
         self.mean[..., X] = 0.5 * (edges[:-1] + edges[1:])
         self.mean[..., SPEED] = -0.5 * (bounds.vx_m_s[0] + bounds.vx_m_s[1])
         for axis, plane in enumerate(map(model.axis, model.axes)):
@@ -151,7 +145,7 @@ class KalmanBank:
         motion[Z, VZ], motion[X, SPEED] = step_s, -step_s
         push = np.array([0.5 * step_s**2, step_s, 0.0, 0.0])
         accelerations = np.array([model.axis(name).acceleration_m_s2 for name in model.axes])
-        variance = (self._process_noise * accelerations) ** 2 / 3.0
+        variance = accelerations**2 / 3.0
         if self._is_augmented:
             motion[Z, ACCELERATION], motion[VZ, ACCELERATION] = push[:2]
             push = np.array([*push, 1.0])
@@ -214,17 +208,11 @@ class Kalman(Checked):
     ----------
     dead_zone : float
         Half-width of the dead zone of the estimated miss, in standard deviations.
-    last_s : float
-        Time to go below which there is no dead zone, s. With a cut-off, the time before the cut-off.
-    members : int
-        Number of filters, one for each interval of the possible ranges.
-    process_noise : float
-        Standard deviation of the acceleration along z, constant over a step and independent between steps,
-        in units of that of an acceleration uniform within the bound of the set's model.
 
     Notes
     -----
-    `KalmanBank` describes the filters. The last decision before the arrival that the engine allows has no dead zone.
+    `KalmanBank` describes the filters. There is no dead zone in the last 3 s before the arrival, or before the last
+    decision that the engine allows.
 
     Limits: the filter guarantees nothing. Its deviations are those of independent errors; an error that keeps its sign,
     or changes it on purpose, is within the bound but outside the theory. A uniform error has sharp ends, which contain
@@ -232,15 +220,12 @@ class Kalman(Checked):
     """
 
     dead_zone: NotNegative = 1.0
-    last_s: NotNegative = 3.0
-    members: Annotated[int, COUNT] = 9
-    process_noise: NotNegative = 1.0
 
     name: ClassVar[str] = "kalman"
 
     def start(self, shape: tuple[int, int]) -> KalmanBank:
         """Start with empty filters; the first step sets their prior."""
-        return KalmanBank(shape, members=self.members, process_noise=self.process_noise)
+        return KalmanBank(shape)
 
     def decide(self, situation: Situation, state: KalmanBank) -> Floats:
         """Update the filters with the measurements of this step, and return the impulses, m/s."""
@@ -248,5 +233,5 @@ class Kalman(Checked):
         if not situation.may_fire:
             return np.zeros_like(situation.last_impulse_m_s)
         estimate = state.estimate(situation)
-        is_last = (situation.last_s - situation.lead_s <= self.last_s) | (estimate.to_go_s <= self.last_s)
+        is_last = (situation.last_s - situation.lead_s <= LAST_SECONDS_S) | (estimate.to_go_s <= LAST_SECONDS_S)
         return estimate.correction_m_s(np.where(is_last, 0.0, self.dead_zone * estimate.deviation_m))

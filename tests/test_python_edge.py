@@ -15,7 +15,6 @@ import pytest
 import infoset
 from experiments import load_scenario
 from guidance import (
-    Kalman,
     SymmetricMiss,
     Thruster,
 )
@@ -238,7 +237,6 @@ def test_what_is_no_count(value: Any) -> None:
     refused(lambda: information(value), "batch")
     refused(lambda: information().sections(value), "engagement")
     refused(lambda: information().section_at(5.5e6, value), "engagement")
-    refused(lambda: Kalman(members=value), "members")
     refused(lambda: square().reduce_outward(value), "cap")
     refused(lambda: fly_one(scenario, value), "run")
     refused(lambda: fly_one(scenario, seed=value), "seed")

@@ -66,17 +66,10 @@ class History:
 
     Attributes
     ----------
-    kinds : ndarray of int, shape (>= events,)
-        Kind of each event: an angle, an impulse, a prediction, a rate or a widening.
+    kinds, values, applies, events, elapsed : ndarray or int
+        The fields of `EventLog`; a prediction applies to all engagements.
     errors : ndarray, shape (>= events,)
         Error bound of each measured rate, rad/s; zero for the other kinds.
-    values : ndarray, shape (>= events, C, B)
-        Measured angle, rad, impulse, m/s, or measured rate, rad/s, along each of C lateral axes; unused for the other
-        kinds.
-    applies : ndarray of bool, shape (>= events, B)
-        Whether the event applies to the engagement; a prediction applies to all.
-    events, elapsed : int
-        Number of events, and of the predictions among them.
     sights : ndarray, shape (C, B, columns)
         Fields of the last sight of each axis and engagement after the first `seen` events, for measured rates.
     seen : int

@@ -13,7 +13,6 @@ from guidance import (
     NoiseKind,
     Patient,
     Situation,
-    Strategy,
     Thruster,
     TieRule,
     ZeroEffortMiss,
@@ -21,7 +20,6 @@ from guidance import (
 )
 from guidance.authority import correctable_later_m
 from infoset import AngleSensor, ExtremePoints, InformationSet, Model, PredictedMiss, RangeSensor, SetModel, StateBox
-from infoset.arrays import Floats
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
@@ -112,10 +110,6 @@ class Straight:
     def __init__(self, z: float, vz: float, x: float, speed: float) -> None:
         self.z, self.vz, self.x, self.speed = z, vz, x, speed
 
-    @property
-    def miss_m(self) -> float:
-        return self.z + self.vz * self.x / self.speed
-
     def fire(self, impulse_m_s: float) -> None:
         self.vz -= impulse_m_s
 
@@ -124,44 +118,6 @@ class Straight:
 
 
 SENSOR = RangeSensor(period_s=2.0, relative_error=0.05)
-
-
-def guide(strategy: Strategy, truth: Straight, meter: bool, sign: float = 1.0) -> tuple[Straight, list[float]]:
-    """Guide along straight motion with measurements that do not err; the impulses given."""
-    state, given, impulses = strategy.start((1, 1)), 0.0, []
-    measured: dict[str, Floats] = {}
-    view = InformationSet(MODEL).view()
-    nothing = situation(0.0, 0.0)
-    step = 0
-    while truth.x > 0.0:
-        ranging = meter and step % 4 == 0
-        new = {"angle": np.array([[np.arctan2(sign * truth.z, truth.x)]])}
-        if ranging:
-            new["range"] = np.array([np.hypot(truth.z, truth.x)])
-        measured = measured | new
-        now = replace(
-            nothing,
-            time_s=0.5 * step,
-            step=step,
-            measured=measured,
-            last_impulse_m_s=np.array([[given]]),
-            information=view,
-            new=frozenset(new),
-            sensors={"range": SENSOR} if meter else {},
-        )
-        given = THRUSTER.give(strategy.decide(now, state), np.array([1000.0])).item()
-        impulses.append(given)
-        truth.fire(sign * given)
-        truth.advance(0.5)
-        step += 1
-    return truth, impulses
-
-
-@pytest.mark.parametrize("meter", [True, False])
-def test_the_filters_hit_without_noise(meter: bool) -> None:
-    truth, _ = guide(Kalman(), Straight(800.0, -60.0, 5850e3, 58.05e3), meter)
-    # Of a miss of 5 km. Without the meter one linearisation a filter leaves more.
-    assert abs(truth.miss_m) < (1.0 if meter else 10.0)
 
 
 def test_the_filters_find_the_motion_without_noise() -> None:
