@@ -1,6 +1,6 @@
 """Guidance: strategies that turn an information set into impulses, the thruster, and measurement noise."""
 
-from guidance.estimate import Estimator, MissEstimate
+from guidance.estimate import MissEstimate
 from guidance.game_noise import GameNoise
 from guidance.kalman import Kalman, KalmanBank
 from guidance.least_effort import LeastEffort
@@ -18,7 +18,6 @@ from guidance.thruster import Thruster
 from guidance.zero_effort import ZeroEffortMiss
 
 __all__ = [
-    "Estimator",
     "GameNoise",
     "Kalman",
     "KalmanBank",

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from guidance.situation import Situation
 from infoset.arrays import Floats
 
 
@@ -39,17 +36,3 @@ class MissEstimate:
         """
         outside_m = self.miss_m - np.clip(self.miss_m, -dead_zone_m, dead_zone_m)
         return np.divide(outside_m, self.to_go_s, out=np.zeros_like(outside_m), where=self.to_go_s > 0.0)
-
-
-class Estimator(Protocol):
-    """A filter for a batch of engagements along each of C lateral axes."""
-
-    def update(self, situation: Situation) -> None:
-        """Use the impulse of the previous step and the measurements of this one; call it once a step."""
-
-    def estimate(self, situation: Situation) -> MissEstimate:
-        """Return the estimate after `update` of the same step."""
-
-
-EstimatorKind = Callable[[tuple[int, int], bool], Estimator]
-"""Makes an estimator from the shape (C, B) of impulses and whether it estimates the acceleration of the target."""

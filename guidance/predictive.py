@@ -7,7 +7,6 @@ from typing import Annotated
 
 import numpy as np
 
-from guidance.estimate import Estimator, EstimatorKind
 from guidance.kalman import KalmanBank
 from guidance.situation import Situation
 from infoset.arrays import Floats
@@ -21,7 +20,7 @@ class ManoeuvreState:
     `due_s`, shape (C, B), is the time to go at which the next manoeuvre begins, s; infinite before the first estimate.
     """
 
-    estimator: Estimator
+    estimator: KalmanBank
     due_s: Floats
 
 
@@ -31,9 +30,6 @@ class Predictive(Checked):
 
     Parameters
     ----------
-    estimator : callable
-        `KalmanBank`, or another function of the shape (C, B) of impulses and of whether it estimates the acceleration
-        of the target; it returns an `Estimator`.
     spacing : float
         The ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has no scheduled times.
 
@@ -60,12 +56,11 @@ class Predictive(Checked):
     not from there.
     """
 
-    estimator: EstimatorKind = KalmanBank
     spacing: Annotated[float, Limits(above=1.0)] = 1.5
 
     def start(self, shape: tuple[int, int]) -> ManoeuvreState:
         """Start before the first manoeuvre."""
-        return ManoeuvreState(self.estimator(shape, False), np.full(shape, np.inf))
+        return ManoeuvreState(KalmanBank(shape), np.full(shape, np.inf))
 
     def decide(self, situation: Situation, state: ManoeuvreState) -> Floats:
         """Update the estimate, and return the impulses of a manoeuvre if one is due, m/s."""

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import numpy as np
 
-from guidance.estimate import Estimator, EstimatorKind
 from guidance.kalman import KalmanBank
 from guidance.situation import Situation
 from infoset.arrays import Floats
@@ -18,7 +17,7 @@ from infoset.limits import Checked, Limits, NotNegative
 class PulseState:
     """State of proportional navigation: the estimator, and the commands that were too small for an impulse so far."""
 
-    estimator: Estimator
+    estimator: KalmanBank
     accumulated_m_s: Floats
 
 
@@ -28,9 +27,6 @@ class ProportionalNavigation(Checked):
 
     Parameters
     ----------
-    estimator : callable
-        `KalmanBank`, or another function of the shape (C, B) of impulses and of whether it estimates the acceleration
-        of the target; it returns an `Estimator`.
     is_augmented : bool
         Estimate the lateral acceleration of the target, and compensate for it (augmented proportional navigation).
     ratio : float
@@ -63,14 +59,13 @@ class ProportionalNavigation(Checked):
     Schmitt trigger). The exact factor of an impulse and the accumulation are not from there.
     """
 
-    estimator: EstimatorKind = KalmanBank
     is_augmented: bool = False
     ratio: Annotated[float, Limits(above=2.0)] = 3.0
     dead_band_m_s: NotNegative | None = None
 
     def start(self, shape: tuple[int, int]) -> PulseState:
         """Start without commands."""
-        return PulseState(self.estimator(shape, self.is_augmented), np.zeros(shape))
+        return PulseState(KalmanBank(shape, self.is_augmented), np.zeros(shape))
 
     def decide(self, situation: Situation, state: PulseState) -> Floats:
         """Update the estimate, and return the accumulated commands beyond the dead band, m/s."""

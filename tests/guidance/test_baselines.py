@@ -11,7 +11,6 @@ import pytest
 
 from experiments import load_scenario
 from guidance import (
-    Estimator,
     Kalman,
     KalmanBank,
     MissEstimate,
@@ -90,26 +89,28 @@ class Truth:
         self.v += self.a * step_s
         self.to_go_s -= step_s
 
-    def estimator(
-        self, errors_m: Callable[[float], float] = lambda to_go_s: 0.0
-    ) -> Callable[[tuple[int, int], bool], Estimator]:
-        """An estimator that knows the motion, but for an error of the miss; only if augmented it knows `a`."""
-        truth = self
 
-        class Known:
-            def __init__(self, shape: tuple[int, int], is_augmented: bool) -> None:
-                self.a = truth.a if is_augmented else 0.0
+class Known:
+    """An estimator that knows the motion, but for an error of the miss; only if augmented it knows `a`."""
 
-            def update(self, situation: Situation) -> None:
-                pass
+    def __init__(self, truth: Truth, is_augmented: bool, errors_m: Callable[[float], float]) -> None:
+        self.truth, self.a, self.errors_m = truth, truth.a if is_augmented else 0.0, errors_m
 
-            def estimate(self, situation: Situation) -> MissEstimate:
-                to_go = truth.to_go_s
-                miss = truth.z + truth.v * to_go + 0.5 * self.a * to_go**2 + errors_m(to_go)
-                one = np.ones((1, 1))
-                return MissEstimate(miss * one, 0.0 * one, max(to_go - situation.lead_s, 0.0) * one)
+    def update(self, situation: Situation) -> None:
+        pass
 
-        return Known
+    def estimate(self, situation: Situation) -> MissEstimate:
+        truth, to_go = self.truth, self.truth.to_go_s
+        miss = truth.z + truth.v * to_go + 0.5 * self.a * to_go**2 + self.errors_m(to_go)
+        one = np.ones((1, 1))
+        return MissEstimate(miss * one, 0.0 * one, max(to_go - situation.lead_s, 0.0) * one)
+
+
+def started(strategy: Any, truth: Truth, errors_m: Callable[[float], float] = lambda to_go_s: 0.0) -> Any:
+    """Return the state of a strategy whose estimator knows the motion."""
+    state = strategy.start((1, 1))
+    state.estimator = Known(truth, getattr(strategy, "is_augmented", False), errors_m)
+    return state
 
 
 @dataclass
@@ -121,9 +122,15 @@ class Flight:
     misses_m: Floats
 
 
-def fly(strategy: Strategy, truth: Truth, steps: int, burns: Sequence[int] | None = None) -> Flight:
+def fly(
+    strategy: Strategy,
+    truth: Truth,
+    steps: int,
+    burns: Sequence[int] | None = None,
+    errors_m: Callable[[float], float] = lambda to_go_s: 0.0,
+) -> Flight:
     """Fly to the arrival with an engine that gives all that is wanted, at all steps or at some."""
-    state, rows = strategy.start((1, 1)), []
+    state, rows = started(strategy, truth, errors_m), []
     schedule = () if burns is None else tuple(T - burn * T / steps for burn in burns)
     now = replace(situation(step_s=T / steps), thruster=replace(ENGINE, impulses_s=schedule))
     for step in range(steps):
@@ -148,7 +155,7 @@ def fly(strategy: Strategy, truth: Truth, steps: int, burns: Sequence[int] | Non
 def test_proportional_navigation_makes_the_miss_zero_along_its_closed_form(ratio: float, steps: int) -> None:
     """m = m_0 (tau/T)^N, the rate of the line of sight is q_0 (tau/T)^(N - 2), and the impulses are their changes."""
     truth = Truth(z=0.0, v=2.0)
-    flight = fly(ProportionalNavigation(truth.estimator(), ratio=ratio), truth, steps)
+    flight = fly(ProportionalNavigation(ratio=ratio), truth, steps)
     share = flight.to_go_s / T
     expected = 2000.0 * share**ratio
     np.testing.assert_allclose(flight.misses_m[:-1], expected, rtol=1e-9, atol=1e-9)
@@ -171,7 +178,7 @@ def test_a_constant_acceleration_of_the_target_with_and_without_augmentation(rat
         (False, ratio / (ratio - 2.0) * a * (1.0 - middle ** (ratio - 2.0))),
     ):
         truth = Truth(z=0.0, v=0.0, a=a)
-        flight = fly(ProportionalNavigation(truth.estimator(), is_augmented, ratio), truth, steps)
+        flight = fly(ProportionalNavigation(is_augmented, ratio), truth, steps)
         acceleration = flight.impulses_m_s / (T / steps)
         np.testing.assert_allclose(acceleration[early], expected[early], rtol=1e-2, atol=1e-2 * a)
         # In the last step the target accelerates after the last impulse.
@@ -182,21 +189,21 @@ def test_a_constant_acceleration_of_the_target_with_and_without_augmentation(rat
 
 def test_pulses_are_no_smaller_than_the_dead_band_and_follow_the_commands() -> None:
     plain, pulsed = Truth(0.0, 2.0), Truth(0.0, 2.0)
-    all_commands = fly(ProportionalNavigation(plain.estimator()), plain, 1000).impulses_m_s
-    flight = fly(ProportionalNavigation(pulsed.estimator(), dead_band_m_s=0.1), pulsed, 1000)
+    all_commands = fly(ProportionalNavigation(), plain, 1000).impulses_m_s
+    flight = fly(ProportionalNavigation(dead_band_m_s=0.1), pulsed, 1000)
     pulses = flight.impulses_m_s[:-1][flight.impulses_m_s[:-1] != 0.0]
     assert (pulses >= 0.1).all()
     assert 15 <= len(pulses) <= 30
     assert np.abs(np.cumsum(flight.impulses_m_s) - np.cumsum(all_commands))[:-1].max() < 0.2
     assert abs(flight.misses_m[-1]) < 1e-6
-    minimum = fly(ProportionalNavigation(pulsed.estimator()), Truth(0.0, 0.0), 10)
+    minimum = fly(ProportionalNavigation(), Truth(0.0, 0.0), 10)
     assert (minimum.impulses_m_s == 0.0).all()
 
 
 def test_the_dead_band_is_the_min_impulse_by_default_and_old_commands_are_not_given() -> None:
     truth = Truth(0.0, 1.0)
-    strategy = ProportionalNavigation(truth.estimator())
-    state, engine = strategy.start((1, 1)), Thruster(1e9, 0.05, 1e9)
+    strategy = ProportionalNavigation()
+    state, engine = started(strategy, truth), Thruster(1e9, 0.05, 1e9)
     now = replace(situation(), thruster=engine)
     assert strategy.decide(now, state)[0, 0] == 0.0  # 1 (1 - 0.99^3) = 0.0297
     assert state.accumulated_m_s[0, 0] == pytest.approx(1.0 - 0.99**3)
@@ -211,7 +218,7 @@ def test_predictive_guidance_leaves_the_error_of_its_last_estimate() -> None:
     """k_i = (e_i - e_(i-1))/tau_i after the first burn, and the miss is -e_i."""
     errors = {900.0: 300.0, 350.0: -40.0, 120.0: 5.0}
     truth, burns = Truth(0.0, 2.0), [100, 650, 880]
-    flight = fly(Predictive(truth.estimator(lambda to_go: errors.get(round(to_go, 6), 1e9))), truth, 1000, burns)
+    flight = fly(Predictive(), truth, 1000, burns, lambda to_go: errors.get(round(to_go, 6), 1e9))
     expected = [2300.0 / 900.0, -340.0 / 350.0, 45.0 / 120.0]
     np.testing.assert_allclose(flight.impulses_m_s[burns], expected, rtol=1e-9)
     assert np.flatnonzero(flight.impulses_m_s).tolist() == burns
@@ -220,7 +227,7 @@ def test_predictive_guidance_leaves_the_error_of_its_last_estimate() -> None:
 
 def test_predictive_guidance_corrects_an_exact_estimate_at_once() -> None:
     truth = Truth(100.0, 2.0)
-    flight = fly(Predictive(truth.estimator(), spacing=2.0), truth, 1000)
+    flight = fly(Predictive(spacing=2.0), truth, 1000)
     assert np.flatnonzero(np.abs(flight.impulses_m_s) > 1e-9).tolist() == [500]
     assert flight.impulses_m_s[500] == pytest.approx(2100.0 / 500.0)
     assert abs(flight.misses_m[-1]) < 1e-6
@@ -230,35 +237,28 @@ def test_predictive_guidance_corrects_an_exact_estimate_at_once() -> None:
 def test_the_divisor_is_the_time_from_the_impulse(make: Callable[..., Strategy]) -> None:
     """The last decision, 300 s before the arrival, gives its impulse 100 s later."""
     truth = Truth(0.0, 2.0, to_go_s=300.0)
-    strategy = make(truth.estimator())
+    strategy = make()
     now = replace(situation(), lead_s=100.0, later_times_s=np.empty(0))
-    assert strategy.decide(now, strategy.start((1, 1)))[0, 0] == pytest.approx(600.0 / 200.0)
-    assert strategy.decide(replace(now, may_fire=False), strategy.start((1, 1)))[0, 0] == 0.0
+    assert strategy.decide(now, started(strategy, truth))[0, 0] == pytest.approx(600.0 / 200.0)
+    assert strategy.decide(replace(now, may_fire=False), started(strategy, truth))[0, 0] == 0.0
 
 
 def measured(
-    kind: Callable[[tuple[int, int], bool], Estimator],
     model: SetModel,
     truth: Truth,
     steps: int,
     seen: Flags | None = None,
     errors_rad: Floats | None = None,
-    **others: Any,
+    is_augmented: bool = False,
 ) -> tuple[Any, Situation]:
     """Return an estimator after angles along a motion with no impulse, and its last situation."""
     batch = 1 if seen is None else len(seen)
-    estimator = kind((1, batch), False)
-    sensors = others.pop("sensors", {})
+    estimator = KalmanBank((1, batch), is_augmented)
     for step in range(steps):
         angle = np.full((1, batch), np.arctan2(truth.z, E * truth.to_go_s))
         values = {"angle": angle + (0.0 if errors_rad is None else errors_rad[step])}
-        if "range" in sensors:
-            values["range"] = np.full(batch, np.hypot(truth.z, E * truth.to_go_s))
         flags = {} if seen is None else {"angle": seen[:, step]}
-        now = replace(
-            situation(model, batch, step), measured=values, new=frozenset(values), seen=flags, sensors=sensors
-        )
-        now = replace(now, **others)
+        now = replace(situation(model, batch, step), measured=values, new=frozenset(values), seen=flags)
         estimator.update(now)
         if step < steps - 1:
             truth.advance(10.0)
@@ -285,7 +285,7 @@ def deviation_m(bounds_rad: Callable[[Floats], Floats], steps: Floats, width_m: 
 def test_deviations_with_a_camera_are_those_of_a_line_through_the_positions(centroid_m: float, bias: Bias) -> None:
     """Range and speed are known; a constant centroid error adds c^2/3 to the variance of the miss."""
     model = set_model(Camera(10.0, 1e-5, centroid_m, bias=bias))
-    estimator, now = measured(KalmanBank, model, Truth(0.0, 0.0), 60)
+    estimator, now = measured(model, Truth(0.0, 0.0), 60)
     independent = centroid_m if bias is Bias.RANDOM else 0.0
     expected = deviation_m(lambda x: 1e-5 + independent / x, np.arange(60.0))
     if bias is Bias.CONSTANT:
@@ -301,12 +301,12 @@ def test_lost_images_change_nothing_in_the_engagement_that_lost_them() -> None:
     seen = generator.random((3, 60)) < 0.5
     seen[2] = True
     errors = generator.uniform(-1e-5, 1e-5, 60)
-    estimator, now = measured(KalmanBank, MODEL, Truth(500.0, -2.0), 60, seen, errors)
+    estimator, now = measured(MODEL, Truth(500.0, -2.0), 60, seen, errors)
     estimate = estimator.estimate(now)
     for number in range(3):
         steps = np.flatnonzero(seen[number]).astype(float)
         assert estimate.deviation_m[0, number] == pytest.approx(deviation_m(lambda x: 0.0 * x + 1e-5, steps), rel=1e-3)
-        single, last = measured(KalmanBank, MODEL, Truth(500.0, -2.0), 60, seen[number : number + 1], errors)
+        single, last = measured(MODEL, Truth(500.0, -2.0), 60, seen[number : number + 1], errors)
         np.testing.assert_allclose(single.estimate(last).miss_m, estimate.miss_m[0, number], rtol=1e-9)
     assert len(set(estimate.miss_m[0].tolist())) == 3
 
@@ -324,7 +324,7 @@ def test_the_dead_zone_ends_at_the_last_allowed_time() -> None:
 def test_augmented_estimators_find_the_acceleration_of_the_target() -> None:
     model = set_model(Camera(10.0, 1e-6), nu=0.01)
     truth = Truth(500.0, -2.0, a=0.006)
-    estimator, now = measured(lambda shape, _: KalmanBank(shape, True), model, truth, 60)
+    estimator, now = measured(model, truth, 60, is_augmented=True)
     assert estimator.estimate(now).miss_m[0, 0] == pytest.approx(truth.miss_m, rel=0.02)
     assert estimator.mean[0, 0, 0, 4] == pytest.approx(0.006, rel=0.02)
 
