@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 
 from guidance.estimate import MissEstimate
-from guidance.patient import LAST_SECONDS_S
 from guidance.situation import Situation
 from infoset import BearingSensor, RangeSensor, SetModel
 from infoset.arrays import Floats
@@ -208,11 +207,12 @@ class Kalman(Checked):
     ----------
     dead_zone : float
         Half-width of the dead zone of the estimated miss, in standard deviations.
+    last_s : float
+        Time to go below which there is no dead zone, s. With a cut-off, the time before the cut-off.
 
     Notes
     -----
-    `KalmanBank` describes the filters. There is no dead zone in the last 3 s before the arrival, or before the last
-    decision that the engine allows.
+    `KalmanBank` describes the filters. The last decision before the arrival that the engine allows has no dead zone.
 
     Limits: the filter guarantees nothing. Its deviations are those of independent errors; an error that keeps its sign,
     or changes it on purpose, is within the bound but outside the theory. A uniform error has sharp ends, which contain
@@ -220,6 +220,7 @@ class Kalman(Checked):
     """
 
     dead_zone: NotNegative = 1.0
+    last_s: NotNegative = 3.0
 
     name: ClassVar[str] = "kalman"
 
@@ -233,5 +234,5 @@ class Kalman(Checked):
         if not situation.may_fire:
             return np.zeros_like(situation.last_impulse_m_s)
         estimate = state.estimate(situation)
-        is_last = (situation.last_s - situation.lead_s <= LAST_SECONDS_S) | (estimate.to_go_s <= LAST_SECONDS_S)
+        is_last = (situation.last_s - situation.lead_s <= self.last_s) | (estimate.to_go_s <= self.last_s)
         return estimate.correction_m_s(np.where(is_last, 0.0, self.dead_zone * estimate.deviation_m))
