@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
 import numpy as np
 
 from guidance.authority import correctable_later_m
 from guidance.situation import Situation
 from guidance.symmetric_impulse import range_at_impulse, symmetric_impulse
 from infoset.arrays import Floats
+from infoset.limits import Checked, Limits
 
 LAST_SECONDS_S = 3.0
 
 
-class Patient:
+@dataclass(frozen=True)
+class Patient(Checked):
     """Correct only what is certain, and what could not be corrected later; at the last impulses, act as U_s.
 
     Parameters
@@ -20,11 +25,6 @@ class Patient:
     share : float
         Share of the correction that later impulses can give, from 0 to 1, on which the strategy relies. With 0 it is
         U_s; with 1 it waits as long as it can.
-
-    Raises
-    ------
-    ValueError
-        If the share is not from 0 to 1.
 
     Notes
     -----
@@ -47,12 +47,9 @@ class Patient:
     Kumkov and Patsko (1997), section 6, for the interval and U_s. The rule of waiting is not theirs.
     """
 
-    name = "patient"
+    share: Annotated[float, Limits(minimum=0.0, maximum=1.0)] = 0.5
 
-    def __init__(self, share: float = 0.5) -> None:
-        if not 0.0 <= share <= 1.0:
-            raise ValueError(f"share must lie from 0 to 1: got {share}")
-        self.share = share
+    name: ClassVar[str] = "patient"
 
     def start(self, shape: tuple[int, int]) -> None:
         """Start without a state."""

@@ -8,6 +8,7 @@ reaches nearly as much; the other pieces need no more than their first bounds.
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import NamedTuple
 
@@ -396,8 +397,8 @@ class GuaranteedMiss:
 
     def copy(self) -> GuaranteedMiss:
         """Return an independent copy."""
-        twin = GuaranteedMiss(self._law, len(self._bounded_below), self._speed_error)
-        twin._bounded_below, twin._leaving = self._bounded_below.copy(), self._leaving.copy()
+        twin = copy.copy(self)
+        twin._leaving = self._leaving.copy()
         return twin
 
     def leave(self, active: Flags, lower: Floats, upper: Floats, sections: Sections, history: History) -> None:
