@@ -13,6 +13,7 @@ from infoset.geometry._set_arguments import (
     axis_numbers,
     finite_values,
     not_negative,
+    present_axes,
 )
 from infoset.geometry.convex_set import ConvexSet
 from infoset.geometry.polygon_arrays import PolygonArrays
@@ -332,7 +333,8 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         kernels.sample(vertices, counts, random.random((counts.size, count, 3)), out)
         return self._known(out.reshape(*self.shape, count, 2), "points")
 
-    def plot(self, axes: Any, **style: Any) -> None:
-        """Fill the polygons on matplotlib axes, with the options of `matplotlib.axes.Axes.fill`."""
+    def plot(self, axes: Any = None, **style: Any) -> None:
+        """Fill the polygons on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""
+        axes = present_axes(axes)
         for index in np.ndindex(self.shape):
             axes.fill(*self.vertices[index][: self.counts[index]].T, **style)

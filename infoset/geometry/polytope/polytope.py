@@ -18,6 +18,7 @@ from infoset.geometry._set_arguments import (
     finite_values,
     need_set,
     not_negative,
+    present_axes,
 )
 from infoset.geometry.convex_set import ConvexSet
 from infoset.geometry.polytope import double_description as dd
@@ -445,9 +446,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         pairs = (self, self._need_other(other)), (other, self)
         return max((two.distance(vertex) for one, two in pairs for vertex in one.vertices), default=0.0)
 
-    def plot(self, axes: Any, **style: Any) -> None:
-        """Fill a set of R^2 on matplotlib axes, with options of matplotlib's `fill`."""
+    def plot(self, axes: Any = None, **style: Any) -> None:
+        """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""
         self._of_plane()
         points = self.vertices - self.vertices.mean(axis=0) if len(self.vertices) else self.vertices
         order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
-        axes.fill(*self.vertices[order].T, **style)
+        present_axes(axes).fill(*self.vertices[order].T, **style)

@@ -116,12 +116,12 @@ def test_a_witness_of_disjoint_sets() -> None:
     assert one.separating_direction(one) is None
 
 
-def test_plots_and_maps_of_zonotopes() -> None:
+def test_plots_without_axes_and_maps_of_zonotopes() -> None:
     import matplotlib.pyplot as plt
 
     for kind in (ConvexPolygons, Polytope):
         figure = plt.figure()
-        kind.from_box([0, 1], [2, 5]).plot(figure.gca(), alpha=0.5)
+        kind.from_box([0, 1], [2, 5]).plot(alpha=0.5)
         assert len(figure.gca().patches) == 1
         plt.close(figure)
     turned = np.array([[0.0, -1.0], [1.0, 0.0]]) @ Zonotope([1, 2], [[1, 0], [0, 3]])
