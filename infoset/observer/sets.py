@@ -177,7 +177,8 @@ class Member:
                     return replace(self, polytope=moved, reduced=self.reduced or polytope is not self.polytope)
                 polytope = polytope.reduce_outward(few)
             if operation == "add_segment":
-                operation, arguments, options = "enlarged", (np.abs(arguments[0]),), {}
+                operation, arguments = "enlarged", (np.abs(arguments[0]),)
+            options = {}
         moved = getattr(polytope, operation)(*arguments, **options)
         return replace(self, polytope=moved, reduced=self.max_facets is not None)
 
@@ -212,7 +213,7 @@ class Member:
         excess = np.zeros(len(terms))
         for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set
             lower, upper = (ends[0] - slack * terms) * unit, (ends[1] + slack * terms) * unit
-            part = self._apply("cut", normals, lower, upper)
+            part = self._apply("cut", normals, lower, upper, again=self.max_facets is None)
             if part.polytope.is_empty or part.polytope.dimension == part.polytope.space:
                 break
         if part.polytope.is_empty and not self.polytope.is_empty:  # find the first strip that leaves nothing

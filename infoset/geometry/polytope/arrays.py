@@ -290,6 +290,7 @@ class PolytopeArrays:
         limits: Floats,
         origin: Floats | float = 0.0,
         box: tuple[Floats, Floats] | None = None,
+        again: bool = True,
     ) -> Self:
         """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all.
 
@@ -316,8 +317,11 @@ class PolytopeArrays:
             return self.empty(self.space)
         part = replace(self, points=rays[:, :-1].copy(), facets=np.vstack([self.facets, scaled[cuts]]), incidence=bits)
         new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
-        with suppress(UncertainHullError):
+        try:
             return part._reduced(new)
+        except UncertainHullError:
+            if not again:
+                raise
         return self._of_rows(*everything, part.bounding_box())
 
     # Representation ---------------------------------------------------------------------------------------------------

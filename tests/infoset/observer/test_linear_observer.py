@@ -385,30 +385,10 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
 # Seeds 639, 1172, 1397, 1622, 1885 and 1948: sharp corners of a thin layer, which vertices with more than n facets did
 # not reach.
 # Seed 2217: a set between facets that are nearly opposite, whose sum with a segment rounding decides even for a box.
-@pytest.mark.parametrize(
-    "seed",
-    [
-        *range(20),
-        *range(40, 60),
-        100,
-        122,
-        125,
-        216,
-        232,
-        252,
-        280,
-        372,
-        639,
-        1172,
-        1397,
-        1622,
-        1885,
-        1948,
-        1949,
-        2217,
-        3147,
-    ],
-)
+HARD = [100, 122, 125, 216, 232, 244, 252, 280, 372, 639, 1172, 1397, 1622, 1885, 1948, 1949, 2217, 3147]
+
+
+@pytest.mark.parametrize("seed", [*range(20), *range(40, 60), *HARD])
 def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(seed: int) -> None:
     """Singular and regular matrices, flat initial sets, exact measurements, gaps, units that differ by 1e18."""
     rng = np.random.default_rng(seed)
