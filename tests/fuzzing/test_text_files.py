@@ -54,6 +54,8 @@ def check_message(message: str, source: object) -> None:
 
 def attack(kind: str, times: int, seed: int, file: Path) -> int:
     draw, refused = random.Random(seed), 0
+    file.write_text(FILES[kind].texts[0])
+    FILES[kind].read(str(file))  # imports modules and compiles kernels
     for _ in range(times):
         content = mutated_toml(draw.choice(FILES[kind].texts), draw)
         file.write_bytes(content)
