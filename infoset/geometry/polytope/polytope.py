@@ -88,9 +88,13 @@ class Polytope(PolytopeArrays, ConvexSet):
         units = np.abs(matrix).max(axis=0) + 1e-300  # the condition does not depend on those of the columns
         if not len(rows) == self.dimension == self.space or np.linalg.cond(matrix / units) > _MAX_CONDITION:
             return self._hull(points, centre, scale, FLAT, errors)
-        # The image of the set is in the hull of the points, but for their errors.
-        normals = np.ascontiguousarray(self.facets[:, :-1] @ np.linalg.inv(matrix))
-        facets = np.column_stack([normals, dd.supports(points, normals)])
+        normals = self.facets[:, :-1] @ np.linalg.inv(matrix)
+        # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding. The hull
+        # of the vertices may lack a sharp tip, so their supports would be too small.
+        back, _ = dd.affine_image(normals, np.ascontiguousarray(matrix.T), np.zeros(self.space))
+        away = np.abs(back - self.facets[:, :-1]) @ np.abs(self.points).max(axis=0)
+        ends, low = dd.affine_image(shift[None], normals, self.facets[:, -1])
+        facets = np.column_stack([normals, ends[0] + (low + away)])
         return replace(self, points=points, facets=facets, centre=centre, scale=scale)._around(errors)
 
     @staticmethod
