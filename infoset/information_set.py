@@ -31,8 +31,8 @@ class InformationSet(InformationSetView):
     Parameters
     ----------
     guarantee : bool
-        Whether to compute the guaranteed miss Phi. Only the guaranteed model with a box as initial set has one. It
-        takes about as long as everything else, and two to six times as long with a rate sensor.
+        Whether to compute the guaranteed miss Phi. Only the guaranteed model with a box as initial set has one. A
+        run takes 2 to 3.5 times as long, with a rate sensor up to 5.
 
     Raises
     ------

@@ -57,7 +57,7 @@ class Step:
         engagement.
     predicted_miss : PredictedMiss
         After the measurement, before the impulse.
-    impulse_m_s : ndarray, shape (B,)
+    impulse_m_s : ndarray, shape (C, B)
         Impulses of the thruster, before errors of execution.
     information : InformationSetView
         The set after the measurement.
@@ -99,7 +99,7 @@ class Engagements:
         self.scenario = scenario
         self.step = 0
         self._draws = draws
-        self._batch = batch = len(draws.position_m)
+        batch = len(draws.position_m)
         self._noise = _make_noise(scenario, draws) if noise is None else _noise_of_batch(noise)
         self._target_m_s2 = target_m_s2
         self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)

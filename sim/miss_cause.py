@@ -118,14 +118,16 @@ class DecisionLog:
         by_budget = exists & (critical < last) & (sizes[then, at] - then_m <= radius_m)
         within_m = corrects_m(budget=self._scenario.thruster.budget_m_s)
         wide = ~exists | (beyond_m > radius_m)
-        conditions = (
-            sizes[0] - corrects_m() > radius_m,
-            by_budget | (sizes[0] - within_m > radius_m),
-            wide & (~exists | (unknown_at_last_m > radius_m)),
-            wide,
-            np.ones_like(wide),
-        )
-        return [list(MissCause)[index] for index in np.argmax(conditions, axis=0).tolist()]
+        # The cause is the first of these conditions that holds.
+        conditions = {
+            MissCause.ENGINE: sizes[0] - corrects_m() > radius_m,
+            MissCause.BUDGET: by_budget | (sizes[0] - within_m > radius_m),
+            MissCause.KNOWLEDGE: wide & (~exists | (unknown_at_last_m > radius_m)),
+            MissCause.SATURATED: wide,
+            MissCause.GUIDANCE: np.ones_like(wide),
+        }
+        first = np.argmax(list(conditions.values()), axis=0)
+        return [list(conditions)[index] for index in first.tolist()]
 
 
 def count_causes(
