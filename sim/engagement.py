@@ -323,14 +323,17 @@ class Engagements:
         self._label_ends.end(information.drop_below_threshold(), living, is_over, labels, misses)
 
     def _control_is_over(self) -> Flags:
-        """Return whether no later step can give an impulse: after the last one of the schedule, or without budget."""
+        """Return whether no later step can give an impulse: after the last one of the schedule, or without budget.
+
+        Not in engagements that have arrived: their sets and their impulses do not go on with the rest of the batch.
+        """
         if self._last_impulse_step is not None and self.step >= self._last_impulse_step:
             is_over = np.ones_like(self._tracking)
         else:
             is_over = self._budget < max(self.scenario.thruster.min_impulse_m_s, MIN_FLOAT)
         for queued in self._queue:
             is_over &= modulus(queued) == 0.0
-        return is_over
+        return is_over & ~self._arrived
 
     def any_state_miss_m(self, results: Results) -> Floats:
         """Return the maximum miss of a state of the set, m, shape (B,): `LabelEnds.any_state_miss_m`."""

@@ -141,3 +141,15 @@ def test_the_farthest_range_has_the_max_miss(asteroid: Scenario) -> None:
     """A range of 1200 km takes 120 s: -3 km - 2.4 km."""
     _, any_state_m = fly(without_control(asteroid, Model.GUARANTEED, (0.8e6, 1.2e6)), 3, noise=EXACT)
     assert any_state_m == pytest.approx([5.4e3] * 3, rel=1e-6)
+
+
+def test_labels_of_a_run_that_arrives_before_the_cut_off_do_not_wait_for_it(asteroid: Scenario) -> None:
+    """The set of a run that has arrived does not go on: in a batch it counted 404 m instead of 19 m."""
+    thruster = replace(asteroid.thruster, last_impulse_s=2.0, delay_steps=2)
+    scenario = replace(guaranteed(asteroid), thruster=thruster, noise=NoiseKind.GAME)
+    scenario = replace(scenario, dispersion=scenario.set_model.bounds)
+    _, together_m = fly(scenario, 11, guarantee=False)
+    flight = Engagements(scenario, draw(scenario, [10], 0), guarantee=False)
+    while flight.flying:
+        flight.advance()
+    assert flight.any_state_miss_m(flight.results(np.arange(1))).tolist() == [together_m[10]]
