@@ -107,6 +107,8 @@ def output_of(
             raise InputError(f"{path}: is given twice; choose another name for one of the two files")
         if str(path) != STDOUT:
             _check_new(path, options.overwrite)
+    if folder is not None and folder.is_file():
+        raise InputError(f"{folder}: is a file, not a folder; choose another name for the folder")
     output = Output(folder, single, options.overwrite)
     yield output
     if output.written and not options.quiet:
@@ -116,6 +118,8 @@ def output_of(
 
 
 def _check_new(file: Path, overwrite: bool) -> None:
+    if file.is_dir():
+        raise InputError(f"{file}: is a folder; give the name of a file")
     if file.exists() and not (overwrite and file.is_file()):
         raise InputError(f"{file}: exists already; choose another name, or give --overwrite to replace a file")
 

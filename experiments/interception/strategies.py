@@ -54,7 +54,7 @@ def chosen_noise(text: str, names: Sequence[str] = NOISES) -> str | OwnNoise:
 
     `InputError` if there is no such noise.
     """
-    return load_noise(text) if is_own(text) else choice("--noise", text, names)
+    return load_noise(text) if is_own(text) else choice("--noise", text, [*names, "FILE.py:CLASS"])
 
 
 def chosen_noises(names: str) -> Mapping[str, NoiseSource | None]:
@@ -113,7 +113,7 @@ def _load(text: str, option: str, methods: tuple[str, ...], version: str | None)
     name, _, class_name = text.rpartition(":")
     file = Path(name).resolve()
     if file.suffix != ".py" or not file.is_file():
-        raise InputError(f"{option}: {shown(text)} must be FILE.py:CLASS, with a file that exists; check the path")
+        raise InputError(f"{option}: {shown(text)} must be FILE.py:CLASS, the path of a file that exists and its class")
     _LOADED.pop((file, class_name), None)  # the last one is looked at first
     _LOADED[file, class_name] = option
     with own_code_errors():

@@ -159,8 +159,8 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
             "without them, use --model guaranteed"
         ]
     return [
-        f"warning: model guaranteed: {failures}, so the scenario exceeds an assumption of the model; to find it, use "
-        "infoset scenarios check FILE"
+        f"warning: model guaranteed: {failures}, so an assumption of the model does not hold: the noise exceeds the "
+        "bounds of the sensors, or the scenario those of the set; infoset scenarios check FILE examines the scenario"
     ]
 
 

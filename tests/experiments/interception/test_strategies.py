@@ -109,7 +109,7 @@ def test_strategies_of_files_and_built_in_ones_are_compared(mine: Path, brief: S
 @pytest.mark.parametrize(
     ("text", "code", "part"),
     [
-        ("no.py:Mine", None, "with a file that exists"),
+        ("no.py:Mine", None, "of a file that exists"),
         ("mine.py", None, "must be FILE.py:CLASS"),
         ("mine.py:HALF", None, 'mine.py has no class "HALF" with the methods start and decide'),
         ("typo.py:Mine", "\nclass Mine\n", "typo.py, line 2: SyntaxError: "),
