@@ -168,7 +168,7 @@ def read_requirement(text: str | None, *, has_size: bool) -> AnyRequirement:
         required = parse_requirement(text or ("hit>=0.95" if has_size else "miss_m p99<10"))
     if required.quantity in ("hit", "cause") and not has_size:
         raise InputError(
-            f"--require {required}: the scenario has no [body]; set its radius, for example --set body.radius_m=80, or "
-            "give a bound of the miss"
+            f"--require {required}: the scenario has no [body] with a radius; give a bound of the miss, for example "
+            "miss_m p99<10"
         )
     return required

@@ -73,9 +73,11 @@ def built_in(name: str, kinds: Collection[str]) -> BuiltIn:
 
 
 def kind_of(document: Mapping[str, Any]) -> str | None:
-    """Return the kind of problem of a parsed file; None if it has none, as a scenario."""
+    """Return the kind of a parsed file: a kind of problem, or `SCENARIO` for tables of a scenario; None for others."""
     kind = document.get("kind")
-    return kind if isinstance(kind, str) and kind in PROBLEMS else None
+    if isinstance(kind, str) and kind in PROBLEMS:
+        return kind
+    return SCENARIO if kind is None and {"uncertainty", "dispersion"} <= document.keys() else None
 
 
 def taken_by(kind: str, file: str = "FILE") -> str:

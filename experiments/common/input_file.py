@@ -87,6 +87,8 @@ def load_problem(name_or_path: str | os.PathLike[str], settings: Sequence[str] |
     kind = kind_of(parse(text, source))
     if kind is None:
         raise InputError(f"{source}: kind: must be one of {', '.join(PROBLEMS)}; write it above the first table")
+    if kind == SCENARIO:
+        raise InputError(f"{source}: {taken_by(kind)}")
     owner: type = getattr(import_module(f"experiments.{PROBLEMS[kind].module}"), PROBLEMS[kind].owner)
     return read_file(owner, name_or_path, settings)
 
@@ -322,7 +324,9 @@ def _value(literal: str) -> Any:
     try:
         return tomllib.loads(f"value = {literal}", parse_float=Decimal)["value"]
     except (ValueError, RecursionError, InvalidOperation):
-        return Decimal(literal) if re.fullmatch(r"[+-]?\.[0-9]+", literal) else literal
+        return (
+            Decimal(literal) if re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", literal) else literal
+        )
 
 
 def _scaled(value: Any, factor: Decimal) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.optimize import minimize
 
@@ -51,25 +53,35 @@ def minimax_excess(solution: EncounterSolution) -> Floats:
     """Return the free values, shape (f,), that minimise the maximum weighted excess of a `solution`.
 
     With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), minimum t with
-    w_i e_i(p) <= t.
+    w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
+    If weights differ by a factor of 1e4 and more, the maximum can be up to 1e-4 of itself above the minimum.
     """
-    roots, back, middle, ideals, size, weights = _scaled(solution)
-    if size == 0.0:
-        return middle
+    costs = [cost for cost in solution.costs if cost.craft.weight > 0.0]
+    weights = np.array([cost.craft.weight for cost in costs])
+    roots, centres = np.array([cost.root for cost in costs]), np.array([cost.ideal for cost in costs])
     matrices = np.einsum("n,nca,ncb->nab", weights, roots, roots)
+    scale = np.linalg.inv(np.linalg.cholesky(matrices.mean(axis=0)).T)
+    scaled = np.einsum("ca,ncd,db->nab", scale, matrices, scale)
+    middle = centres.mean(axis=0)
+    ideals = np.linalg.solve(scale, (centres - middle).T).T
+    size = float(np.abs(ideals).max())
+    if size == 0.0 or len(centres) == 1:
+        return np.array(centres[0])
+    ideals /= size
 
     def excess(point: Floats) -> Floats:
         apart = point - ideals
-        return np.asarray(np.einsum("na,nab,nb->n", apart, matrices, apart))
+        return np.asarray(np.einsum("na,nab,nb->n", apart, scaled, apart))
 
     def slopes(point: Floats) -> Floats:
-        return np.asarray(2.0 * np.einsum("nab,nb->na", matrices, point - ideals))
+        return np.asarray(2.0 * np.einsum("nab,nb->na", scaled, point - ideals))
 
-    initial = np.zeros(len(middle))
+    initial = np.linalg.solve(scaled.sum(axis=0), np.einsum("nab,nb->a", scaled, ideals))
+    free = len(initial)
     minimum = minimize(
         lambda x: x[-1],
         np.append(initial, excess(initial).max()),
-        jac=lambda _: np.append(initial, 1.0),
+        jac=lambda _: np.append(np.zeros(free), 1.0),
         constraints={
             "type": "ineq",
             "fun": lambda x: x[-1] - excess(x[:-1]),
@@ -78,7 +90,8 @@ def minimax_excess(solution: EncounterSolution) -> Floats:
         method="SLSQP",
         options={"ftol": 1e-15, "maxiter": 200},
     )
-    return np.asarray(middle + size * back @ minimum.x[:-1])
+    best = _bound_craft(np.asarray(minimum.x[:-1]), excess, slopes, scaled)
+    return np.asarray(middle + size * scale @ best)
 
 
 def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
@@ -115,3 +128,29 @@ def _scaled(solution: EncounterSolution) -> tuple[Floats, Floats, Floats, Floats
     apart = (ideals - middle) @ root.T
     size = float(np.linalg.norm(apart, axis=1).max())
     return np.array([cost.root for cost in costs]) @ back, back, middle, apart / (size or 1.0), size, weights
+
+
+def _bound_craft(
+    point: Floats, excess: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], matrices: Floats
+) -> Floats:
+    """Polish a minimax point: equal excesses of the active craft, slopes that cancel."""
+    values = excess(point)
+    bound = np.flatnonzero(values >= values.max() * (1.0 - 1e-5))
+    count, free = len(bound), len(point)
+    shares = np.linalg.lstsq(
+        np.vstack([slopes(point)[bound].T, np.ones(count)]), np.append(np.zeros(free), 1.0), rcond=None
+    )[0]
+    best = point
+    for _ in range(8):
+        values, tilts = excess(point)[bound], slopes(point)[bound]
+        top = float(values.mean())
+        residual = np.concatenate([shares @ tilts, values - top, [shares.sum() - 1.0]])
+        system = np.zeros((free + count + 1, free + count + 1))
+        system[:free, :free] = 2.0 * np.einsum("n,nab->ab", shares, matrices[bound])
+        system[:free, free : free + count] = tilts.T
+        system[free : free + count, :free] = tilts
+        system[free : free + count, -1] = -1.0
+        system[-1, free : free + count] = 1.0
+        step = np.linalg.lstsq(system, -residual, rcond=None)[0]
+        point, shares = point + step[:free], shares + step[free : free + count]
+    return np.asarray(point if excess(point).max() <= excess(best).max() * (1.0 + 1e-9) else best)

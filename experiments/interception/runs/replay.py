@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from experiments.common.errors import InputError, input_errors
 from experiments.common.output import output_of
 from experiments.common.screen import figure_files, progress_bar, show
@@ -21,6 +23,8 @@ def run(options: Replay) -> None:
         raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
     with input_errors("--times", "; for example --times 0.5,40,90"):
         times_s = [float(time_s) for time_s in options.times.split(",") if time_s]
+        if not all(0.0 <= time_s < math.inf for time_s in times_s):
+            raise ValueError("times must be finite and not negative")
     with (
         output_of(options, figure_files(*FIGURES), {"--gif": options.gif}) as written,
         progress_bar(options.quiet) as begin,

@@ -97,7 +97,7 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Command, swept: 
         (["--vary", "thruster.budget=1:2:2"], "did you mean thruster.budget_m_s?"),
         (["--vary", "thruster.max_impulse_m_s=0.01:5:3"], "brief with thruster.max_impulse_m_s = 0.01"),
         (["--require", "miss_m 10"], "--require: must be hit>=SHARE, no-CAUSE>=SHARE or QUANTITY"),
-        (["--require", "hit>=0.95"], "has no [body]; set its radius, for example --set body.radius_m=80"),
+        (["--require", "hit>=0.95"], "has no [body] with a radius; give a bound of the miss"),
         (["--max-runs", 30], "--max-runs is the limit of --until; add --until decided"),
     ],
 )
