@@ -33,6 +33,8 @@ _SHORT = 1e-15
 """Length of a row, relative to the longest one, below which it has no direction."""
 SMALL = 2.0**10
 """Ratio of two sets' widths from which half-spaces are intersected in the coordinates of the smaller one."""
+_FINE = 2.0**20
+"""Ratio of widths from which a part is computed again in its own coordinates: it is known to 1e-12 of the whole."""
 _JOGGLES = (0.0, 1e-10, 1e-8, 1e-6)
 """Movements of points or half-spaces, one after the other, until vertices and facets agree."""
 
@@ -296,10 +298,10 @@ class PolytopeArrays:
 
         `box` are two ends that contain the part, if known.
         """
-        limits = _moved(rows, limits, self.centre - origin)
+        limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
         own, ends = self._rows(self.centre)
         everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
-        if box is not None and (SMALL * (box[1] - box[0]) < np.ptp(self.points, axis=0) * self.scale).any():
+        if box is not None and (SMALL * (box[1] - box[0]) < before * self.scale).any():
             # Sets that touch each other do so within the rounding of their own coordinates.
             return self._of_rows(*everything, box)
         scaled, possible = _scaled_rows(rows, limits, self.scale)
@@ -317,12 +319,16 @@ class PolytopeArrays:
             return self.empty(self.space)
         part = replace(self, points=rays[:, :-1].copy(), facets=np.vstack([self.facets, scaled[cuts]]), incidence=bits)
         new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
-        try:
-            return part._reduced(new)
-        except UncertainHullError:
-            if not again:
-                raise
-        return self._of_rows(*everything, part.bounding_box())
+        widths = np.ptp(part.points, axis=0)
+        # An axis along which the part has no width is no reason: its equations fix that coordinate.
+        if not ((_FINE * widths < before) & (widths > FLAT * before)).any():
+            try:
+                return part._reduced(new)
+            except UncertainHullError:
+                if not again:
+                    raise
+        better = self._of_rows(*everything, part.bounding_box())
+        return part._reduced(new) if better.is_empty else better
 
     # Representation ---------------------------------------------------------------------------------------------------
 

@@ -498,7 +498,7 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                         table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
                     _solve(table, step)
                 rounding = 0.0
-                for _ in range(15):  # more would only help at sharp corners
+                for _ in range(50):  # with 15, sharp corners lose the true state of an observer
                     done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
                     for m in range(count):
                         along, square = _along(facets[mine[m]], step)

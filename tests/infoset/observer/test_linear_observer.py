@@ -382,10 +382,10 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
 # Formerly lost the true state: seeds 216 and 252, with exact measurements, a singular matrix and a flat initial set;
 # seeds 1949 and 3147, with initial sets whose known coordinates were rounding errors.
 # Seeds 100 to 372: a state that is zero at first, in units far from one.
-# Seeds 639, 1172, 1397, 1622, 1885 and 1948: sharp corners of a thin layer, which vertices with more than n facets did
-# not reach.
+# Seeds 639, 1172, 1397, 1622, 1843, 1885 and 1948: sharp corners of a thin layer, which vertices with more than n
+# facets did not reach.
 # Seed 2217: a set between facets that are nearly opposite, whose sum with a segment rounding decides even for a box.
-HARD = [100, 122, 125, 216, 232, 244, 252, 280, 372, 639, 1172, 1397, 1622, 1885, 1948, 1949, 2217, 3147]
+HARD = [100, 122, 125, 216, 232, 244, 252, 280, 372, 639, 1172, 1397, 1622, 1843, 1885, 1948, 1949, 2217, 3147]
 
 
 @pytest.mark.parametrize("seed", [*range(20), *range(40, 60), *HARD])
