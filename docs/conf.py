@@ -66,6 +66,7 @@ nitpick_ignore = [
         "guidance.proportional_navigation": ("PulseState",),
         "infoset.observer.sets": ("Polygons", "Polytopes", "Motion"),
         "infoset.observer.steps": ("Strips",),
+        "rendezvous.relative_motion.time_varying": ("HeldSegment",),
         "infoset.limits": ("Line",),
         "infoset.sensors.sensor": ("Measurements", "Geometry", "Apart", "Cuttable"),
         "infoset.sensors.bearing": ("RangeOrRanges",),
