@@ -142,7 +142,7 @@ class Estimate:
 
     def chebyshev_centre(self) -> Floats:
         """Return the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty set."""
-        return self._runs(self.sets.chebyshev_centres(self.states))
+        return self._runs(self.sets.chebyshev_centres())
 
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
         """Return the minimum and the maximum values of matrix x, each of shape (m,) or (B, m); NaN for the empty set.
@@ -242,8 +242,8 @@ class LinearObserver:
         self._single = runs is None
         self._runs = runs or 1
         self._disturbance = Zonotope(np.zeros(n), []) if disturbance is None else disturbance
-        self._need_set("disturbance", self._disturbance)
-        self._need_set("initial", initial, (self._runs,) if runs else ())
+        _need_set("disturbance", self._disturbance, n)
+        _need_set("initial", initial, n, (self._runs,) if runs else ())
         self._noise = _Noise.of(noise, self.outputs)
         self._sets: Sets = (
             Polygons.of(initial, self._runs)
@@ -253,18 +253,6 @@ class LinearObserver:
         self.max_facets, self._initial, self._events, self._count = max_facets, initial, list[Motion | Strips](), 0
         self.step = 0
         self._empty = np.full(self._runs, -1), np.zeros(self._runs, dtype=np.int64), np.zeros(self._runs)
-
-    def _need_set(self, name: str, value: Set, shape: tuple[int, ...] = ()) -> None:
-        if not isinstance(value, ConvexPolygons | Polytope | Zonotope):
-            raise TypeError(f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}")
-        space = 2 if isinstance(value, ConvexPolygons) else value.space
-        if space != self.states:
-            raise ValueError(f"{name} must have {self.states} coordinates, one for each state: got {space}")
-        if isinstance(value, ConvexPolygons) and value.shape not in ((), shape):
-            batch = f" or a batch of shape {shape}" if shape else ""
-            raise ValueError(f"{name} must be a single polygon{batch}: got a batch of shape {value.shape}")
-        if not isinstance(value, Zonotope) and np.any(value.is_empty):
-            raise ValueError(f"{name} must not be empty")
 
     def predict(self, inputs: ArrayLike | None = None) -> None:
         """Move the sets to the next step.
@@ -432,13 +420,8 @@ class _Noise:
     @classmethod
     def of(cls, noise: ArrayLike | Set, outputs: int) -> _Noise:
         if isinstance(noise, ConvexPolygons | Polytope | Zonotope):
-            if not isinstance(noise, Zonotope) and np.any(noise.is_empty):
-                raise ValueError("noise must not be empty")
-            if isinstance(noise, ConvexPolygons) and noise.shape:
-                raise ValueError(f"noise must be a single polygon: got a batch of shape {noise.shape}")
+            _need_set("noise", noise, outputs)
             polytope = polytope_of(noise)
-            if polytope.space != outputs:
-                raise ValueError(f"noise must have {outputs} coordinates, one for each output: got {polytope.space}")
             rows, limits = polytope.constraints()
             return cls(rows, np.full(len(rows), -np.inf), limits, polytope)
         half = finite_values("noise", noise, "...")
@@ -468,6 +451,19 @@ class _Noise:
             terms = np.abs(np.nan_to_num(y[:, pattern])) @ np.abs(rows).T + np.abs(upper)
             groups.append((runs, Strips(rows @ matrix[pattern], heights - upper, np.full_like(heights, np.inf), terms)))
         return groups
+
+
+def _need_set(name: str, value: Set, space: int, shape: tuple[int, ...] = ()) -> None:
+    if not isinstance(value, ConvexPolygons | Polytope | Zonotope):
+        raise TypeError(f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}")
+    found = 2 if isinstance(value, ConvexPolygons) else value.space
+    if found != space:
+        raise ValueError(f"{name} must have {space} coordinates, one for each state or output: got {found}")
+    if isinstance(value, ConvexPolygons) and value.shape not in ((), shape):
+        batch = f" or a batch of shape {shape}" if shape else ""
+        raise ValueError(f"{name} must be a single polygon{batch}: got a batch of shape {value.shape}")
+    if not isinstance(value, Zonotope) and np.any(value.is_empty):
+        raise ValueError(f"{name} must not be empty")
 
 
 def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from operator import methodcaller
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from infoset.geometry.zonotope import Zonotope
 from infoset.observer.steps import Batch, Move, Strips, cut_to_preimage, predict_all, support_all, update_all
 
 Set = ConvexPolygons | Polytope | Zonotope
-Views = TypeVar("Views", Move, Strips)
 
 POLYTOPE_SLACK = 1e-11
 """Enlargement of polytopes, relative to the terms of normal . x of a measurement, or to the widths of a prediction:
@@ -49,7 +48,8 @@ class Motion:
     @property
     def reversed_sum(self) -> Motion:
         """The step x - shift - w."""
-        return Motion(np.eye(len(self.matrix)), -self.shifts, self.terms, _negative(self.disturbance))
+        unit = np.eye(len(self.matrix))
+        return Motion(unit, -self.shifts, self.terms, -unit @ self.disturbance)
 
 
 class Polygons(Batch):
@@ -83,12 +83,13 @@ class Polygons(Batch):
             generators, other, centre = w.generators, none, w.centre
         else:
             generators, other, centre = none, polygon_of(w).polygon(), np.zeros(2)
-        move = Move(motion.matrix, motion.shifts + centre, motion.terms + np.abs(centre), generators, other)
-        return self._apply(predict_all, 2 * len(generators) + len(other) + 4, _contiguous(move))
+        arrays = motion.matrix, motion.shifts + centre, motion.terms + np.abs(centre), generators, other
+        move = Move(*map(np.ascontiguousarray, arrays))  # kernels are compiled once
+        return self._apply(predict_all, 2 * len(generators) + len(other) + 4, move)
 
     def cut(self, strips: Strips, excess: Floats) -> Polygons:
         """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
-        return self._apply(update_all, 2 * len(strips.normals), _contiguous(strips), excess)
+        return self._apply(update_all, 2 * len(strips.normals), Strips(*map(np.ascontiguousarray, strips)), excess)
 
     def preimage_cut(self, later: Sets, motion: Motion) -> Polygons:
         """Return the states that lead to a state of the later set for some disturbance."""
@@ -101,7 +102,7 @@ class Polygons(Batch):
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
         return support_all(self, direction)
 
-    def chebyshev_centres(self, states: int) -> Floats:
+    def chebyshev_centres(self) -> Floats:
         """Return the centres of largest discs, shape (B, 2); NaN for the empty set."""
         centres, _ = ConvexPolygons.unchecked(self.vertices, self.counts).chebyshev_centre()
         return np.ma.filled(centres, np.nan)
@@ -136,17 +137,13 @@ class Member:
         `sizes`, shape (n,), are maximum terms of the coordinates of a flat set.
         """
         one = self.polytope
-        if one.is_empty:
+        if one.is_empty or (one.dimension == one.space and not _is_thin(one)):
             return self
         if one.dimension < one.space:
             sizes = np.maximum(self.sizes, sizes)
-            return self._apply(methodcaller("enlarged", _THIN * np.where(sizes > 0.0, sizes, 1.0)))
-        if not _is_thin(one):
-            return self
-        same = self._apply(methodcaller("translate", np.zeros(one.space)))  # in coordinates of its present widths
-        if not _is_thin(same.polytope):
-            return same
-        return same._apply(methodcaller("enlarged", _THIN * np.ptp(one.vertices, axis=0)))
+            return self._apply("enlarged", _THIN * np.where(sizes > 0.0, sizes, 1.0))
+        same = self._apply("translate", np.zeros(one.space))  # in coordinates of its present widths
+        return same._apply("enlarged", _THIN * np.ptp(one.vertices, axis=0)) if _is_thin(same.polytope) else same
 
     def limited(self) -> Member:
         """Return a set that contains this one, with at most as many facets and vertices as allowed.
@@ -167,24 +164,23 @@ class Member:
         smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES)
         return self if smaller is self.polytope else replace(self, polytope=smaller, reduced=True)
 
-    def _apply(
-        self, operation: Callable[[Polytope], Polytope], outer: Callable[[Polytope], Polytope] | None = None
-    ) -> Member:
+    def _apply(self, operation: str, *arguments: Any, **options: Any) -> Member:
         """Return the result of an operation; where rounding decides about facets, that of a larger set with fewer ones.
 
-        The last one is a box; `outer` is then an operation with a larger result, if there is one, that needs no hull.
+        The last one is a box; its sum with a segment is then a larger box.
         """
-        if self.max_facets is None:
-            return replace(self, polytope=operation(self.polytope))
-        polytope = self.polytope
-        for few in (self.max_facets // 2, 0):
-            try:
-                return replace(
-                    self, polytope=operation(polytope), reduced=self.reduced or polytope is not self.polytope
-                )
-            except (UncertainHullError, UnboundedPolytopeError):
-                polytope = polytope.reduce_outward(max(few, 2 * polytope.space))
-        return replace(self, polytope=(outer or operation)(polytope), reduced=True)
+        polytope, box = self.polytope, 2 * self.polytope.space
+        if self.max_facets is not None:
+            for few in (max(self.max_facets // 2, box), box):
+                with suppress(UncertainHullError, UnboundedPolytopeError):
+                    moved = getattr(polytope, operation)(*arguments, **options)
+                    return replace(self, polytope=moved, reduced=self.reduced or polytope is not self.polytope)
+                polytope = polytope.reduce_outward(few)
+            if operation == "add_segment":
+                operation, arguments = "enlarged", (np.abs(arguments[0]),)
+            options = {}
+        moved = getattr(polytope, operation)(*arguments, **options)
+        return replace(self, polytope=moved, reduced=self.max_facets is not None)
 
     def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
         """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w.
@@ -192,24 +188,21 @@ class Member:
         It is not reduced after the last sum: most of its facets go with the next measurement.
         """
         terms = np.abs(matrix) @ self.sizes + terms
-        image = self.limited()._apply(methodcaller("affine_map", matrix, shift))
+        image = self.limited()._apply("affine_map", matrix, shift)
         moved = image.solid(terms)
         was_solid = moved is image
         if isinstance(disturbance, Zonotope):
             for k, half in enumerate(disturbance.generators):
                 if k > 0 and len(shift) > 4:  # in many dimensions a sum has many facets
                     moved = moved.limited()
-                moved = moved._apply(
-                    methodcaller("add_segment", half, hull=self.max_facets is None),
-                    methodcaller("enlarged", np.abs(half)),
-                )
+                moved = moved._apply("add_segment", half, hull=self.max_facets is None)
         else:
-            moved = moved._apply(methodcaller("minkowski_sum", polytope_of(disturbance)))
+            moved = moved._apply("minkowski_sum", polytope_of(disturbance))
         if self.max_facets is None:
             moved = moved.limited()
         widths = np.ptp(moved.polytope.vertices, axis=0) if not moved.polytope.is_empty else 0.0
         slack = POLYTOPE_SLACK if moved.solid(terms) is moved and was_solid else _THIN
-        return moved._apply(methodcaller("enlarged", SUM_SLACK * terms + slack * widths))
+        return moved._apply("enlarged", SUM_SLACK * terms + slack * widths)
 
     def cut(self, strips: Strips, run: int = 0) -> tuple[Member, Floats]:
         """Return the part within strips, and the distances of strips from the set, shape (r,), if the part is empty."""
@@ -220,20 +213,20 @@ class Member:
         excess = np.zeros(len(terms))
         for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set
             lower, upper = (ends[0] - slack * terms) * unit, (ends[1] + slack * terms) * unit
-            part = self._apply(methodcaller("cut", normals, lower, upper))
+            part = self._apply("cut", normals, lower, upper, again=self.max_facets is None)
             if part.polytope.is_empty or part.polytope.dimension == part.polytope.space:
                 break
         if part.polytope.is_empty and not self.polytope.is_empty:  # find the first strip that leaves nothing
             part = self
             for r, normal in enumerate(normals):
                 heights = part.polytope.vertices @ normal
-                part = part._apply(methodcaller("cut", normal, lower[r], upper[r]))
+                part = part._apply("cut", normal, lower[r], upper[r])
                 if part.polytope.is_empty:
                     excess[r] = max(heights.min() - upper[r], lower[r] - heights.max(), _TINY) / unit[r]
                     break
         if slack == _THIN and not part.polytope.is_empty:
             widths = np.ptp(self.polytope.vertices, axis=0)
-            part = part.solid(self.sizes)._apply(methodcaller("enlarged", POLYTOPE_SLACK * widths))
+            part = part.solid(self.sizes)._apply("enlarged", POLYTOPE_SLACK * widths)
         return part.limited(), excess
 
 
@@ -291,19 +284,14 @@ class Polytopes:
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
         return np.array([member.polytope.support_function(direction) for member in self.members])
 
-    def chebyshev_centres(self, states: int) -> Floats:
+    def chebyshev_centres(self) -> Floats:
         """Return the centres of largest balls, shape (B, n), by a linear program each; NaN for the empty set."""
         polytopes = [member.polytope for member in self.members]
-        return np.array([np.full(states, np.nan) if p.is_empty else p.chebyshev_centre()[0] for p in polytopes])
+        return np.array([np.full(p.space, np.nan) if p.is_empty else p.chebyshev_centre()[0] for p in polytopes])
 
 
 Sets = Polygons | Polytopes
 """The sets of B runs; both classes have the same methods, which return new sets."""
-
-
-def _contiguous(arrays: Views) -> Views:
-    """Return the same named tuple of contiguous arrays: kernels are compiled once."""
-    return type(arrays)(*map(np.ascontiguousarray, arrays))
 
 
 def polygon_of(shape: Set) -> ConvexPolygons:
@@ -336,12 +324,3 @@ def sizes_of(shape: Set) -> Floats:
     if isinstance(shape, Zonotope):
         return np.asarray(np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0))
     return np.asarray(np.abs(shape.vertices).reshape(-1, shape.vertices.shape[-1]).max(axis=0))
-
-
-def _negative(disturbance: Set) -> Set:
-    """Return {-w: w in the set}."""
-    if isinstance(disturbance, Zonotope):
-        return Zonotope(-disturbance.centre, disturbance.generators)
-    if isinstance(disturbance, ConvexPolygons):
-        return disturbance.linear_map(-np.eye(2))
-    return disturbance.linear_map(-np.eye(disturbance.space))

@@ -33,6 +33,8 @@ _SHORT = 1e-15
 """Length of a row, relative to the longest one, below which it has no direction."""
 SMALL = 2.0**10
 """Ratio of two sets' widths from which half-spaces are intersected in the coordinates of the smaller one."""
+_FINE = 2.0**20
+"""Ratio of widths from which a part is computed again in its own coordinates: it is known to 1e-12 of the whole."""
 _JOGGLES = (0.0, 1e-10, 1e-8, 1e-6)
 """Movements of points or half-spaces, one after the other, until vertices and facets agree."""
 
@@ -65,8 +67,7 @@ class PolytopeArrays:
         digits. The facets are the rays of a double description: O(m f) for f facets in the plane, O(m f^2) at worst.
         """
         array = finite_values("points", points, "m", "n")
-        # The minimum width also keeps a set that is nearly flat along an axis from being blown up to rounding errors.
-        centre, scale = coordinates(array.min(axis=0), array.max(axis=0), 1e-10 * np.abs(array).max(axis=0))
+        centre, scale = _around(array.min(axis=0), array.max(axis=0))
         return cls._hull((array - centre) / scale, centre, scale, flat)
 
     @classmethod
@@ -98,52 +99,25 @@ class PolytopeArrays:
         centre, scale = coordinates(minimum, most, np.zeros(len(minimum)))
         least, top = (minimum - centre) / scale, (most - centre) / scale
         ends = [dict.fromkeys(pair) for pair in zip(least, top, strict=True)]
-        unit, wide = np.eye(len(least)), least < top
-        return cls._of_shape(
-            np.array(list(itertools.product(*ends))),
-            np.column_stack([np.vstack([unit[wide], -unit[wide]]), np.concatenate([top[wide], -least[wide]])]),
-            np.column_stack([unit[~wide], top[~wide]]),
-            centre,
-            scale,
-        )
-
-    @classmethod
-    def _of_shape(cls, points: Floats, facets: Floats, equations: Floats, centre: Floats, scale: Floats) -> Self:
-        """Return a polytope whose vertices and facets are known; the incidence follows from their distances."""
-        facets = facets * _units(facets)
-        on = facets[:, -1] - points @ facets[:, :-1].T <= dd.ON * max(1.0, float(np.abs(points).max()))
-        return cls(points, facets, equations, dd.packed(on), centre, scale)
+        points, unit, wide = np.array(list(itertools.product(*ends))), np.eye(len(least)), least < top
+        facets = np.column_stack([np.vstack([unit[wide], -unit[wide]]), np.concatenate([top[wide], -least[wide]])])
+        on = points @ facets[:, :-1].T == facets[:, -1]
+        return cls(points, facets, np.column_stack([unit[~wide], top[~wide]]), dd.packed(on), centre, scale)
 
     @classmethod
     def from_ball(cls, centre: ArrayLike, radius: float, *, outer: bool = True) -> Self:
         """Return a polytope around the ball with `centre`, shape (n,), and `radius`, or in it.
 
         Its facets, or its vertices if not `outer`, are in the 3^n - 1 directions whose components are in ratios of -1,
-        0 and 1; it has 2^n n! vertices, or facets. It extends beyond the ball, or stays inside it, by the factor 1.09
-        in two dimensions, 1.13 in three and 1.21 in six at most.
+        0 and 1; it has 2^n n! vertices, or facets: 3840 in R^5. It extends beyond the ball, or stays inside it, by the
+        factor 1.09 in two dimensions, 1.13 in three and 1.19 in five at most.
         """
         middle, size = finite_values("centre", centre, "n"), float(radius_values(radius))
-        space = len(middle)
-        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=space) if any(row)])
+        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=len(middle)) if any(row)])
         rows /= np.linalg.norm(rows, axis=1)[:, None]
-        # The hyperplane through (1, 0, ..), (1, 1, 0, ..) / sqrt(2), .. is one side; symmetry gives the others.
-        side = np.diff(np.sqrt(np.arange(space + 1)))
-        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=space)))
-        sides = (np.array(list(itertools.permutations(side)))[:, None] * signs).reshape(-1, space)
-        if size <= 1e-13 * np.abs(middle).max():  # rounding of the coordinates is larger
-            return cls.from_vertices(middle + size * (sides if outer else rows))
-        points, normals = (sides, rows) if outer else (rows, sides)
-        offsets = np.ones(len(normals)) if outer else dd.supports(points, normals)
-        base, scale = coordinates(middle - size, middle + size, np.zeros(space))
-        shift, share = (middle - base) / scale, size / scale
-        facets = normals / share
-        return cls._of_shape(
-            shift + share * points,
-            np.column_stack([facets, offsets + facets @ shift]),
-            np.zeros((0, space + 1)),
-            base,
-            scale,
-        )
+        if outer and size > 1e-13 * np.abs(middle).max():  # rounding of the coordinates is smaller
+            return cls._of_rows(rows, np.full(len(rows), size), middle, (middle - size, middle + size))
+        return cls.from_vertices(middle + size * rows)
 
     @classmethod
     def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Self:
@@ -230,8 +204,14 @@ class PolytopeArrays:
         return replace(self, points=points, facets=facets)
 
     @classmethod
-    def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0) -> Self:
-        """Return {x: rows (x - origin) <= limits}.
+    def _of_rows(
+        cls,
+        rows: Floats,
+        limits: Floats,
+        origin: Floats | float = 0.0,
+        box: tuple[Floats, Floats] | None = None,
+    ) -> Self:
+        """Return {x: rows (x - origin) <= limits}, which a `box` contains, if it is known.
 
         The coordinates in which the set is round are not known before the set, so it is computed again if others are
         much better.
@@ -240,34 +220,23 @@ class PolytopeArrays:
             return cls.empty(rows.shape[1])
         rows, limits = rows[limits < np.inf], limits[limits < np.inf]
         # In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
-        centre, found = np.zeros(rows.shape[1]), None
-        with suppress(UnboundedPolytopeError, UncertainHullError):
-            found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 0.25))
-        if found is None or found.is_empty:
-            found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 1.0))
-        return found if found._is_round else cls._in_box(rows, limits, origin, found._box) or found
-
-    @classmethod
-    def _in_box(cls, rows: Floats, limits: Floats, origin: Floats | float, box: tuple[Floats, Floats]) -> Self | None:
-        """Return {x: rows (x - origin) <= limits}, which a box contains, computed in the coordinates of the box.
-
-        Again, if those of the result are much better. None if it is empty, or rounding decides.
-        """
-        found = None
+        *starts, last = [(np.zeros(rows.shape[1]), _guess(rows, limits, share)) for share in (0.25, 1.0)]
+        for start in starts if box is None else [_around(*box), *starts]:
+            with suppress(UnboundedPolytopeError, UncertainHullError):
+                found = cls._intersect(rows, limits, origin, *start)
+                if not found.is_empty:
+                    break
+        else:
+            found = cls._intersect(rows, limits, origin, *last)
         with suppress(UnboundedPolytopeError, UncertainHullError):
             for _ in range(3):
-                better = cls._intersect(rows, limits, origin, *coordinates(*box, 1e-10 * np.abs(box).max(axis=0)))
-                if better.is_empty:
-                    break
-                found, box = better, better._box
                 if found._is_round:
                     break
+                better = cls._intersect(rows, limits, origin, *_around(*found.bounding_box()))
+                if better.is_empty:
+                    break
+                found = better
         return found
-
-    @property
-    def _box(self) -> tuple[Floats, Floats]:
-        """Minimum and maximum coordinates."""
-        return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
     @property
     def _is_round(self) -> bool:
@@ -323,6 +292,7 @@ class PolytopeArrays:
         limits: Floats,
         origin: Floats | float = 0.0,
         box: tuple[Floats, Floats] | None = None,
+        again: bool = True,
     ) -> Self:
         """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all.
 
@@ -330,12 +300,10 @@ class PolytopeArrays:
         """
         limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
         own, ends = self._rows(self.centre)
-        both = np.vstack([own, rows]), np.append(ends, limits)
+        everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
         if box is not None and (SMALL * (box[1] - box[0]) < before * self.scale).any():
             # Sets that touch each other do so within the rounding of their own coordinates.
-            better = self._in_box(*both, self.centre, box)
-            if better is not None:
-                return better
+            return self._of_rows(*everything, box)
         scaled, possible = _scaled_rows(rows, limits, self.scale)
         heights = self.points @ scaled[:, :-1].T - scaled[:, -1]
         cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max())))
@@ -352,13 +320,15 @@ class PolytopeArrays:
         part = replace(self, points=rays[:, :-1].copy(), facets=np.vstack([self.facets, scaled[cuts]]), incidence=bits)
         new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
         widths = np.ptp(part.points, axis=0)
-        with suppress(UncertainHullError):
-            # An axis along which the part has no width is no reason: its equations fix that coordinate.
-            if not ((SMALL * widths < before) & (widths > FLAT * before)).any():
+        # An axis along which the part has no width is no reason: its equations fix that coordinate.
+        if not ((_FINE * widths < before) & (widths > FLAT * before)).any():
+            try:
                 return part._reduced(new)
-        # The part is much smaller: again, in its own coordinates.
-        better = self._in_box(*both, self.centre, part._box)
-        return part._reduced(new) if better is None else better
+            except UncertainHullError:
+                if not again:
+                    raise
+        better = self._of_rows(*everything, part.bounding_box())
+        return part._reduced(new) if better.is_empty else better
 
     # Representation ---------------------------------------------------------------------------------------------------
 
@@ -465,6 +435,10 @@ class PolytopeArrays:
             raise EmptyPolytopeError("the polytope is empty")
         return self
 
+    def bounding_box(self) -> tuple[Floats, Floats]:
+        """Return the minimum and the maximum coordinates of the vertices, each of shape (n,). O(v n), exact."""
+        return self.needed().vertices.min(axis=0), self.vertices.max(axis=0)
+
     def __repr__(self) -> str:
         if self.is_empty:
             return f"<empty polytope in R^{self.space}>"
@@ -480,6 +454,12 @@ def coordinates(lower: Floats, upper: Floats, minimum: Floats) -> tuple[Floats, 
     scale = np.ldexp(1.0, np.frexp(np.where(widths > 0.0, widths, 1.0))[1] - 1)
     far = np.maximum(np.abs(lower), np.abs(upper)) > _FAR * scale
     return np.where(far, 0.5 * lower + 0.5 * upper, 0.0), scale
+
+
+def _around(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Return the coordinates of a set between two points."""
+    # The minimum width also keeps a set that is nearly flat along an axis from being blown up to rounding errors.
+    return coordinates(lower, upper, 1e-10 * np.maximum(np.abs(lower), np.abs(upper)))
 
 
 def _guess(rows: Floats, limits: Floats, share: float) -> Floats:

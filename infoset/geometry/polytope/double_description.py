@@ -137,21 +137,6 @@ def sides(rays: Floats, row: Floats) -> tuple[Floats, Integers]:
 
 
 @_kernels.compiled
-def _near(bits: Bits, others: Integers, chosen: Integers, least: int) -> Integers:
-    """Return the `chosen` sets of bits that share at least `least` bits with the union of the `others`."""
-    union = np.zeros(bits.shape[1], np.uint64)
-    for i in others:
-        for word in range(len(union)):
-            union[word] |= bits[i, word]
-    near, count = np.empty(len(chosen), np.int64), 0
-    for i in chosen:
-        if _common(bits[i], union) >= least:
-            near[count] = i
-            count += 1
-    return near[:count]
-
-
-@_kernels.compiled
 def crossings(
     rays: Floats, bits: Bits, heights: Floats, signs: Integers, least: int, affine: bool
 ) -> tuple[Floats, Bits]:
@@ -167,8 +152,8 @@ def crossings(
         counts[i] = _common(bits[i], bits[i])
     room, count, blocker = 2 * k + 16, 0, 0
     result, marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)
-    below = _near(bits, np.flatnonzero(signs > 0), np.flatnonzero(signs < 0), least)
-    for p in _near(bits, below, np.flatnonzero(signs > 0), least):
+    below = np.flatnonzero(signs < 0)
+    for p in np.flatnonzero(signs > 0):
         for q in below:
             shared = _common(bits[p], bits[q])
             if shared < least:
@@ -261,31 +246,16 @@ def pivots(rows: Floats, tolerance: float, first: int) -> tuple[Integers, Intege
 
     A pivot up to `tolerance` ends it. If `first` >= 0, the first pivot is the last entry of that row.
     """
-    table = rows.copy()
-    k, size = table.shape
+    table, (k, size) = rows.copy(), rows.shape
     chosen, columns = np.empty(min(k, size), np.int64), np.empty(min(k, size), np.int64)
-    used_row, used_column = np.zeros(k, np.bool_), np.zeros(size, np.bool_)
     for step in range(min(k, size)):
-        best, row, column = tolerance, -1, -1
-        if step == 0 and first >= 0:
-            row, column = first, size - 1
-        else:
-            for i in range(k):
-                if not used_row[i]:
-                    for j in range(size):
-                        if not used_column[j] and abs(table[i, j]) > best:
-                            best, row, column = abs(table[i, j]), i, j
-        if row < 0:
+        best = np.abs(table).argmax() if step or first < 0 else first * size + size - 1
+        row, column = best // size, best % size
+        if abs(table[row, column]) <= tolerance:
             return chosen[:step].copy(), columns[:step].copy()
         chosen[step], columns[step] = row, column
-        used_row[row], used_column[column] = True, True
-        for i in range(k):
-            if not used_row[i]:
-                factor = table[i, column] / table[row, column]
-                if factor != 0.0:
-                    for j in range(size):
-                        table[i, j] -= factor * table[row, j]
-                    table[i, column] = 0.0
+        table -= np.outer(table[:, column] / table[row, column], table[row])
+        table[row], table[:, column] = 0.0, 0.0
     return chosen, columns
 
 
@@ -528,7 +498,7 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                         table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
                     _solve(table, step)
                 rounding = 0.0
-                for _ in range(50):
+                for _ in range(50):  # with 15, sharp corners lose the true state of an observer
                     done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
                     for m in range(count):
                         along, square = _along(facets[mine[m]], step)

@@ -89,7 +89,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         if not len(rows) == self.dimension == self.space or np.linalg.cond(matrix / units) > _MAX_CONDITION:
             return self._hull(points, centre, scale, FLAT, errors)
         normals = self.facets[:, :-1] @ np.linalg.inv(matrix)
-        # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding.
+        # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding. The hull
+        # of the vertices may lack a sharp tip, so their supports would be too small.
         back, _ = dd.affine_image(normals, np.ascontiguousarray(matrix.T), np.zeros(self.space))
         away = np.abs(back - self.facets[:, :-1]) @ np.abs(self.points).max(axis=0)
         ends, low = dd.affine_image(shift[None], normals, self.facets[:, -1])
@@ -224,8 +225,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
         lower, upper = np.array(self.bounding_box()) - other.bounding_box()
-        found = self._in_box(rows, less, self.centre, (lower, np.maximum(lower, upper)))
-        return found or self._of_rows(rows, less, self.centre)
+        return self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
@@ -250,13 +250,15 @@ class Polytope(PolytopeArrays, ConvexSet):
         upper: ArrayLike = np.inf,
         *,
         slack_ulp: float = 0.0,
+        again: bool = True,
     ) -> Polytope:
         """Return the intersection with one or more strips lower <= normals x <= upper, or the set itself if they
         contain it.
 
         `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,); infinite ones give
         half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
-        satisfies the bounds up to rounding is not lost.
+        satisfies the bounds up to rounding is not lost. Where rounding decides about vertices, the set is computed
+        again from all half-spaces, which may take long; without `again` it is an UncertainHullError.
         """
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
@@ -271,7 +273,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - minimum])
         if np.isneginf(limits).any() or (minimum > most + 2.0 * wider).any():
             return self.empty(self.space)
-        return self._with_rows(rows[limits < np.inf], limits[limits < np.inf])
+        return self._with_rows(rows[limits < np.inf], limits[limits < np.inf], again=again)
 
     def project(self, axes: ArrayLike) -> Polytope:
         """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
@@ -358,10 +360,6 @@ class Polytope(PolytopeArrays, ConvexSet):
     def is_subset(self, other: Polytope, tolerance: float = 0.0) -> bool:
         """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
         return bool(self._need_other(other).contains(self.vertices, tolerance).all())
-
-    def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates of the vertices, each of shape (n,). O(v n), exact."""
-        return self.needed().vertices.min(axis=0), self.vertices.max(axis=0)
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
