@@ -33,7 +33,7 @@ _SHORT = 1e-15
 """Length of a row, relative to the longest one, below which it has no direction."""
 SMALL = 2.0**10
 """Ratio of two sets' widths from which half-spaces are intersected in the coordinates of the smaller one."""
-_FINE = 2.0**20
+_FINE = 2.0**14
 """Ratio of widths from which a part is computed again in its own coordinates: it is known to 1e-12 of the whole."""
 _JOGGLES = (0.0, 1e-10, 1e-8, 1e-6)
 """Movements of points or half-spaces, one after the other, until vertices and facets agree."""
@@ -211,31 +211,34 @@ class PolytopeArrays:
         origin: Floats | float = 0.0,
         box: tuple[Floats, Floats] | None = None,
     ) -> Self:
-        """Return {x: rows (x - origin) <= limits}, which a `box` contains, if it is known.
+        """Return {x: rows (x - origin) <= limits}.
 
         The coordinates in which the set is round are not known before the set, so it is computed again if others are
-        much better.
+        much better. If a `box` contains it, it is only computed in coordinates of the box; the result is empty also if
+        rounding decides about it there.
         """
         if np.isneginf(limits).any():
             return cls.empty(rows.shape[1])
         rows, limits = rows[limits < np.inf], limits[limits < np.inf]
-        # In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
-        *starts, last = [(np.zeros(rows.shape[1]), _guess(rows, limits, share)) for share in (0.25, 1.0)]
-        for start in starts if box is None else [_around(*box), *starts]:
+        found = cls.empty(rows.shape[1])
+        if box is None:
+            # In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
+            centre = np.zeros(rows.shape[1])
             with suppress(UnboundedPolytopeError, UncertainHullError):
-                found = cls._intersect(rows, limits, origin, *start)
-                if not found.is_empty:
-                    break
-        else:
-            found = cls._intersect(rows, limits, origin, *last)
+                found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 0.25))
+            if found.is_empty:
+                found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 1.0))
+            if found._is_round:
+                return found
+            box = found.bounding_box()
         with suppress(UnboundedPolytopeError, UncertainHullError):
             for _ in range(3):
-                if found._is_round:
-                    break
-                better = cls._intersect(rows, limits, origin, *_around(*found.bounding_box()))
+                better = cls._intersect(rows, limits, origin, *_around(*box))
                 if better.is_empty:
                     break
-                found = better
+                found, box = better, better.bounding_box()
+                if found._is_round:
+                    break
         return found
 
     @property
@@ -303,7 +306,9 @@ class PolytopeArrays:
         everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
         if box is not None and (SMALL * (box[1] - box[0]) < before * self.scale).any():
             # Sets that touch each other do so within the rounding of their own coordinates.
-            return self._of_rows(*everything, box)
+            better = self._of_rows(*everything, box)
+            if not better.is_empty:
+                return better
         scaled, possible = _scaled_rows(rows, limits, self.scale)
         heights = self.points @ scaled[:, :-1].T - scaled[:, -1]
         cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max())))
