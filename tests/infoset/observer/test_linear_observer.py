@@ -553,11 +553,11 @@ def test_a_precise_measurement_is_one_cut(monkeypatch: pytest.MonkeyPatch) -> No
     rng = np.random.default_rng(3)
     a, c, generators = 0.4 * rng.normal(size=(6, 6)), np.eye(2, 6), 0.1 * rng.normal(size=(2, 6))
     start, disturbance = Zonotope.box(-np.ones(6), np.ones(6)), Zonotope(np.zeros(6), generators)
-    observer = LinearObserver(a, c, start, noise=1e-4, disturbance=disturbance)
+    observer = LinearObserver(a, c, start, noise=1e-3, disturbance=disturbance)
     monkeypatch.setattr(Polytope, "_of_rows", None)
     x = np.zeros(6)
     for _ in range(4):
         observer.predict()
         x = a @ x + rng.uniform(-1.0, 1.0, 2) @ generators
-        observer.update(c @ x + rng.uniform(-1e-4, 1e-4, 2))
+        observer.update(c @ x + rng.uniform(-1e-3, 1e-3, 2))
         assert observer.estimate().polytopes[0].contains(x)
