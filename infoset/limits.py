@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import types
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
@@ -18,12 +19,12 @@ MINIMUM = 1e-110
 """Minimum value of a number that must be positive: its square is not zero."""
 
 
-class _Rule:
+class _Rule(ABC):
     """What values of a field must be; readers of files check it too."""
 
+    @abstractmethod
     def problem(self, value: Any) -> str | None:
         """Return why a value is refused, or None."""
-        raise NotImplementedError
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         """Return the schema of a field for readers of files: its type, and this rule for each of its values."""

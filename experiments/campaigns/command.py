@@ -112,7 +112,8 @@ class Sweep(Flight):
     For example, to find which sensor and which engine hit a body of a given size. Each combination of values is a cell.
     It meets the requirement, does not meet it, or is undecided. All cells have the same initial states and random
     errors, and are stored like a campaign. DIR contains the runs; one table, sweep.parquet, with one row for each cell;
-    and a figure for each noise: lines for one key, maps for two keys.
+    and a figure for each noise: lines for one key, maps for two keys. With --noise mixed, even runs have random
+    noise and odd ones game noise.
 
     Forms of --vary: KEY=FROM:TO:COUNT, equal spacing; KEY=log:FROM:TO:COUNT, logarithmic spacing;
     KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.min or KEY.max, an end of a pair; angle_sensor.scale, a
@@ -141,7 +142,10 @@ class Sweep(Flight):
     max_runs: Annotated[
         int | None,
         typer.Option(
-            metavar="N", min=1, max=MAX_RUNS, help="Maximum number of runs of a cell with --until. Default: 2000."
+            metavar="N",
+            min=1,
+            max=MAX_RUNS,
+            help="Maximum number of runs of a cell with --until; at least --runs. Default: 2000.",
         ),
     ] = None
     guarantee: Annotated[

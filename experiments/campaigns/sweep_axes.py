@@ -99,7 +99,7 @@ def _axis(piece: str, scenario: Scenario) -> Axis:
             "--vary angle_sensor.scale=1:8:8,thruster.max_impulse_m_s=2.5:20:8"
         )
     is_log, first, last, count = bool(match[1]), float(match[2]), float(match[3]), int(match[4])
-    if not first < last < math.inf or not 2 <= count <= MAX_VALUES:
+    if not 0.0 < last - first < math.inf or not 2 <= count <= MAX_VALUES:
         raise InputError(
             f"--vary: {keys[0]}: must go from a smaller to a greater value, with a count from 2 to {MAX_VALUES}, found "
             f"{shown(written)}"

@@ -107,6 +107,8 @@ def output_of(
             raise InputError(f"{path}: is given twice; choose another name for one of the two files")
         if str(path) != STDOUT:
             _check_new(path, options.overwrite)
+        elif files and path in files.values():
+            raise InputError("-: only JSON, CSV and HTML can be printed; give the name of a file")
     if folder is not None and folder.is_file():
         raise InputError(f"{folder}: is a file, not a folder; choose another name for the folder")
     output = Output(folder, single, options.overwrite)

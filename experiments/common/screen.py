@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
@@ -95,6 +96,7 @@ class _Report:
 
     def __init__(self, bars: Progress) -> None:
         self._bars, self._written_s = bars, time.monotonic()
+        self._lock = threading.Lock()  # the parts of a command run in threads
         self._done: dict[TaskID, float] = {}
         self._first: tuple[float, float] | None = None
         self._is_told = False
@@ -109,6 +111,10 @@ class _Report:
         return partial(self._update, bar, name)
 
     def _update(self, bar: TaskID, name: str, done: float) -> None:
+        with self._lock:
+            self._report(bar, name, done)
+
+    def _report(self, bar: TaskID, name: str, done: float) -> None:
         self._bars.update(bar, completed=done)
         now_s, self._done[bar] = time.monotonic(), done
         share = sum(self._done.values()) / len(self._done)

@@ -140,6 +140,8 @@ def own_code_errors() -> Iterator[None]:
     """Turn an exception of the code in a loaded file, or about what it returned, into a message with its line."""
     try:
         yield
+    except (InputError, MemoryError):
+        raise
     except (Exception, SystemExit) as error:
         trace = "".join(traceback.format_exception(error))  # also that of another process
         for (file, name), option in reversed(_LOADED.items()):

@@ -160,7 +160,7 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
         ]
     return [
         f"warning: model guaranteed: {failures}, so an assumption of the model does not hold: the noise exceeds the "
-        "bounds of the sensors, or the scenario those of the set; infoset scenarios check FILE examines the scenario"
+        "bounds of the sensors, or the scenario exceeds those of the model; infoset scenarios check FILE examines it"
     ]
 
 

@@ -50,7 +50,10 @@ class ConvexSet:
         return self.affine_map(matrix)
 
     def __contains__(self, point: ArrayLike) -> bool:
-        return bool(self.contains(point))
+        found = self.contains(point)
+        if np.ndim(found):
+            raise TypeError("'in' is for one point and one set; use contains for a batch")
+        return bool(found)
 
     def __le__(self, other: Self) -> Any:
         return self.is_subset(other) if isinstance(other, type(self)) else NotImplemented

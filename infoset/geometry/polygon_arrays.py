@@ -288,15 +288,17 @@ class PolygonArrays:
 
     def _measure_at(self, kernel: Callable[..., None], name: str, value: ArrayLike) -> Floats:
         """Apply a kernel that measures at a vector for each polygon; a single polygon is measured at all vectors."""
-        values = real_values(name, value)
-        one = self if self.shape else self.broadcast_to(values.shape[:-1])
-        return one._measure(kernel, one._each(name, values, 2))
+        one = self if self.shape else self.broadcast_to(real_values(name, value).shape[:-1])
+        return one._measure(kernel, one._each(name, value, 2))
 
     def _each(self, name: str, value: ArrayLike, *last: int) -> Floats:
         """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`.
 
-        Numbers, whose shape is (), may be infinite.
+        Numbers, whose shape is (), may be infinite. Values may be masked for empty polygons, as results of a batch are.
         """
+        if isinstance(value, np.ma.MaskedArray) and value.shape == (*self.shape, *last):
+            masked = np.ma.getmaskarray(value).reshape(*self.shape, -1).any(axis=-1)
+            value = value.filled(0.0) if (self.is_empty | ~masked).all() else value
         values = finite_values(name, value, "...", *last) if last else bound_values(name, value)
         shape = (*self.shape, *last)
         if values.shape != shape:

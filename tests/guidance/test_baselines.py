@@ -163,8 +163,17 @@ def test_proportional_navigation_makes_the_miss_zero_along_its_closed_form(ratio
     np.testing.assert_allclose(rate, 2000.0 / (E * T**2) * share ** (ratio - 2.0), rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(flight.impulses_m_s, -np.diff(expected, append=0.0) / flight.to_go_s, atol=1e-9)
     assert abs(flight.misses_m[-1]) < 1e-6
-    if steps == 1000:  # N/(N - 1) times a velocity across the line of sight, by the textbook
-        assert flight.impulses_m_s.sum() == pytest.approx(2.0 * ratio / (ratio - 1.0), rel=3e-3)
+
+
+@pytest.mark.parametrize("ratio", [3.0, 4.0, 5.0])
+def test_the_impulse_of_proportional_navigation_is_that_of_the_textbook(ratio: float) -> None:
+    """Acceleration N V/T (tau/T)^(N - 2) for a velocity V across the line of sight: N/(N - 1) V in all."""
+    steps = 4000
+    flight = fly(ProportionalNavigation(ratio=ratio), Truth(z=0.0, v=2.0), steps)
+    acceleration = flight.impulses_m_s / (T / steps)
+    middle = 0.5 * (flight.to_go_s + np.append(flight.to_go_s[1:], 0.0)) / T
+    np.testing.assert_allclose(acceleration, ratio * 2.0 / T * middle ** (ratio - 2.0), rtol=1e-2, atol=1e-6)
+    assert flight.impulses_m_s.sum() == pytest.approx(2.0 * ratio / (ratio - 1.0), rel=1e-3)
 
 
 @pytest.mark.parametrize("ratio", [3.0, 4.0, 5.0])

@@ -40,8 +40,6 @@ RADIUS_SHOWN = 2.0
 _AT_BODY_SCALE = "at the scale of the body"
 _BODY_FROM, _BODY_SCALE = 4.0, 2.0
 """Ratio of the axes and the radius of the body from which a second panel extends to some radii of the body."""
-_POINTS_IN_FRONT = 300
-"""Number of points of a panel up to which they are in front of the circles."""
 
 _CIRCLES: tuple[tuple[float, str, Any], ...] = (
     (0.5, "circle: median of the miss", "-"),
@@ -143,7 +141,7 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     size, alpha = float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5)), float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8))
     point: dict[str, Any] = {"color": SET_EDGE, "marker": "o", "linestyle": "none", "markeredgewidth": 0.0}
     point |= {"markersize": size, "alpha": alpha, "rasterized": count > MAX_VECTORS}
-    point["zorder"] = 2.0 if count > _POINTS_IN_FRONT else 3.2  # the white edge of a circle hides the points on it
+    point["zorder"] = 3.2  # in front: the white edge of a circle hides the points on it
     axes.plot(*each.across_m.T, label="miss of one run", **point)
     line: dict[str, Any] = {"path_effects": [*HALO, Normal()], "zorder": 3.0}
     for level, name, dashes in _CIRCLES:

@@ -121,6 +121,7 @@ def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytes
     [
         (["--budget", "0"], "--budget"),
         (["--record", "there.npz"], "there.npz: exists already"),
+        (["--record", "-"], "only JSON, CSV and HTML can be printed"),
         (["asteroid-1997-single", "--range-sensor"], "has no [range_sensor]"),
     ],
 )

@@ -129,6 +129,19 @@ def test_the_empty_set_has_no_points_to_give(measure: Callable[[ConvexPolygons],
     np.testing.assert_array_equal(values[..., 2, :], of_last)
 
 
+def test_results_of_a_batch_are_arguments_of_it_although_masked_for_empty_polygons() -> None:
+    batch = boxes((3,)).cut((1.0, 0.0), [1.5, 0.0, 0.0], 9.0)
+    middle = batch.centroid()
+    assert batch.contains(middle).tolist() == [False, True, True]
+    assert (batch.margin(middle)[1:] > 0.0).all()
+    assert batch.translate(middle).is_empty.tolist() == [True, False, False]
+    hidden = np.ma.masked_array(np.zeros((3, 2)), [[False] * 2, [True] * 2, [False] * 2])
+    with pytest.raises(TypeError, match="masked"):
+        batch.contains(hidden)
+    with pytest.raises(TypeError, match="use contains for a batch"):
+        (0.0, 0.0) in batch  # noqa: B015
+
+
 # From points, to shapely and back ---------------------------------------------------------------------------------
 
 
