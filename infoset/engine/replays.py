@@ -238,9 +238,8 @@ def replay(
                 living, overlaps[event] = measure_section(section, elapsed, own[event], across, law)
             else:
                 angles = own[event], across
-                lowest, highest = chains.heights(section, time_to_go(middle, elapsed, law))
-                living, overlaps[event] = measure_in_window(section, label, elapsed, angles, window, law)
-                cuts[event] |= overlaps[event] < highest - lowest
+                living, overlaps[event], is_cut = measure_in_window(section, label, elapsed, angles, window, law)
+                cuts[event] |= is_cut
             if not living:
                 return event, done
         elif kinds[event] == IMPULSE:
@@ -249,14 +248,14 @@ def replay(
             widen_section(section, elapsed, law)
         elif errors is not None:
             rate = Rate(own[event], errors[event], sight)
-            highest, lowest = chains.max_and_min_miss(section, time_to_go(middle, elapsed, law))
-            living, overlaps[event] = measure_rate_section(section, label, elapsed, rate, window, law, points)
-            cuts[event] |= overlaps[event] < highest - lowest
+            living, overlaps[event], is_cut = measure_rate_section(section, label, elapsed, rate, window, law, points)
+            cuts[event] |= is_cut
             if not living:
                 return event, done
         if errors is not None:
             sight = sight_after(sight, kinds[event], own[event], across, applies[event], law)
-            window = window_after(window, kinds[event], own[event], across, errors[event], elapsed, law)
+            if past.thinned or window.near < window.far:  # of a single label only the limits are used
+                window = window_after(window, kinds[event], own[event], across, errors[event], elapsed, law)
     if errors is not None:
         if past.thinned:
             apply_stretch(section, stretch, elapsed, law, points)

@@ -265,7 +265,7 @@ def measure_rate_all(
                     continue
                 section, label = section_of(sections, channel, b, s), slots[b, s].label
                 alone = new_window(label, label, law)
-                survives, overlap = measure_rate_section(section, label, log.elapsed, rate, alone, law, points)
+                survives, overlap, _ = measure_rate_section(section, label, log.elapsed, rate, alone, law, points)
                 if not survives:
                     deaths += mark_empty(slots[b, s], channel, event, overlap)
                 if slots[b, s].living:

@@ -168,11 +168,11 @@ def nearly_tangent(angle: float, up: float, law: SectionLaw) -> float:
 @allocation_free
 def measure_in_window(
     section: SectionView, label: float, elapsed: int, angles: tuple[float, float], window: Window, law: SectionLaw
-) -> tuple[bool, float]:
-    """Cut the section of a label by a measured angle, with the convex band of its window; return what `cut` does.
+) -> tuple[bool, float, bool]:
+    """Cut the section of a label by a measured angle, with the convex band of its window.
 
-    `angles` are the angles of this axis and of the other one, rad. By (13b), in the form with the smaller last term. If
-    the band cuts nothing, the overlap is a lower bound.
+    Return what `chains.cut` does, and whether the band cuts something; if not, the overlap is a lower bound. `angles`
+    are the angles of this axis and of the other one, rad. By (13b), in the form with the smaller last term.
     """
     e, half, travelled = law.closing_speed, half_time(window, law), law.closing_speed * (law.step * elapsed)
     alpha, across = angles
@@ -189,12 +189,13 @@ def measure_in_window(
         lower = scale * nearly_tangent(alpha - bound, -1.0, law) + turn - slack
         upper = scale * nearly_tangent(alpha + bound, 1.0, law) + turn + slack
         if lower <= minimum and maximum <= upper:
-            return True, min(maximum - lower, upper - minimum)
+            return True, min(maximum - lower, upper - minimum), False
     lower, upper = slope_band(alpha, across, travelled, x if by_speed else near, law)
     if not by_speed:
         lower_far, upper_far = slope_band(alpha, across, travelled, far, law)
         lower, upper = min(lower, lower_far), max(upper, upper_far)
-    return chains.cut(section, middle / e, scale * lower + turn - slack, scale * upper + turn + slack)
+    living, overlap = chains.cut(section, middle / e, scale * lower + turn - slack, scale * upper + turn + slack)
+    return living, overlap, overlap < maximum - minimum
 
 
 @inlined
@@ -245,10 +246,10 @@ def max_slope(elapsed: int, sight: LastSight, window: Window, law: SectionLaw) -
 @allocation_free
 def measure_rate_section(
     section: SectionView, label: float, elapsed: int, rate: Rate, window: Window, law: SectionLaw, points: Floats
-) -> tuple[bool, float]:
+) -> tuple[bool, float, bool]:
     """Cut the section of a label by a line-of-sight rate: by (9), a band of the predicted miss omega x^2 / e.
 
-    Return what `chains.cut` does, with the overlap in metres of predicted miss.
+    Return what `chains.cut` does, with the overlap in metres of predicted miss, and whether the band cuts something.
     """
     middle = section.label
     tau = time_to_go(middle, elapsed, law)
@@ -259,10 +260,11 @@ def measure_rate_section(
     lower, upper = rate_band(label, elapsed, rate, 1.0, window, law)
     upper_miss, lower_miss = chains.max_and_min_miss(section, tau)
     if lower - slack <= lower_miss and upper_miss <= upper + slack:
-        return True, min(upper_miss - lower, upper - lower_miss) + slack
+        return True, min(upper_miss - lower, upper - lower_miss) + slack, False
     if law.exact_angles:
         steepest = max_slope(elapsed, rate.sight, window, law)
         lower, upper = rate_band(label, elapsed, rate, 1.0 + steepest * steepest, window, law)
     if chains.is_crowded(section):
         chains.reduce_outward(section, tau, points)
-    return chains.cut_misses(section, tau, lower - slack, upper + slack, points)
+    living, overlap = chains.cut_misses(section, tau, lower - slack, upper + slack, points)
+    return living, overlap, overlap < upper_miss - lower_miss

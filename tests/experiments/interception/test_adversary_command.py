@@ -98,7 +98,7 @@ def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytes
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
     monkeypatch.setattr("sim.bound.lower_bound.PERIODS_LOOKED_AT", 1)  # few pairs
     monkeypatch.setattr("sim.bound.lower_bound.REFINEMENTS", 0)
-    options = ("--budget", 12, "--model", "paper", "--json")
+    options = ("--budget", 24, "--model", "paper", "--json")
     same = ("--objective", "fixed-truth", *options)
     table = infoset("bound", "--strategies", "symmetric-miss", *options, "bound.json")[1]
     shown = infoset("adversary", "--strategy", "symmetric-miss", *same, "adversary.json")[1]
