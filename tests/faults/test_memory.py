@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -34,16 +35,19 @@ OpenBLAS, which Numba loads with scipy.linalg, does not end where it finds no me
 
 
 def with_room(room_bytes: int, *arguments: object, folder: Path) -> Left:
-    """Run the command with so much memory beyond what Python and its libraries take."""
-    done = subprocess.run(
-        [sys.executable, "-c", LIMITED, str(room_bytes), *map(str, arguments)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-        env={**os.environ, "NO_COLOR": "1"},
-    )
+    """Run the command with so much memory beyond what Python and its libraries take; kill it after two minutes."""
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", LIMITED, str(room_bytes), *map(str, arguments)],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=120,
+            env={**os.environ, "NO_COLOR": "1"},
+        )
+    except subprocess.TimeoutExpired:
+        return Left(-signal.SIGKILL, "", "")
     return Left(done.returncode, done.stdout, done.stderr)
 
 
@@ -74,8 +78,8 @@ def test_no_memory_is_a_message_that_says_how_to_go_on(
 def test_a_campaign_under_a_limit_ends_and_is_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
     """With however little memory: the shards that are there are complete, and the campaign can be resumed.
 
-    Where a library or Python itself fails for want of memory, it may end the process in its own way. So few runs are
-    simulated in threads: Python's pool of processes waits forever if it has no memory for a thread of its own.
+    Where a library or Python itself fails for want of memory, it may end the process in its own way, or wait forever.
+    So few runs are simulated in threads: Python's pool of processes waits for a thread that had no memory.
     """
     study = ("campaign", file, "--model", "paper")
     asked = (*study, "--runs", 2048, "--chunk", 512, "--out", "runs", "--resume", "--workers", 2)
