@@ -116,7 +116,7 @@ class KeplerMotion:
 
     def sight(self) -> Sight:
         """Return the present geometry."""
-        position, velocity = self.position_m.T, self.velocity_m_s.T
+        position, velocity = (self._motion[:, row, :, RELATIVE].T for row in (POSITION, VELOCITY))
         lateral, x, speed, v_x = position[:X], position[X], velocity[:X], velocity[X]
         slope = _ratio(lateral, x)
         return Sight(

@@ -50,12 +50,12 @@ class DecisionLog:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._decisions: list[tuple[int, Flags, Floats, Floats]] = []
+        self._decisions: list[tuple[int, Flags, Floats, Floats, Floats]] = []
         self._executed: list[Floats] = []
 
     def decide(self, step: int, tracking: Flags, budget_left_m_s: Floats, miss: PredictedMiss) -> None:
         """Record a step in which impulses can be decided, before the decision."""
-        self._decisions.append((step, tracking, budget_left_m_s, np.stack([miss.lower_m, miss.upper_m])))
+        self._decisions.append((step, tracking, budget_left_m_s, miss.lower_m, miss.upper_m))
 
     def execute(self, impulse_m_s: Floats) -> None:
         """Record the executed impulses of a step, shape (C, B)."""
@@ -70,8 +70,9 @@ class DecisionLog:
         thruster = self._scenario.thruster
         steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + thruster.delay_steps
         tracking = _rows([flags for _, flags, *_ in self._decisions], arrival_s.shape) > 0.0
-        budget_m_s = _rows([left for _, _, left, _ in self._decisions], arrival_s.shape)
-        ends_m = _with_end(_rows([ends for *_, ends in self._decisions], (2, *lateral_miss_m.shape)))
+        budget_m_s = _rows([left for _, _, left, *_ in self._decisions], arrival_s.shape)
+        ends = [lower for *_, lower, _ in self._decisions], [upper for *_, upper in self._decisions]
+        ends_m = _with_end(np.stack([_rows(rows, lateral_miss_m.shape) for rows in ends], axis=1))
         times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
         executed = _with_end(_rows(self._executed, lateral_miss_m.shape))
         changes = executed[np.minimum(steps, len(executed) - 1)]
