@@ -359,8 +359,8 @@ def bound_all(leaving: Leaving, past: Past, outlines: Outlines, pieces: Records,
                     run(leaving.known[w, b], past)
         while count > 0:
             worst = 0
-            for i in range(count):
-                if pieces[i].bound > pieces[worst].bound:
+            for i in range(count):  # of the pieces without a bound the last one, which often has the maximum miss
+                if pieces[i].bound >= pieces[worst].bound:
                     worst = i
             piece = pieces[worst]
             near, far, step = piece.near, piece.far, piece.step

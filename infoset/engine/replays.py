@@ -11,7 +11,7 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chains
 from infoset.engine.chain_storage import Chains, copy_section, empty_sections, view_of, working_room
 from infoset.engine.chains import SectionView
-from infoset.engine.history import ANGLE, IMPULSE, NO_SIGHT, PREDICTION, WIDENING, EventLog, History, LastSight
+from infoset.engine.history import ANGLE, IMPULSE, NO_SIGHT, PREDICTION, RATE, WIDENING, EventLog, History, LastSight
 from infoset.engine.section_law import Laws, SectionLaw, law_of
 from infoset.engine.section_life import (
     ALIVE,
@@ -218,6 +218,9 @@ def replay(
         start_section(section, room, law)
     for event in range(first, until):
         across = across_of(values, event, law)
+        if errors is not None and past.thinned and not cuts[event] and kinds[event] in (ANGLE, RATE):
+            sight = sight_after(sight, kinds[event], own[event], across, applies[event], law)
+            continue
         if errors is not None and past.thinned and applies[event] and cuts[event]:
             apply_stretch(section, stretch, elapsed, law, points)
             stretch = new_stretch(elapsed)
