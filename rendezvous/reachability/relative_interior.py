@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from infoset.geometry.polytope import HIGHS, UncertainHullError
+from infoset.geometry.polytope import HIGHS, UncertainHullError, largest_ball
 from rendezvous._arrays import Floats, Integers
 
 FLAT = 1e-9
@@ -64,7 +64,7 @@ def relative_interior(
         if not basis.shape[1]:
             return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0))
         rows, limits = rows[kept] / lengths[kept, None], limits[kept] / lengths[kept]
-        centre, radius = _largest_ball(rows, limits)
+        centre, radius = largest_ball(rows, limits)
         width = max(float(np.abs(limits - rows @ centre).max()), float(np.abs(centre).max()))
         flat = max(FLAT * width, ROUNDING * size, 1e-300)
         tight = np.zeros(0, dtype=np.int64) if radius > flat else _always_tight(rows, limits, flat)
@@ -98,16 +98,6 @@ def _balance(across: Floats) -> Floats:
     if lengths.max() <= 1e3 * lengths.min():
         return np.ones(len(lengths))
     return np.asarray(np.exp2(-np.round(np.log2(lengths))))
-
-
-def _largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
-    """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}, rows of unit length."""
-    matrix = np.column_stack([rows, np.ones(len(rows))])
-    cost = np.append(np.zeros(rows.shape[1]), -1.0)
-    optimum = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)
-    if optimum.status != 0:
-        raise UncertainHullError("the linear program of a largest ball inside was not solved")
-    return optimum.x[:-1], float(optimum.x[-1])
 
 
 def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Integers:

@@ -1,6 +1,6 @@
 """Convex polytopes in R^n with both representations, flat ones included."""
 
-from infoset.geometry.polytope._measures import HIGHS, nearest_difference
+from infoset.geometry.polytope._measures import HIGHS, largest_ball, nearest_difference
 from infoset.geometry.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from infoset.geometry.polytope.operations import polytope_from_support, product
 from infoset.geometry.polytope.polytope import Polytope
@@ -11,6 +11,7 @@ __all__ = [
     "Polytope",
     "UnboundedPolytopeError",
     "UncertainHullError",
+    "largest_ball",
     "nearest_difference",
     "polytope_from_support",
     "product",

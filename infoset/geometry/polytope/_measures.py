@@ -59,24 +59,22 @@ def _facets_of(face: int, others: list[int], size: int) -> list[int]:
     return found
 
 
-def largest_ball(rows: Floats, limits: Floats, scale: Floats | float = 1.0) -> tuple[Floats, float]:
+def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}.
 
-    The distance of a facet is measured for rows as if of unit length; `scale`, shape (d,), are sizes of coordinates.
-    The radius is negative if the set is empty; its absolute value is the minimum relaxation of the rows that has a
-    point. An UncertainHullError is raised if the linear program (HiGHS) was not solved, for example because the set has
-    balls of any size.
+    The distance of a facet is measured for rows as if of unit length. The radius is negative if the set is empty; its
+    absolute value is the minimum relaxation of the rows that has a point. An UncertainHullError is raised if the linear
+    program (HiGHS) was not solved, for example because the set has balls of any size.
     """
-    inner = rows * scale
-    units = np.abs(inner).max(axis=1, initial=1e-300)
+    units = np.abs(rows).max(axis=1, initial=1e-300)
     minimum = float(units.min(initial=1.0))  # the unit of the radius
-    matrix = np.column_stack([inner / units[:, None], minimum / units])
+    matrix = np.column_stack([rows / units[:, None], minimum / units])
     cost = np.zeros(matrix.shape[1])
     cost[-1] = -1.0
     optimum = linprog(cost, A_ub=matrix, b_ub=limits / units, bounds=(None, None), method="highs", options=HIGHS)
     if optimum.status != 0:
         raise UncertainHullError("the linear program of a largest ball inside was not solved: is the set unbounded?")
-    return optimum.x[:-1] * scale, float(optimum.x[-1]) * minimum
+    return optimum.x[:-1], float(optimum.x[-1]) * minimum
 
 
 def triangle_of(columns: Floats) -> tuple[Floats, Integers]:
