@@ -29,6 +29,8 @@ _THIN = 3e-8
 """Thickness of a layer in place of a flat set, relative to the coordinates."""
 _MIN_DEPTH = 1e-9
 """Thickness of a set, in coordinates in which it is about one wide, below which rounding decides about its facets."""
+_SMALL = 2.0**10
+"""Ratio of widths from which a part of a set is computed again by itself."""
 _TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -182,6 +184,28 @@ class Member:
         moved = getattr(polytope, operation)(*arguments, **options)
         return replace(self, polytope=moved, reduced=self.max_facets is not None)
 
+    @property
+    def is_coarse(self) -> bool:
+        """Whether the set has a bound on facets and many vertices: those of more than four states."""
+        return self.max_facets is not None and self.polytope.space > 4
+
+    def alone(self, whole: Member) -> Member:
+        """Return the set; one that was cut out of a much larger `whole` is computed from its own few facets.
+
+        Otherwise its vertices are exact to 1e-12 of the widths of the whole. The facets move outward by ten times as
+        much.
+        """
+        if not self.is_coarse or self.polytope.is_empty:
+            return self
+        before, widths = (np.ptp(one.polytope.vertices, axis=0) for one in (whole, self))
+        if not (_SMALL * widths < before).any():
+            return self
+        larger = self._apply("enlarged", POLYTOPE_SLACK * before)
+        with suppress(UncertainHullError, UnboundedPolytopeError):
+            again = Polytope.from_constraints(*larger.polytope.constraints())
+            return larger if again.is_empty else replace(larger, polytope=again)
+        return larger
+
     def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
         """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w.
 
@@ -213,7 +237,7 @@ class Member:
         excess = np.zeros(len(terms))
         for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set
             lower, upper = (ends[0] - slack * terms) * unit, (ends[1] + slack * terms) * unit
-            part = self._apply("cut", normals, lower, upper, again=self.max_facets is None)
+            part = self._apply("cut", normals, lower, upper, again=not self.is_coarse)
             if part.polytope.is_empty or part.polytope.dimension == part.polytope.space:
                 break
         if part.polytope.is_empty and not self.polytope.is_empty:  # find the first strip that leaves nothing
@@ -227,7 +251,7 @@ class Member:
         if slack == _THIN and not part.polytope.is_empty:
             widths = np.ptp(self.polytope.vertices, axis=0)
             part = part.solid(self.sizes)._apply("enlarged", POLYTOPE_SLACK * widths)
-        return part.limited(), excess
+        return part.limited().alone(self), excess
 
 
 @dataclass(frozen=True, eq=False)

@@ -326,7 +326,7 @@ class PolytopeArrays:
         new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
         widths = np.ptp(part.points, axis=0)
         # An axis along which the part has no width is no reason: its equations fix that coordinate.
-        if not ((_FINE * widths < before) & (widths > FLAT * before)).any():
+        if not (again and ((_FINE * widths < before) & (widths > FLAT * before)).any()):
             try:
                 return part._reduced(new)
             except UncertainHullError:

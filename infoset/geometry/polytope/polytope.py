@@ -258,8 +258,9 @@ class Polytope(PolytopeArrays, ConvexSet):
 
         `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,); infinite ones give
         half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
-        satisfies the bounds up to rounding is not lost. Where rounding decides about vertices, the set is computed
-        again from all half-spaces, which may take long; without `again` it is an UncertainHullError.
+        satisfies the bounds up to rounding is not lost. A part that is much smaller than the set, or where rounding
+        decides about vertices, is computed again from all half-spaces, which may take long. Without `again` the small
+        part is known to 1e-12 of the set, and where rounding decides, an UncertainHullError is raised.
         """
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
