@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry.polygon_exact import two_product, two_sum
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.kernels import Kernels
 
@@ -361,13 +360,25 @@ def have_neighbours(bits: Bits, dimension: int) -> bool:
 
 
 @_kernels.allocation_free
+def _product(a: float, b: float) -> tuple[float, float]:
+    """Return a b and its rounding error (Dekker)."""
+    c, d = 134217729.0 * a, 134217729.0 * b
+    a_high, b_high = c - (c - a), d - (d - b)
+    a_low, b_low = a - a_high, b - b_high
+    p = a * b
+    return p, ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+@_kernels.allocation_free
 def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
     """Return start + a . b as the sum of two numbers, as exact as with doubled digits (Ogita, Rump and Oishi)."""
     high, low = start, 0.0
     for i in range(len(b)):
-        product, rest = two_product(a[i], b[i])
-        high, lost = two_sum(high, product)
-        low += lost + rest
+        p, e = _product(a[i], b[i])
+        total = high + p
+        part = total - high
+        low += ((high - (total - part)) + (p - part)) + e
+        high = total
     total = high + low
     return total, low - (total - high)
 
