@@ -184,18 +184,13 @@ class Member:
         moved = getattr(polytope, operation)(*arguments, **options)
         return replace(self, polytope=moved, reduced=self.max_facets is not None)
 
-    @property
-    def is_coarse(self) -> bool:
-        """Whether the set has a bound on facets and many vertices: those of more than four states."""
-        return self.max_facets is not None and self.polytope.space > 4
-
     def alone(self, whole: Member) -> Member:
-        """Return the set; one that was cut out of a much larger `whole` is computed from its own few facets.
+        """Return the set, a part of a `whole`; one that is much smaller is computed from its own few facets.
 
         Otherwise its vertices are exact to 1e-12 of the widths of the whole. The facets move outward by ten times as
         much.
         """
-        if not self.is_coarse or self.polytope.is_empty:
+        if self.polytope.is_empty:
             return self
         before, widths = (np.ptp(one.polytope.vertices, axis=0) for one in (whole, self))
         if not (_SMALL * widths < before).any():
@@ -212,7 +207,7 @@ class Member:
         It is not reduced after the last sum: most of its facets go with the next measurement.
         """
         terms = np.abs(matrix) @ self.sizes + terms
-        image = self.limited()._apply("affine_map", matrix, shift)
+        image = self.limited()._apply("affine_map", matrix, shift, hull=self.max_facets is None or len(shift) < 5)
         moved = image.solid(terms)
         was_solid = moved is image
         if isinstance(disturbance, Zonotope):
@@ -234,10 +229,12 @@ class Member:
         # A row that is short in the units of the states counts like others; normals may have at most 1e60.
         unit = np.ldexp(1.0, -np.frexp(np.maximum(terms, 1e-50))[1])
         normals, ends = strips.normals * unit[:, None], (strips.lower[run], strips.upper[run])
-        excess = np.zeros(len(terms))
+        excess, facets = np.zeros(len(terms)), len(self.polytope.facets)
+        # In more than four dimensions it takes long to compute a small part from more facets than a set may have.
+        again = self.max_facets is None or self.polytope.space < 5 or facets <= self.max_facets
         for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set
             lower, upper = (ends[0] - slack * terms) * unit, (ends[1] + slack * terms) * unit
-            part = self._apply("cut", normals, lower, upper, again=not self.is_coarse)
+            part = self._apply("cut", normals, lower, upper, again=again)
             if part.polytope.is_empty or part.polytope.dimension == part.polytope.space:
                 break
         if part.polytope.is_empty and not self.polytope.is_empty:  # find the first strip that leaves nothing
@@ -251,7 +248,7 @@ class Member:
         if slack == _THIN and not part.polytope.is_empty:
             widths = np.ptp(self.polytope.vertices, axis=0)
             part = part.solid(self.sizes)._apply("enlarged", POLYTOPE_SLACK * widths)
-        return part.limited().alone(self), excess
+        return part.limited() if again else part.limited().alone(self), excess
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,10 +67,11 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return {matrix x}, with a matrix of shape (m, n), singular or not."""
         return self.affine_map(matrix)
 
-    def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
+    def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0, *, hull: bool = True) -> Polytope:
         """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.
 
-        Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull.
+        Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull, which
+        may take long; without `hull` it is an UncertainHullError.
         """
         rows = finite_values("matrix", matrix, "m", self.space)
         moved = self._shift(offset, len(rows))
@@ -87,6 +88,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         errors += rounded / scale
         units = np.abs(matrix).max(axis=0) + 1e-300  # the condition does not depend on those of the columns
         if not len(rows) == self.dimension == self.space or np.linalg.cond(matrix / units) > _MAX_CONDITION:
+            if not hull:
+                raise UncertainHullError("the image is the hull of points")
             return self._hull(points, centre, scale, FLAT, errors)
         normals = self.facets[:, :-1] @ np.linalg.inv(matrix)
         # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding. The hull

@@ -421,6 +421,19 @@ def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(se
             assert estimate.polytopes[0].contains(state), estimate.step
 
 
+@pytest.mark.parametrize("states", [5, 6])
+def test_a_singular_motion_of_many_states_needs_no_hull_of_many_points(states: int) -> None:
+    """Formerly seconds or minutes a step: the image was the hull of up to 700 vertices."""
+    rng = np.random.default_rng(1)
+    a, w = 0.4 * rng.normal(size=(states, states)), Zonotope(np.zeros(states), 0.1 * rng.normal(size=(2, states)))
+    a[-1], x, start = 0.0, np.ones(states), Zonotope.box(-np.ones(states), np.ones(states))
+    observer = LinearObserver(a, np.eye(2, states), start, noise=0.05, disturbance=w)
+    for _ in range(6):
+        observer.predict()
+        observer.update((x := a @ x + w.generators[0] - w.generators[1])[:2] + 0.05)
+        assert observer.estimate().polytopes[0].contains(x)
+
+
 def test_a_state_that_is_known_to_the_last_digit_leaves_the_others_as_they_are() -> None:
     """The third state converges until rounding makes its interval a point; formerly the set lost the true state."""
     box = Zonotope.box(-np.ones(3), np.ones(3))
