@@ -71,7 +71,12 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.
 
         Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull, which
-        may take long. Without `hull` an UncertainHullError is raised then.
+        may take long.
+
+        Raises
+        ------
+        UncertainHullError
+            If it would be a hull, without `hull`.
         """
         rows = finite_values("matrix", matrix, "m", self.space)
         moved = self._shift(offset, len(rows))
