@@ -184,7 +184,7 @@ class Member:
         moved = getattr(polytope, operation)(*arguments, **options)
         return replace(self, polytope=moved, reduced=self.max_facets is not None)
 
-    def alone(self, whole: Member) -> Member:
+    def recomputed(self, whole: Member) -> Member:
         """Return the set, a part of a `whole`; one that is much smaller is computed from its own few facets.
 
         Otherwise its vertices are exact to 1e-12 of the widths of the whole. The facets move outward by ten times as
@@ -197,8 +197,9 @@ class Member:
             return self
         larger = self._apply("enlarged", POLYTOPE_SLACK * before)
         with suppress(UncertainHullError, UnboundedPolytopeError):
-            again = Polytope.from_constraints(*larger.polytope.constraints())
-            return larger if again.is_empty else replace(larger, polytope=again)
+            better = Polytope.from_constraints(*larger.polytope.constraints())
+            if better.dimension == better.space:  # not a thin set that rounding has made flat or empty
+                return replace(larger, polytope=better)
         return larger
 
     def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
@@ -231,10 +232,10 @@ class Member:
         normals, ends = strips.normals * unit[:, None], (strips.lower[run], strips.upper[run])
         excess, facets = np.zeros(len(terms)), len(self.polytope.facets)
         # In more than four dimensions it takes long to compute a small part from more facets than a set may have.
-        again = self.max_facets is None or self.polytope.space < 5 or facets <= self.max_facets
+        recompute = self.max_facets is None or self.polytope.space < 5 or facets <= self.max_facets
         for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set
             lower, upper = (ends[0] - slack * terms) * unit, (ends[1] + slack * terms) * unit
-            part = self._apply("cut", normals, lower, upper, again=again)
+            part = self._apply("cut", normals, lower, upper, recompute=recompute)
             if part.polytope.is_empty or part.polytope.dimension == part.polytope.space:
                 break
         if part.polytope.is_empty and not self.polytope.is_empty:  # find the first strip that leaves nothing
@@ -248,7 +249,7 @@ class Member:
         if slack == _THIN and not part.polytope.is_empty:
             widths = np.ptp(self.polytope.vertices, axis=0)
             part = part.solid(self.sizes)._apply("enlarged", POLYTOPE_SLACK * widths)
-        return part.limited() if again else part.limited().alone(self), excess
+        return part.limited() if recompute else part.limited().recomputed(self), excess
 
 
 @dataclass(frozen=True, eq=False)

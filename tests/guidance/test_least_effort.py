@@ -121,10 +121,11 @@ def test_the_reference_is_a_miss_that_no_strategy_prevents(guaranteed: Scenario)
 @pytest.mark.thorough
 @pytest.mark.parametrize(("budget", "seeds"), [(800, 1), (8000, 5)])
 def test_the_worst_miss_without_a_range_sensor_is_near_the_bound(guaranteed: Scenario, budget: int, seeds: int) -> None:
-    """Searches find 74 to 77 m for U_s and at most 31.2 m for least effort; no strategy guarantees less than 24.4 m."""
+    """Long searches find 74 to 77 m for U_s, 31.1 m for least effort; no strategy guarantees less than 24.4 m."""
+    limit_m = 30.0 if seeds == 1 else 1.3 * lower_bound(guaranteed).bound_m
     for seed in range(seeds):
         worst = find_worst(guaranteed, strategy="least-effort", budget=budget, seed=seed, keep_set=True)
-        assert worst.value_m < 31.2
+        assert worst.value_m < limit_m
     symmetric = find_worst(guaranteed, strategy="symmetric-miss", budget=budget, keep_set=True)
     assert symmetric.value_m > (60.0 if budget > 1000 else 40.0)
 

@@ -141,7 +141,7 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     size, alpha = float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5)), float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8))
     point: dict[str, Any] = {"color": SET_EDGE, "marker": "o", "linestyle": "none", "markeredgewidth": 0.0}
     point |= {"markersize": size, "alpha": alpha, "rasterized": count > MAX_VECTORS}
-    point["zorder"] = 3.2  # in front: the white edge of a circle hides the points on it
+    point["zorder"] = 3.2  # the white edge of a circle would hide the points on it
     axes.plot(*each.across_m.T, label="miss of one run", **point)
     line: dict[str, Any] = {"path_effects": [*HALO, Normal()], "zorder": 3.0}
     for level, name, dashes in _CIRCLES:

@@ -295,7 +295,7 @@ class PolytopeArrays:
         limits: Floats,
         origin: Floats | float = 0.0,
         box: tuple[Floats, Floats] | None = None,
-        again: bool = True,
+        recompute: bool = True,
     ) -> Self:
         """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all.
 
@@ -326,11 +326,11 @@ class PolytopeArrays:
         new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
         widths = np.ptp(part.points, axis=0)
         # An axis along which the part has no width is no reason: its equations fix that coordinate.
-        if not (again and ((_FINE * widths < before) & (widths > FLAT * before)).any()):
+        if not (recompute and ((_FINE * widths < before) & (widths > FLAT * before)).any()):
             try:
                 return part._reduced(new)
             except UncertainHullError:
-                if not again:
+                if not recompute:
                     raise
         better = self._of_rows(*everything, part.bounding_box())
         return part._reduced(new) if better.is_empty else better

@@ -259,7 +259,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         upper: ArrayLike = np.inf,
         *,
         slack_ulp: float = 0.0,
-        again: bool = True,
+        recompute: bool = True,
     ) -> Polytope:
         """Return the intersection with one or more strips lower <= normals x <= upper, or the set itself if they
         contain it.
@@ -267,8 +267,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,); infinite ones give
         half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
         satisfies the bounds up to rounding is not lost. A part that is much smaller than the set, or where rounding
-        decides about vertices, is computed again from all half-spaces, which may take long. Without `again` the small
-        part is known to 1e-12 of the set, and where rounding decides, an UncertainHullError is raised.
+        decides about vertices, is computed again from all half-spaces, which may take long. Without `recompute` the
+        small part is known to 1e-12 of the set, and where rounding decides, an UncertainHullError is raised.
         """
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
@@ -283,7 +283,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - minimum])
         if np.isneginf(limits).any() or (minimum > most + 2.0 * wider).any():
             return self.empty(self.space)
-        return self._with_rows(rows[limits < np.inf], limits[limits < np.inf], again=again)
+        return self._with_rows(rows[limits < np.inf], limits[limits < np.inf], recompute=recompute)
 
     def project(self, axes: ArrayLike) -> Polytope:
         """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""

@@ -139,7 +139,7 @@ def test_results_of_a_batch_are_arguments_of_it_although_masked_for_empty_polygo
     with pytest.raises(TypeError, match="masked"):
         batch.contains(hidden)
     with pytest.raises(TypeError, match="use contains for a batch"):
-        (0.0, 0.0) in batch  # noqa: B015
+        assert (0.0, 0.0) in batch
 
 
 # From points, to shapely and back ---------------------------------------------------------------------------------

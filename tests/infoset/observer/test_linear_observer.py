@@ -421,17 +421,17 @@ def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(se
             assert estimate.polytopes[0].contains(state), estimate.step
 
 
-@pytest.mark.parametrize("states", [5, 6])
-def test_a_singular_motion_of_many_states_needs_no_hull_of_many_points(states: int) -> None:
-    """Formerly seconds or minutes a step: the image was the hull of up to 700 vertices."""
-    rng = np.random.default_rng(1)
-    a, w = 0.4 * rng.normal(size=(states, states)), Zonotope(np.zeros(states), 0.1 * rng.normal(size=(2, states)))
-    a[-1], x, start = 0.0, np.ones(states), Zonotope.box(-np.ones(states), np.ones(states))
-    observer = LinearObserver(a, np.eye(2, states), start, noise=0.05, disturbance=w)
-    for _ in range(6):
-        observer.predict()
-        observer.update((x := a @ x + w.generators[0] - w.generators[1])[:2] + 0.05)
-        assert observer.estimate().polytopes[0].contains(x)
+@pytest.mark.parametrize("seed", [0, 2, 4, 12, 15, 20, 475])
+def test_many_states_that_are_singular_or_flat_are_kept(seed: int) -> None:
+    """Images under singular matrices were hulls of 700 points, for minutes; a thin set was made flat and lost 475."""
+    from benchmarks.hard_observers import degenerate_case  # it imports this module
+
+    observer, states, measured = degenerate_case(seed)
+    for k, (state, y) in enumerate(zip(states, measured, strict=True)):
+        if k:
+            observer.predict()
+        observer.update(y)
+        assert observer.estimate().polytopes[0].contains(state)
 
 
 def test_a_state_that_is_known_to_the_last_digit_leaves_the_others_as_they_are() -> None:
@@ -564,18 +564,17 @@ def test_numbers_of_one_output_and_a_wrong_bound() -> None:
 def test_a_precise_measurement_is_one_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     """A set that becomes much smaller is computed again from its few facets; formerly from those of the prediction."""
     rows: list[int] = []
-    of_rows = Polytope._of_rows.__func__  # type: ignore[attr-defined]
+    of_rows = Polytope._of_rows
 
-    def counted(cls: type[Polytope], normals: Floats, *others: object) -> Polytope:
+    def counted(normals: Floats, *others: Any) -> Polytope:
         rows.append(len(normals))
-        polytope: Polytope = of_rows(cls, normals, *others)
-        return polytope
+        return of_rows(normals, *others)
 
     rng = np.random.default_rng(3)
     a, c, generators = 0.4 * rng.normal(size=(6, 6)), np.eye(2, 6), 0.1 * rng.normal(size=(2, 6))
     start, disturbance = Zonotope.box(-np.ones(6), np.ones(6)), Zonotope(np.zeros(6), generators)
     observer = LinearObserver(a, c, start, noise=1e-3, disturbance=disturbance)
-    monkeypatch.setattr(Polytope, "_of_rows", classmethod(counted))
+    monkeypatch.setattr(Polytope, "_of_rows", counted)
     x = np.zeros(6)
     for _ in range(4):
         observer.predict()
