@@ -117,7 +117,7 @@ class KeplerMotion:
     def sight(self) -> Sight:
         """Return the present geometry."""
         position, velocity = np.ascontiguousarray(self._motion[:, :ACCELERATION, :, RELATIVE].transpose(1, 2, 0))
-        lateral, x, speed, v_x = position[:X], position[X], velocity[:X], velocity[X]
+        lateral, x, speed, v_x = position[:X], position[X:], velocity[:X], velocity[X:]
         slope = _ratio(lateral, x)
         return Sight(
             alpha_rad=np.arctan2(lateral, x),

@@ -49,8 +49,10 @@ class LabelEnds:
 
     def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
         """Move the labels that have left and have not arrived by impulses of shape (C, B), m/s."""
+        if not self._of.size:
+            return
         impulse = np.where(where, impulse_m_s, 0.0)
-        if not self._of.size or not impulse.any():
+        if not impulse.any():
             return
         doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
         to_go_s = np.maximum(self._labels_m / self._model.closing_speed_m_s - time_s, 0.0)

@@ -79,18 +79,18 @@ class DecisionLog:
         steps = np.array(self._steps, dtype=np.int64) + thruster.delay_steps
         tracking, budget_m_s, ends_m = self._tracking[:number], self._budget_m_s[:number], self._ends_m[: number + 1]
         times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
-        miss = np.zeros((number + 1, *lateral_miss_m.shape))
-        miss[:-1] = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
-        miss[:-1] *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
-        miss = np.cumsum(miss[::-1], axis=0)[::-1] + lateral_miss_m
+        changes = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
+        changes *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
         causes, last = np.full(len(missed), None, dtype=object), _last(tracking)
         if missed.any():
-            at_decisions = miss[..., missed], tracking[:, missed], budget_m_s[:, missed], ends_m[..., missed]
+            later = np.cumsum(changes[::-1, :, missed], axis=0)[::-1]
+            miss = np.append(later, np.zeros((1, *later.shape[1:])), axis=0) + lateral_miss_m[:, missed]
+            at_decisions = miss, tracking[:, missed], budget_m_s[:, missed], ends_m[..., missed]
             causes[missed] = self._causes(*at_decisions, times_s, arrival_s[missed])
         lower_m, upper_m = _chosen(ends_m, last)
         return {
             "causes": tuple(causes),
-            "unguided_miss_m": modulus(miss[0]),
+            "unguided_miss_m": modulus(changes[::-1].sum(axis=0) + lateral_miss_m),
             "engine_corrects_m": max_correctable_m(times_s, thruster, arrival_s),
             "budget_corrects_m": max_correctable_m(times_s, thruster, arrival_s, budget=thruster.budget_m_s),
             "last_possible_m": np.ma.MaskedArray(modulus(0.5 * (upper_m - lower_m)), mask=last < 0),
@@ -164,4 +164,5 @@ def _chosen(rows: Floats, chosen: Integers) -> Floats:
 
 def _last(flags: Flags) -> Integers:
     """Return the last row with a flag in each column; -1 without one."""
-    return np.asarray(np.max(np.where(flags, np.arange(len(flags))[:, None], -1), axis=0, initial=-1))
+    last = len(flags) - 1 - np.argmax(flags[::-1], axis=0) if len(flags) else -1
+    return np.where(flags.any(axis=0), last, -1)
