@@ -198,7 +198,7 @@ class PolytopeArrays:
         facets = self.facets * _units(self.facets)
         if not by.any():
             return replace(self, facets=facets)
-        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ by
+        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ by + dd.EPS * np.abs(facets[:, -1])
         flat, most = len(self.equations) > 0, dd.TIP + 32.0 * float(by.max())
         points = dd.push_out(self.points, facets, self.incidence, np.ones(len(self.points), bool), flat, most)
         return replace(self, points=points, facets=facets)
