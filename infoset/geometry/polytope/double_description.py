@@ -321,24 +321,20 @@ def _members(bits: Bits, result: Integers) -> int:
 
 
 @_kernels.compiled
-def maximal(bits: Bits, least: int) -> Flags:
+def maximal(bits: Bits, transpose: Bits, least: int) -> Flags:
     """Return which sets of bits have at least `least` bits and are in no other set; the first of equal ones is kept."""
     k, words = bits.shape
-    mine, counts, kept = np.empty(64 * words, np.int64), np.empty(k, np.int64), np.zeros(k, np.bool_)
-    columns, holders = np.zeros((64 * words, (k + 63) // 64), np.uint64), np.empty(k, np.int64)
+    mine, holders, counts = np.empty(64 * words, np.int64), np.empty(k, np.int64), np.empty(k, np.int64)
     for i in range(k):
-        counts[i] = _members(bits[i], mine)
-        for bit in mine[: counts[i]]:
-            columns[bit, i // 64] |= _1 << np.uint64(i % 64)
-    for i in range(k):
-        if counts[i] < least:
-            continue
-        common = columns[mine[0]].copy() if _members(bits[i], mine) else ~columns[0]
-        for bit in mine[1 : counts[i]]:
-            common &= columns[bit]
-        kept[i] = True
+        counts[i] = _common(bits[i], bits[i])
+    kept = counts >= least
+    for n in np.flatnonzero(kept):
+        _members(bits[n], mine)
+        common = transpose[mine[0]].copy()
+        for bit in mine[1 : counts[n]]:
+            common &= transpose[bit]
         for j in holders[: _members(common, holders)]:
-            kept[i] &= j == i or (counts[j] == counts[i] and j > i)
+            kept[n] &= j == n or (counts[j] == counts[n] and j > n)
     return kept
 
 
@@ -427,15 +423,15 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                 if along > 0.0 and needs[m] > factor * along:
                     factor = needs[m] / along
             step = factor * away
-            if not flat and attempt < 3 and (count == n or factor * math.sqrt(_dot(away, away)) > _RADIAL):
+            if not flat and attempt < 2 and (count == n or factor * math.sqrt(_dot(away, away)) > _RADIAL):
                 step[:] = 0.0
                 for m in range(n if count == n else 0):  # to each facet, along the ones before
                     ways[m] = facets[mine[m], :n]
                     for k in range(m):
-                        share = _dot(ways[k], facets[mine[m]]) / _dot(ways[k], ways[k])
+                        share = _dot(ways[k], facets[mine[m]]) / max(_dot(ways[k], ways[k]), EPS)
                         for j in range(n):
                             ways[m, j] -= share * ways[k, j]
-                    share = (needs[m] - _dot(step, facets[mine[m]])) / max(_dot(ways[m], ways[m]), EPS**2)
+                    share = (needs[m] - _dot(step, facets[mine[m]])) / max(_dot(ways[m], ways[m]), EPS)
                     for j in range(n):
                         step[j] += share * ways[m, j]
                 for _ in range(50):  # with 15, sharp corners lose the true state of an observer

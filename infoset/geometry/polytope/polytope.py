@@ -26,7 +26,7 @@ from infoset.geometry.polytope._measures import largest_ball, nearest_difference
 from infoset.geometry.polytope.arrays import FLAT, PolytopeArrays, coordinates
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.geometry.polytope.reduction import reduced_outward
-from infoset.limits import Limits, real_values
+from infoset.limits import Limits
 
 _MAX_CONDITION = 1e6
 """Condition of a matrix, in scaled coordinates, up to which facets are mapped; beyond, they are those of a hull."""
@@ -108,8 +108,7 @@ class Polytope(PolytopeArrays, ConvexSet):
     @staticmethod
     def _shift(offset: ArrayLike, space: int) -> Floats:
         """Return an offset, shape (space,), from such an array or from one number for all coordinates."""
-        shift = real_values("offset", offset)
-        shift = finite_values("offset", shift, *[space] * min(shift.ndim, 1))
+        shift = finite_values("offset", offset, *[space] * min(np.ndim(offset), 1))
         return np.ascontiguousarray(np.broadcast_to(shift, (space,)))
 
     def translate(self, offset: ArrayLike) -> Polytope:
@@ -173,7 +172,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1] @ along) + 2.0 * dd.EPS * np.abs(facets[:, -1])
         whole = replace(self, points=points, facets=facets, incidence=dd.packed(incidence))
         try:
-            whole = whole._around(errors)._reduced(np.zeros(len(points), bool))
+            whole = whole._around(errors)._reduced(len(facets))
         except UncertainHullError:
             if not hull:
                 raise
@@ -193,18 +192,14 @@ class Polytope(PolytopeArrays, ConvexSet):
         return start._around(margin / start.scale)
 
     def _prism(self, margin: Floats) -> Polytope:
-        """Return a flat set and its translations across the affine hull by a `margin`, shape (n,), or 3e-8 of its size.
-
-        The other coordinates have the coefficient one in one equation alone.
-        """
+        """Return a flat set and its translations across it by a `margin`, shape (n,), or 3e-8 of its coordinates."""
         # A coordinate that is zero in all points has no scale yet: that of the margin.
         is_zero = (self.points == 0.0).all(axis=0) & (self.centre == 0.0) & (margin > 0.0)
         scale = np.where(is_zero, np.ldexp(1.0, np.frexp(margin)[1]), self.scale)
         sizes = np.maximum(margin / scale, _THICK * np.abs(self.vertices / scale).max(axis=0))
         heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, _THICK)
         points, on = self.points, dd.unpacked(self.incidence, len(self.facets))
-        others = np.delete(np.arange(self.space), self._own)
-        for axis, height in zip(others, heights, strict=True):
+        for axis, height in zip(self._own[1], heights, strict=True):
             along, above = np.eye(self.space)[axis] * height, np.repeat([False, True], len(points))
             points = np.vstack([points - along, points + along])
             on = np.column_stack([np.vstack([on, on]), above, ~above])
@@ -233,8 +228,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
         lower, upper = np.array(self.bounding_box()) - other.bounding_box()
-        found = self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
-        return self._of_rows(rows, less, self.centre) if found.is_empty else found
+        return self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
@@ -261,8 +255,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         slack_ulp: float = 0.0,
         recompute: bool = True,
     ) -> Polytope:
-        """Return the intersection with one or more strips lower <= normals x <= upper, or the set itself if they
-        contain it.
+        """Return the part in one or more strips lower <= normals x <= upper, or the set itself if they contain it.
 
         `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,); infinite ones give
         half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
@@ -270,12 +263,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         decides about vertices, is computed again from all half-spaces, which may take long. Without `recompute` the
         small part is known to 1e-12 of the set, and where rounding decides, an UncertainHullError is raised.
         """
-        rows = real_values("normals", normals)
-        rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
-        minimum, most = (
-            np.broadcast_to(bound_values(name, bound, (), (len(rows),)), len(rows))
-            for name, bound in (("lower", lower), ("upper", upper))
-        )
+        rows = np.atleast_2d(finite_values("normals", normals, *["m"] * (np.ndim(normals) > 1), self.space))
+        minimum, most = bound_values("lower", lower, (), (len(rows),)), bound_values("upper", upper, (), (len(rows),))
         not_negative("slack_ulp", slack_ulp)
         if self.is_empty:
             return self
@@ -332,14 +321,13 @@ class Polytope(PolytopeArrays, ConvexSet):
         return np.asarray(self.vertices[int(heights.argmax())])
 
     @cached_property
-    def _misfits(self) -> tuple[Floats, Floats]:
-        """Distances of the vertices beyond the facets and from the affine hull: rounding of this representation."""
-        x = self.vertices
-        beyond = (x @ self.normals.T - self.offsets).max(axis=0, initial=0.0)
-        away = np.abs(x @ self.across.T - self.levels).max(axis=0, initial=0.0)
+    def _misfits(self) -> Floats:
+        """Distances of the vertices beyond the rows of `constraints`: rounding of this representation."""
+        rows, limits = self.constraints()
         # Points within a few tolerances of the double description count as in the affine hull.
-        away = away + 4.0 * dd.ON * (np.abs(self.across) @ np.abs(x).max(axis=0, initial=0.0))
-        return beyond, away
+        near = np.where(np.arange(len(rows)) < len(self.facets), 0.0, 4.0 * dd.ON)
+        beyond = (self.vertices @ rows.T - limits).max(axis=0, initial=0.0)
+        return np.asarray(beyond + near * (np.abs(rows) @ np.abs(self.vertices).max(axis=0)))
 
     def excess(self, points: ArrayLike) -> Floats:
         """Return the maximum distance of `points`, shape (..., n), beyond a facet or from the affine hull.
@@ -351,10 +339,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         if self.is_empty:
             return np.full(x.shape[:-1], np.inf)
         reach = (self.space + 2) * dd.EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
-        over, apart = self._misfits
-        beyond = x @ self.normals.T - self.offsets - over - reach @ np.abs(self.normals).T
-        away = np.abs(x @ self.across.T - self.levels) - apart - reach @ np.abs(self.across).T
-        return np.asarray(np.maximum(beyond.max(axis=-1, initial=-np.inf), away.max(axis=-1, initial=-np.inf)))
+        rows, limits = self.constraints()
+        return np.asarray((x @ rows.T - limits - self._misfits - reach @ np.abs(rows).T).max(axis=-1))
 
     def margin(self, points: ArrayLike) -> Floats:
         """Return the distances of `points`, shape (..., n), from the nearest facet, positive inside: -`excess`.
@@ -385,7 +371,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if not self.dimension:
             return np.zeros((1, 1), np.int64), np.ones(1)
         corners = simplices_of(dd.transposed(self.incidence, len(self.facets)), self.dimension)
-        inner = self.points[:, self._own]
+        inner = self.points[:, self._own[0]]
         return corners, np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
 
     def area(self) -> float:
