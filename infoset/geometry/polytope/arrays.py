@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Floats, Integers
 from infoset.geometry._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
+from infoset.geometry.polygon_arrays import PolygonArrays
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import orthonormal
 from infoset.geometry.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
@@ -130,15 +131,11 @@ class PolytopeArrays:
     @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Self:
         """Return a convex shapely Point, LineString or Polygon as a set of R^2; see `ConvexPolygons.from_shapely`."""
-        from infoset.geometry.polygon_arrays import PolygonArrays
-
         vertices = PolygonArrays.from_shapely(geometry).polygon()
         return cls.from_vertices(vertices) if len(vertices) else cls.empty(2)
 
     def to_shapely(self) -> BaseGeometry:
         """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
-        from infoset.geometry.polygon_arrays import PolygonArrays
-
         return PolygonArrays.from_points(self._of_plane().vertices).to_shapely()
 
     def _of_plane(self) -> Self:
@@ -249,10 +246,9 @@ class PolytopeArrays:
             ends = rays[:, -1] == 1.0
             if not ends.any():
                 return cls.empty(space)
-            if rank <= space:
-                raise UnboundedPolytopeError(np.linalg.svd(table)[2][-1, :-1] * scale)
-            if not ends.all():
-                raise UnboundedPolytopeError(rays[~ends][0, :-1] * scale)
+            free = np.linalg.svd(table)[2][-1:] if rank <= space else rays[~ends]
+            if len(free):
+                raise UnboundedPolytopeError(free[0, :-1] * scale)
             incidence = dd.transposed(dd.transposed(on, len(table))[1:], len(rays))  # no point lies on the first row
             start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), incidence, centre, scale)
             with suppress(UncertainHullError):
@@ -260,7 +256,7 @@ class PolytopeArrays:
         raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet")
 
     def _reduced(self, old: int) -> Self:
-        """Return the set without redundant vertices and facets; vertices on facets that are not `old` are outside all.
+        """Return the set without redundant vertices and facets; vertices on facets after the first `old` move outward.
 
         Facets on which all vertices lie are equations of a set of lower dimension: the hull of its vertices.
         """
@@ -295,8 +291,7 @@ class PolytopeArrays:
         rays, count = np.column_stack([self.points, np.ones(len(self.points))]), len(self.facets)
         bits: dd.Bits = np.zeros((len(rays), (count + len(cuts) + 63) // 64), np.uint64)
         bits[:, : self.incidence.shape[1]] = self.incidence[:, : bits.shape[1]]
-        for number, cut in enumerate(cuts, count):
-            row = np.append(-scaled[cut, :-1], scaled[cut, -1])
+        for number, row in enumerate(scaled[cuts] * ([-1.0] * self.space + [1.0]), count):
             rays, bits = dd.insert(rays, bits, row, number, self.dimension - 1, True)
         if not len(rays) or not possible:
             return self.empty(self.space)

@@ -401,7 +401,7 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
     than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
     v, n = points.shape
-    result, middle, ways = points.copy(), points.sum(axis=0) / v, np.empty((n, n))
+    result, middle, ways, squares = points.copy(), points.sum(axis=0) / v, np.empty((n, n)), np.empty(n)
     mine, needs = np.empty(len(facets), np.int64), np.empty(len(facets))
     for i in range(v):
         moved, count = 0.0, _members(bits[i], mine)
@@ -428,10 +428,11 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                 for m in range(n if count == n else 0):  # to each facet, along the ones before
                     ways[m] = facets[mine[m], :n]
                     for k in range(m):
-                        share = _dot(ways[k], facets[mine[m]]) / max(_dot(ways[k], ways[k]), EPS)
+                        share = _dot(ways[k], facets[mine[m]]) / squares[k]
                         for j in range(n):
                             ways[m, j] -= share * ways[k, j]
-                    share = (needs[m] - _dot(step, facets[mine[m]])) / max(_dot(ways[m], ways[m]), EPS)
+                    squares[m] = max(_dot(ways[m], ways[m]), EPS)
+                    share = (needs[m] - _dot(step, facets[mine[m]])) / squares[m]
                     for j in range(n):
                         step[j] += share * ways[m, j]
                 for _ in range(50):  # with 15, sharp corners lose the true state of an observer

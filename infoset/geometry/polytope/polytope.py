@@ -127,7 +127,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         rows, limits = self._rows(moved)
         mapped, rounded = dd.affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
         found = self._of_rows(mapped, limits)
-        if found.is_empty or len(found.equations) or not (rounded.any() or moved.any()):
+        if found.dimension < found.space or not (rounded.any() or moved.any()):
             return found
         return found.enlarged(2.0 * dd.EPS * np.abs(found.vertices).max(axis=0))
 
@@ -154,8 +154,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if self.dimension < self.space:
             return self.minkowski_sum(self.from_vertices([-along, along]))
         along = along / self.scale
-        row = np.append(along / np.abs(along).max(), 0.0)
-        heights, signs = dd.sides(self.facets, row)
+        heights, signs = dd.sides(self.facets, np.append(along / np.abs(along).max(), 0.0))
         ridges = dd.transposed(self.incidence, len(self.facets))
         new, common = dd.crossings(self.facets, ridges, heights, signs, self.space - 1, False)
         directed = np.abs(new[:, :-1]).max(axis=1, initial=0.0) > dd.ON  # not of two opposite facets
@@ -285,8 +284,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         """
         numbers = axis_numbers(axes, self.space, self.space - 1)
         fixed = finite_values("values", values, *[len(numbers)] * min(np.ndim(values), 1))
-        rest = np.delete(np.arange(self.space), numbers)
-        return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(rest)
+        return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(np.delete(np.arange(self.space), numbers))
 
     def reduce_outward(self, cap: int, max_vertices: int | None = None) -> Polytope:
         """Return a polytope with at most `cap` (>= 2n) facets that contains the set.
@@ -317,8 +315,7 @@ class Polytope(PolytopeArrays, ConvexSet):
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a `direction`, both of shape (n,). O(v n)."""
         row = finite_values("direction", direction, self.space)
-        heights = self.needed().vertices @ row
-        return np.asarray(self.vertices[int(heights.argmax())])
+        return np.asarray(self.vertices[int((self.needed().vertices @ row).argmax())])
 
     @cached_property
     def _misfits(self) -> Floats:
@@ -392,10 +389,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return np.asarray(self.centre + self.scale * np.einsum("ij,ijk->ik", weights, self.points[chosen]))
 
     def chebyshev_centre(self) -> tuple[Floats, float]:
-        """Return the centre, shape (n,), and the radius of a largest ball in the set, within its affine hull.
-
-        A linear program (HiGHS).
-        """
+        """Return the centre, shape (n,), and radius of a largest ball in the set, within its affine hull (HiGHS)."""
         middle = self.needed().vertices.mean(axis=0)
         if not self.dimension:
             return middle, 0.0
@@ -415,10 +409,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return np.asarray(x + nearest_difference(self.needed().vertices, x[None, :])) if x not in self else x
 
     def distance(self, other: Polytope | ArrayLike) -> float:
-        """Return the distance from `other`, a polytope or a point, shape (n,); inf if a set is empty.
-
-        As `closest_point`.
-        """
+        """Return the distance from `other`, a polytope or point, shape (n,); inf if one is empty. As `closest_point`."""
         if isinstance(other, Polytope):
             points = self._need_other(other).vertices
         else:
