@@ -409,7 +409,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return np.asarray(x + nearest_difference(self.needed().vertices, x[None, :])) if x not in self else x
 
     def distance(self, other: Polytope | ArrayLike) -> float:
-        """Return the distance from `other`, a polytope or point, shape (n,); inf if one is empty. As `closest_point`."""
+        """Return the distance from a polytope or point `other`, shape (n,); inf if one is empty. As `closest_point`."""
         if isinstance(other, Polytope):
             points = self._need_other(other).vertices
         else:
