@@ -195,10 +195,11 @@ class PolytopeArrays:
 
     @classmethod
     def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Box | None = None) -> Self:
-        """Return {x: rows (x - origin) <= limits}; if a `box` is known to contain it, first in coordinates of the box.
+        """Return {x: rows (x - origin) <= limits}.
 
         The coordinates in which the set is round are not known before the set, so it is computed again if others are
-        much better.
+        much better. If a `box` contains it, it is only computed in coordinates of the box; the result is empty also if
+        rounding decides about it there.
         """
         if np.isneginf(limits).any():
             return cls.empty(rows.shape[1])
@@ -220,7 +221,7 @@ class PolytopeArrays:
                 box, found = better.bounding_box(), better
                 if found._is_round:
                     break
-        return cls._of_rows(rows, limits, origin) if found.is_empty else found
+        return found
 
     @property
     def _is_round(self) -> bool:
@@ -282,7 +283,9 @@ class PolytopeArrays:
         everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
         if box is not None and (SMALL * (box[1] - box[0]) < before * self.scale).any():
             # Sets that touch each other do so within the rounding of their own coordinates.
-            return self._of_rows(*everything, box)
+            better = self._of_rows(*everything, box)
+            if not better.is_empty:
+                return better
         scaled, possible = _scaled_rows(rows, limits, self.scale)
         heights = self.points @ scaled[:, :-1].T - scaled[:, -1]
         cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max())))
@@ -304,7 +307,8 @@ class PolytopeArrays:
             except UncertainHullError:
                 if not recompute:
                     raise
-        return self._of_rows(*everything, part.bounding_box())
+        better = self._of_rows(*everything, part.bounding_box())
+        return part._reduced(count) if better.is_empty else better
 
     # Representation ---------------------------------------------------------------------------------------------------
 

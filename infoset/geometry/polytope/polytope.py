@@ -227,7 +227,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
         lower, upper = np.array(self.bounding_box()) - other.bounding_box()
-        return self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
+        found = self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
+        return self._of_rows(rows, less, self.centre) if found.is_empty else found
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
