@@ -29,6 +29,9 @@ COLLINEAR = 1e-9
 """Distance of a ray from the plane of two others that contains it. A wrong one adds only points of the set."""
 TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
+_MOVES, _SWEEP = 60, 3
+"""Number of moves of a vertex across its facets, and of those after which one may be lost again: longer sweeps move the
+vertex farther at sharp corners, shorter ones take more moves."""
 _RADIAL = 1e-13
 """The same up to which a vertex of more than n facets moves away from the centre: others need several steps."""
 MAX_CROSSINGS = 50_000
@@ -416,13 +419,12 @@ def supports(points: Floats, normals: Floats) -> Floats:
 
 
 @_kernels.allocation_free
-def _along(row: Floats, step: Floats) -> tuple[float, float]:
-    """Return row . step of the first entries of a row, and their sum of squares."""
-    along = square = 0.0
+def _along(row: Floats, step: Floats) -> float:
+    """Return row . step of the first entries of a row."""
+    along = 0.0
     for j in range(len(step)):
         along += row[j] * step[j]
-        square += row[j] * row[j]
-    return along, square
+    return along
 
 
 @_kernels.allocation_free
@@ -430,33 +432,46 @@ def _least_factor(facets: Floats, mine: Integers, needs: Floats, step: Floats) -
     """Return the minimum factor of a step away from the centre that moves a point by its needs across its facets."""
     factor = 0.0
     for m in range(len(mine)):
-        along, _ = _along(facets[mine[m]], step)
+        along = _along(facets[mine[m]], step)
         if along > 0.0 and needs[m] > factor * along:
             factor = needs[m] / along
     return factor
 
 
 @_kernels.allocation_free
-def _solve(table: Floats, result: Floats) -> None:
-    """Write the solution of the linear equations (a, b), a x = b, to a zero result, which stays zero if singular."""
-    n = len(table)
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            best = i if abs(table[i, k]) > abs(table[best, k]) else best
-        if table[best, k] == 0.0:
-            return
-        for j in range(k, n + 1):
-            table[k, j], table[best, j] = table[best, j], table[k, j]
-        for i in range(k + 1, n):
-            factor = table[i, k] / table[k, k]
-            for j in range(k, n + 1):
-                table[i, j] -= factor * table[k, j]
-    for k in range(n - 1, -1, -1):
-        value = table[k, n]
-        for j in range(k + 1, n):
-            value -= table[k, j] * result[j]
-        result[k] = value / table[k, k]
+def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, step: Floats) -> float:
+    """Enlarge a step until it moves a point by its needs across its facets; return the rounding of the step.
+
+    Each move is across the facet that is missed most, and along those of the moves before in its sweep. At a sharp
+    corner of many facets something may be left. `basis`, shape (`_SWEEP`, n), is a working array.
+    """
+    size, rounding = 0, 0.0
+    for _ in range(_MOVES):
+        rounding = EPS * math.sqrt(_along(step, step))  # far below that of the coordinates
+        facet, most = -1, rounding
+        for m in range(len(mine)):
+            gap = needs[m] - _along(facets[mine[m]], step)
+            if gap > most:
+                facet, most = m, gap
+        if facet < 0:
+            break
+        normal, free = facets[mine[facet]], basis[size]
+        for j in range(len(step)):
+            free[j] = normal[j]
+        for k in range(2 * size):  # twice, for rounding
+            along = _along(free, basis[k % size])
+            for j in range(len(step)):
+                free[j] -= along * basis[k % size, j]
+        length = math.sqrt(_along(free, free))
+        if length < 1e-12:  # it depends on those of the sweep
+            size = 0
+            continue
+        part = (most + 0.25 * abs(needs[facet])) / _along(normal, free)
+        for j in range(len(step)):
+            step[j] += part * free[j]
+            free[j] /= length
+        size = (size + 1) % len(basis)
+    return rounding
 
 
 @_kernels.compiled
@@ -464,58 +479,48 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
     """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
-    its outer side covers the set. A point that is exactly on its facets stays. The others move to the common point of n
-    facets that are moved outward by rounding; to the outer sides of more than n facets, one after the other (Agmon and
-    Motzkin); and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves by more
-    than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
+    its outer side covers the set. A point that is exactly on its facets stays. The others move across their facets
+    (`_cross_facets`), and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves
+    by more than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
     v, n = points.shape
     result, middle, away, step = points.copy(), np.zeros(n), np.empty(n), np.empty(n)
     for i in range(v):
         for j in range(n):
             middle[j] += points[i, j] / v
-    mine, needs, table = np.empty(len(facets), np.int64), np.empty(len(facets)), np.empty((n, n + 1))
+    mine, needs, basis = np.empty(len(facets), np.int64), np.empty(len(facets)), np.empty((min(_SWEEP, n), n))
     for i in range(v):
         moved, count = 0.0, _members(bits[i], mine)
         for attempt in range(3 if chosen[i] else 0):
             inside = False
             for m in range(count):
                 f = mine[m]
-                high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
-                inside |= high < 0.0 or (high == 0.0 and low < 0.0)
-                terms = 0.0
+                height, terms = -facets[f, n], abs(facets[f, n])
                 for j in range(n):
-                    terms += abs(facets[f, j] * points[i, j])
-                needs[m] = 0.4 * attempt * EPS * terms - high  # rounding of coordinates
+                    product = facets[f, j] * result[i, j]
+                    height += product
+                    terms += abs(product)
+                rounding = 8.0 * EPS * terms
+                if abs(height) > rounding:
+                    needs[m] = 2.0 * rounding - height if height < 0.0 else -height
+                    inside |= height < 0.0
+                    continue
+                high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
+                needs[m] = 0.2 * attempt * EPS * terms - high  # rounding of coordinates
+                inside |= high < 0.0 or (high == 0.0 and low < 0.0)
             if not inside:
                 break
             for j in range(n):
                 away[j], step[j] = points[i, j] - middle[j], 0.0
             factor = _least_factor(facets, mine[:count], needs, away)
-            if not flat and (count == n or factor * math.sqrt(_along(away, away)[0]) > _RADIAL):
-                if count == n:
-                    for m in range(n):
-                        table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
-                    _solve(table, step)
-                rounding = 0.0
-                for _ in range(50):  # with 15, sharp corners lose the true state of an observer
-                    done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
-                    for m in range(count):
-                        along, square = _along(facets[mine[m]], step)
-                        gap = needs[m] - along
-                        if gap > rounding:
-                            part = (gap + 0.25 * abs(needs[m])) / square
-                            for j in range(n):
-                                step[j] += part * facets[mine[m], j]
-                            done = False
-                    if done:
-                        break
+            if not flat and (count == n or factor * math.sqrt(_along(away, away)) > _RADIAL):
+                rounding = _cross_facets(facets, mine[:count], needs[:count], basis, step)
                 for m in range(count):  # what is left, at sharp corners, away from the centre
-                    needs[m] -= _along(facets[mine[m]], step)[0] + rounding
+                    needs[m] -= _along(facets[mine[m]], step) + rounding
                 factor = _least_factor(facets, mine[:count], needs, away)
             for j in range(n):
                 step[j] += factor * away[j]
-            length = math.sqrt(_along(step, step)[0])
+            length = math.sqrt(_along(step, step))
             if length == 0.0 or moved >= most:
                 break
             share = min(1.0, (most - moved) / length)
