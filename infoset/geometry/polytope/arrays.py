@@ -285,7 +285,10 @@ class PolytopeArrays:
         flat = bool(whole.any()) or len(self.points) <= self.dimension
         points = dd.push_out(self.points, facets, incidence & ~whole, new, flat or len(self.equations) > 0, dd.TIP)
         if flat:
-            return self._hull(points, self.centre, self.scale, 1e2 * FLAT)
+            hull = self._hull(points, self.centre, self.scale, 1e2 * FLAT)
+            if hull.dimension == self.dimension:  # of a thin set, the bits of the facets are rounding
+                raise UncertainHullError("rounding decides whether a set is flat")
+            return hull
         used, sides, incidence = _lattice(incidence, len(facets), self.dimension)
         return replace(self, points=points[used], facets=facets[sides], incidence=incidence)
 
