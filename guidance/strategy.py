@@ -18,8 +18,10 @@ def checked_impulses(wanted: object, situation: Situation, tracking: Flags, stra
     """
     values, shape = np.asarray(wanted), situation.last_impulse_m_s.shape
     real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
-    if real and values.shape == shape and (np.isfinite(values) | ~tracking).all():
-        return values.astype(np.float64, copy=False)
+    if real and values.shape == shape:
+        finite = np.isfinite(values)
+        if finite.all() or (finite | ~tracking).all():
+            return values.astype(np.float64, copy=False)
     raise ValueError(
         f"strategy {type(strategy).__name__} must return finite impulses (m/s) of the shape {shape}, one for each "
         f"lateral axis and engagement, real and not masked: at step {situation.step} it returned shape {values.shape}, "

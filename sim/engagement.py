@@ -133,7 +133,7 @@ class Engagements:
         self._lead_s = scenario.thruster.delay_steps * model.step_s
         self._not_given = np.zeros(batch)
         self._label_ends = LabelEnds(model, batch)
-        self._decisions = DecisionLog(scenario)
+        self._decisions = DecisionLog(scenario, lateral, draws.steps)
 
     @property
     def flying(self) -> bool:
@@ -173,7 +173,7 @@ class Engagements:
             observe(Step(self.step, time_s, tracking, flying, sight, measured, miss, self._impulse, self._view))
         executed = self._executed(self._impulse)
         self._truth.fire(executed)
-        self._decisions.execute(executed)
+        self._decisions.execute(self.step, executed)
         self._information.shift(self._impulse, self._flying)
         self._truth_section.shift(self._impulse, given > 0.0)
         self._label_ends.fire(self._impulse, self._flying, self.step * model.step_s)

@@ -116,8 +116,8 @@ class KeplerMotion:
 
     def sight(self) -> Sight:
         """Return the present geometry."""
-        position, velocity = (self._motion[:, row, :, RELATIVE].T for row in (POSITION, VELOCITY))
-        lateral, x, speed, v_x = position[:X], position[X], velocity[:X], velocity[X]
+        position, velocity = np.ascontiguousarray(self._motion[:, :ACCELERATION, :, RELATIVE].transpose(1, 2, 0))
+        lateral, x, speed, v_x = position[:X], position[X:], velocity[:X], velocity[X:]
         slope = _ratio(lateral, x)
         return Sight(
             alpha_rad=np.arctan2(lateral, x),

@@ -49,8 +49,10 @@ class LabelEnds:
 
     def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
         """Move the labels that have left and have not arrived by impulses of shape (C, B), m/s."""
+        if not self._of.size:
+            return
         impulse = np.where(where, impulse_m_s, 0.0)
-        if not self._of.size or not impulse.any():
+        if not impulse.any():
             return
         doubt = np.stack([impulse_doubts(impulse, law) for law in self._laws])
         to_go_s = np.maximum(self._labels_m / self._model.closing_speed_m_s - time_s, 0.0)
@@ -71,15 +73,16 @@ class LabelEnds:
         misses_m : ndarray, shape (2, C, B, S)
             Minimum and maximum predicted miss of each section along each lateral axis, m.
         """
-        self.left |= left.any(axis=1)
-        self.published_m = np.maximum(self.published_m, np.where(left, _max(misses_m), 0.0).max(axis=1))
-        counts = np.where(control_is_over[:, None], living, left) & ~self._is_over[:, None]
+        of, slots = np.nonzero(np.where(control_is_over[:, None], living, left))
+        leaves, counts = left[of, slots], ~self._is_over[of]
+        misses = misses_m[:, :, of, slots]
+        self.left[of[leaves]] = True
+        np.maximum.at(self.published_m, of[leaves], _max(misses)[leaves])
         self._is_over = self._is_over | control_is_over
-        if counts.any():
-            self._exists |= counts.any(axis=1)
-            self._of = np.append(self._of, np.nonzero(counts)[0])
-            self._labels_m = np.append(self._labels_m, labels_m[counts])
-            self._misses_m = np.concatenate((self._misses_m, misses_m[:, :, counts]), axis=2)
+        self._exists[of[counts]] = True
+        self._of = np.concatenate((self._of, of[counts]))
+        self._labels_m = np.concatenate((self._labels_m, labels_m[of, slots][counts]))
+        self._misses_m = np.concatenate((self._misses_m, misses[:, :, counts]), axis=2)
 
     def any_state_miss_m(self, results: Results) -> Floats:
         """Return the maximum miss of a state that the set contained when control ended for its label, m, shape (B,).

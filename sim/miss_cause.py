@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import Enum
 from functools import partial
 from typing import Any
@@ -45,21 +44,30 @@ class DecisionLog:
     -----
     With the lateral miss m of the true motion, its arrival T and the executed impulses u_j at the times t_j, the miss
     without the impulses from decision i on is M_i = m + sum over j >= i of u_j (T - t_j): no motion is simulated again.
-    Recorded arrays are kept, not copied. Cost: O(1) in a step, O(K B) after a flight with K decisions.
+    Cost: O(B) in a step, O(K B) after a flight with K decisions.
+
+    `lateral` is the shape (C, B) of impulses, `steps` the maximum number of steps.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, lateral: tuple[int, int], steps: int) -> None:
         self._scenario = scenario
-        self._decisions: list[tuple[int, Flags, Floats, Floats, Floats]] = []
-        self._executed: list[Floats] = []
+        self._steps: list[int] = []
+        self._tracking = np.zeros((steps, lateral[1]), dtype=bool)
+        self._budget_m_s = np.zeros((steps, lateral[1]))
+        # One row more, of zeros: after the last decision.
+        self._ends_m = np.zeros((steps + 1, 2, *lateral))
+        self._executed_m_s = np.zeros((steps + 1, *lateral))
 
     def decide(self, step: int, tracking: Flags, budget_left_m_s: Floats, miss: PredictedMiss) -> None:
         """Record a step in which impulses can be decided, before the decision."""
-        self._decisions.append((step, tracking, budget_left_m_s, miss.lower_m, miss.upper_m))
+        row = len(self._steps)
+        self._steps.append(step)
+        self._tracking[row], self._budget_m_s[row] = tracking, budget_left_m_s
+        self._ends_m[row, 0], self._ends_m[row, 1] = miss.lower_m, miss.upper_m
 
-    def execute(self, impulse_m_s: Floats) -> None:
+    def execute(self, step: int, impulse_m_s: Floats) -> None:
         """Record the executed impulses of a step, shape (C, B)."""
-        self._executed.append(impulse_m_s)
+        self._executed_m_s[step] = impulse_m_s
 
     def columns(self, lateral_miss_m: Floats, arrival_s: Floats, missed: Flags) -> dict[str, Any]:
         """Return the fields of `Results` with the causes, from lateral misses (C, B) and arrivals (B,) of the motions.
@@ -67,25 +75,22 @@ class DecisionLog:
         In space the impulses of a flight reach a disc, so the modulus of M_i is compared with the authority, and the
         radius of the possible misses is that of the disc around their rectangle.
         """
-        thruster = self._scenario.thruster
-        steps = np.array([step for step, *_ in self._decisions], dtype=np.int64) + thruster.delay_steps
-        tracking = _rows([flags for _, flags, *_ in self._decisions], arrival_s.shape) > 0.0
-        budget_m_s = _rows([left for _, _, left, *_ in self._decisions], arrival_s.shape)
-        ends = [lower for *_, lower, _ in self._decisions], [upper for *_, upper in self._decisions]
-        ends_m = _with_end(np.stack([_rows(rows, lateral_miss_m.shape) for rows in ends], axis=1))
+        thruster, number = self._scenario.thruster, len(self._steps)
+        steps = np.array(self._steps, dtype=np.int64) + thruster.delay_steps
+        tracking, budget_m_s, ends_m = self._tracking[:number], self._budget_m_s[:number], self._ends_m[: number + 1]
         times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
-        executed = _with_end(_rows(self._executed, lateral_miss_m.shape))
-        changes = executed[np.minimum(steps, len(executed) - 1)]
+        changes = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
         changes *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
-        miss = _with_end(np.cumsum(changes[::-1], axis=0)[::-1]) + lateral_miss_m
         causes, last = np.full(len(missed), None, dtype=object), _last(tracking)
         if missed.any():
-            at_decisions = miss[..., missed], tracking[:, missed], budget_m_s[:, missed], ends_m[..., missed]
+            later = np.cumsum(changes[::-1, :, missed], axis=0)[::-1]
+            miss = np.append(later, np.zeros((1, *later.shape[1:])), axis=0) + lateral_miss_m[:, missed]
+            at_decisions = miss, tracking[:, missed], budget_m_s[:, missed], ends_m[..., missed]
             causes[missed] = self._causes(*at_decisions, times_s, arrival_s[missed])
         lower_m, upper_m = _chosen(ends_m, last)
         return {
             "causes": tuple(causes),
-            "unguided_miss_m": modulus(miss[0]),
+            "unguided_miss_m": modulus(changes[::-1].sum(axis=0) + lateral_miss_m),
             "engine_corrects_m": max_correctable_m(times_s, thruster, arrival_s),
             "budget_corrects_m": max_correctable_m(times_s, thruster, arrival_s, budget=thruster.budget_m_s),
             "last_possible_m": np.ma.MaskedArray(modulus(0.5 * (upper_m - lower_m)), mask=last < 0),
@@ -152,17 +157,6 @@ def count_causes(
     }
 
 
-def _rows(values: Sequence[Floats] | Sequence[Flags], shape: tuple[int, ...]) -> Floats:
-    """Return recorded arrays of a shape as one array, which is empty without any."""
-    joined = np.concatenate([np.empty((0, *shape[1:])), *values])
-    return joined.reshape(len(values), *shape)
-
-
-def _with_end(rows: Floats) -> Floats:
-    """Return rows with one more of zeros: after the last decision."""
-    return np.append(rows, np.zeros((1, *rows.shape[1:])), axis=0)
-
-
 def _chosen(rows: Floats, chosen: Integers) -> Floats:
     """Return one row for each of n flights, shape (2, C, n), from rows of shape (K + 1, 2, C, n); -1 is the last."""
     return np.moveaxis(rows[chosen, :, :, np.arange(len(chosen))], 0, -1)
@@ -170,4 +164,5 @@ def _chosen(rows: Floats, chosen: Integers) -> Floats:
 
 def _last(flags: Flags) -> Integers:
     """Return the last row with a flag in each column; -1 without one."""
-    return np.asarray(np.max(np.where(flags, np.arange(len(flags))[:, None], -1), axis=0, initial=-1))
+    last = len(flags) - 1 - np.argmax(flags[::-1], axis=0) if len(flags) else -1
+    return np.where(flags.any(axis=0), last, -1)

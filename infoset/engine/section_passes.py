@@ -408,6 +408,19 @@ def keep_labels_all(active: Flags, minimum: Floats, maximum: Floats, sections: S
 
 
 @entry
+def too_few_all(active: Flags, fewest: int, sections: Sections, few: Flags) -> int:
+    """Write which active engagements have less than `fewest` living sections, shape (B,); return their number."""
+    number = 0
+    for b in range(len(sections.used)):
+        living = 0
+        for s in range(sections.used[b]):
+            living += sections.slots[b, s].living
+        few[b] = active[b] and living < fewest
+        number += few[b]
+    return number
+
+
+@entry
 def write_outline(section: Chains, n: int, tau: float, out: Floats) -> int:
     """Call `chains.outline` from Python."""
     return chains.outline(view_of(section, n, 0.0), tau, out)

@@ -204,6 +204,11 @@ class SetState:
         lower, upper = self.lower_label, self.upper_label
         return removed, section_passes.keep_labels_all(active, lower, upper, self.sections, removed)
 
+    def with_few_sections(self, active: Flags) -> tuple[Flags, int]:
+        """Return which active engagements have fewer living sections than the model allows, and their number."""
+        few = np.empty(self.batch, dtype=bool)
+        return few, section_passes.too_few_all(active, self.model.fewest_sections, self.sections, few)
+
     def widest(self, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
         """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`.
 

@@ -267,7 +267,10 @@ class PolytopeArrays:
         still = flat or len(self.equations) > 0
         points = dd.push_out(self.points, self.facets, self.incidence & ~whole, new, still, dd.TIP)
         if flat:
-            return self._hull(points, self.centre, self.scale, 1e2 * FLAT)
+            hull = self._hull(points, self.centre, self.scale, 1e2 * FLAT)
+            if hull.dimension == self.dimension:  # of a thin set, the bits of the facets are rounding
+                raise UncertainHullError("rounding decides whether a set is flat")
+            return hull
         used, sides, incidence = _lattice(self.incidence, len(self.facets), self.dimension)
         return replace(self, points=points[used], facets=self.facets[sides], incidence=incidence)
 

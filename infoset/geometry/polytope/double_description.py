@@ -32,6 +32,9 @@ TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
 _RADIAL = 1e-13
 """The same up to which a vertex of more than n facets moves away from the centre: others need several steps."""
+_MOVES, _SWEEP = 60, 3
+"""Number of moves of a vertex across its facets, and of those after which one may be lost again: longer sweeps move the
+vertex farther at sharp corners, shorter ones take more moves."""
 MAX_CROSSINGS = 50_000
 """Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
 EPS = float(np.finfo(np.float64).eps)
@@ -390,18 +393,51 @@ def supports(points: Floats, normals: Floats) -> Floats:
     return result
 
 
+@_kernels.allocation_free
+def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, step: Floats) -> None:
+    """Enlarge a step until it moves a point by its needs across its facets.
+
+    Each move is across the facet that is missed most, and along those of the moves before in its sweep. At a sharp
+    corner of many facets something may be left. `basis`, shape (`_SWEEP`, n), is a working array.
+    """
+    size = 0
+    for _ in range(_MOVES):
+        facet, most = -1, EPS * math.sqrt(_dot(step, step))  # far below the rounding of the coordinates
+        for m in range(len(mine)):
+            gap = needs[m] - _dot(step, facets[mine[m]])
+            if gap > most:
+                facet, most = m, gap
+        if facet < 0:
+            break
+        normal, free = facets[mine[facet]], basis[size]
+        for j in range(len(free)):
+            free[j] = normal[j]
+        for k in range(2 * size):  # twice, for rounding
+            along = _dot(free, basis[k % size])
+            for j in range(len(free)):
+                free[j] -= along * basis[k % size, j]
+        length = math.sqrt(_dot(free, free))
+        if length < 1e-12:  # it depends on those of the sweep
+            size = 0
+            continue
+        share = (most + 0.25 * abs(needs[facet])) / _dot(free, normal)
+        for j in range(len(free)):
+            step[j] += share * free[j]
+            free[j] /= length
+        size = (size + 1) % len(basis)
+
+
 @_kernels.compiled
 def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bool, most: float) -> Floats:
     """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
-    its outer side covers the set. A point that is exactly on its facets stays. The others move to the common point of n
-    facets that are moved outward by rounding; to the outer sides of more than n facets, one after the other (Agmon and
-    Motzkin); and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves by more
-    than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
+    its outer side covers the set. A point that is exactly on its facets stays. The others move across their facets
+    (`_cross_facets`), and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves
+    by more than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
     v, n = points.shape
-    result, middle, ways, squares = points.copy(), points.sum(axis=0) / v, np.empty((n, n)), np.empty(n)
+    result, middle, basis = points.copy(), points.sum(axis=0) / v, np.empty((min(_SWEEP, n), n))
     mine, needs = np.empty(len(facets), np.int64), np.empty(len(facets))
     for i in range(v):
         moved, count = 0.0, _members(bits[i], mine)
@@ -409,12 +445,19 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
             inside = False
             for m in range(count):
                 f = mine[m]
-                high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
-                inside |= high < 0.0 or (high == 0.0 and low < 0.0)
-                terms = 0.0
+                height, terms = -facets[f, n], abs(facets[f, n])
                 for j in range(n):
-                    terms += abs(facets[f, j] * points[i, j])
-                needs[m] = 0.4 * attempt * EPS * terms - high  # rounding of coordinates
+                    product = facets[f, j] * result[i, j]
+                    height += product
+                    terms += abs(product)
+                rounding = 8.0 * EPS * terms
+                if abs(height) > rounding:
+                    needs[m] = 2.0 * rounding - height if height < 0.0 else -height
+                    inside |= height < 0.0
+                    continue
+                high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
+                needs[m] = 0.2 * attempt * EPS * terms - high  # rounding of coordinates
+                inside |= high < 0.0 or (high == 0.0 and low < 0.0)
             if not inside:
                 break
             away, factor = points[i] - middle, 0.0
@@ -425,28 +468,7 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
             step = factor * away
             if not flat and attempt < 2 and (count == n or factor * math.sqrt(_dot(away, away)) > _RADIAL):
                 step[:] = 0.0
-                for m in range(n if count == n else 0):  # to each facet, along the ones before
-                    ways[m] = facets[mine[m], :n]
-                    for k in range(m):
-                        share = _dot(ways[k], facets[mine[m]]) / squares[k]
-                        for j in range(n):
-                            ways[m, j] -= share * ways[k, j]
-                    squares[m] = max(_dot(ways[m], ways[m]), EPS)
-                    share = (needs[m] - _dot(step, facets[mine[m]])) / squares[m]
-                    for j in range(n):
-                        step[j] += share * ways[m, j]
-                for _ in range(50):  # with 15, sharp corners lose the true state of an observer
-                    done, rounding = True, 1e-10 * math.sqrt(_dot(step, step))
-                    for m in range(count):
-                        f = mine[m]
-                        gap = needs[m] - _dot(step, facets[f])
-                        if gap > rounding:
-                            share = (gap + 0.25 * abs(needs[m])) / _dot(facets[f, :n], facets[f])
-                            for j in range(n):
-                                step[j] += share * facets[f, j]
-                            done = False
-                    if done:
-                        break
+                _cross_facets(facets, mine[:count], needs[:count], basis, step)
             length = math.sqrt(_dot(step, step))
             if length == 0.0 or moved >= most:
                 break

@@ -327,29 +327,23 @@ class Polytope(PolytopeArrays, ConvexSet):
         beyond = (self.vertices @ rows.T - limits).max(axis=0, initial=0.0)
         return np.asarray(beyond + near * (np.abs(rows) @ np.abs(self.vertices).max(axis=0)))
 
-    def excess(self, points: ArrayLike) -> Floats:
-        """Return the maximum distance of `points`, shape (..., n), beyond a facet or from the affine hull.
+    def margin(self, points: ArrayLike) -> Floats:
+        """Return the minimum distance of `points`, shape (..., n), from the facets, positive inside, shape (...).
 
-        It has shape (...), and is at most 0 inside, also for the vertices: the rounding of a scalar product, and of the
-        representation (distances of vertices beyond facets), is subtracted. Infinite for the empty set.
+        In a flat set it is at most minus the distance from the affine hull, in the empty set -inf. It is not negative
+        at the vertices: the rounding of a scalar product, and of the representation (distances of vertices beyond
+        facets), is added. Outside, -`margin` is at most the `distance`.
         """
         x = finite_values("points", points, "...", self.space)
         if self.is_empty:
-            return np.full(x.shape[:-1], np.inf)
+            return np.full(x.shape[:-1], -np.inf)
         reach = (self.space + 2) * dd.EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
         rows, limits = self.constraints()
-        return np.asarray((x @ rows.T - limits - self._misfits - reach @ np.abs(rows).T).max(axis=-1))
-
-    def margin(self, points: ArrayLike) -> Floats:
-        """Return the distances of `points`, shape (..., n), from the nearest facet, positive inside: -`excess`.
-
-        Outside, -`margin` is at most the `distance`.
-        """
-        return -self.excess(points)
+        return np.asarray((limits + self._misfits + reach @ np.abs(rows).T - x @ rows.T).min(axis=-1))
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`excess`)."""
-        return np.asarray(self.excess(points) <= not_negative("tolerance", tolerance))
+        """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`margin`)."""
+        return np.asarray(self.margin(points) >= -not_negative("tolerance", tolerance))
 
     def is_subset(self, other: Polytope, tolerance: float = 0.0) -> bool:
         """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
