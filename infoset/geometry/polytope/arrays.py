@@ -250,7 +250,7 @@ class PolytopeArrays:
             free = np.linalg.svd(table)[2][-1:] if rank <= space else rays[~ends]
             if len(free):
                 raise UnboundedPolytopeError(free[0, :-1] * scale)
-            incidence = dd.transposed(dd.transposed(on, len(table))[1:], len(rays))  # no point lies on the first row
+            incidence = dd.packed(dd.unpacked(on, len(table))[:, 1:])  # no point lies on the first row
             start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), incidence, centre, scale)
             with suppress(UncertainHullError):
                 return start._reduced(0)
@@ -437,8 +437,8 @@ def _guess(rows: Floats, limits: Floats, share: float) -> Floats:
     counts, order = used.sum(axis=0), np.arange(rows.shape[1])
     sizes = np.where(used, np.abs(limits)[:, None] / np.where(used, np.abs(rows), 1.0), np.inf)
     sizes = np.sort(sizes, axis=0)[(share * np.maximum(counts - 1, 0)).astype(np.int64), order]
-    # Where no row is tight away from zero, the unit is that of the others.
-    sizes[counts == 0] = np.append(np.sort(sizes[counts > 0]), 1.0)[(counts > 0).sum() // 2]
+    if not counts.all():  # where no row is tight away from zero, the unit is that of the others
+        sizes[counts == 0] = np.append(np.sort(sizes[counts > 0]), 1.0)[(counts > 0).sum() // 2]
     return np.asarray(np.ldexp(1.0, np.frexp(sizes)[1]))
 
 
