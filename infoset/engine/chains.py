@@ -29,7 +29,7 @@ import numpy as np
 from infoset._compile import FALSE, allocation_free, constants, inlined
 from infoset.arrays import Floats
 from infoset.geometry import polygon, polygon_reduction
-from infoset.geometry.polygon_exact import two_product, two_sum
+from infoset.geometry.double_words import two_product, two_sum
 
 EPSILON = float(np.finfo(np.float64).eps)
 """One ulp of 1. A coordinate of a vertex has an error of about one ulp of its terms, V tau and m; where two of them are

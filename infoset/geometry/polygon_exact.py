@@ -9,32 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from infoset._compile import compiled, inlined
+from infoset._compile import compiled
+from infoset.geometry.double_words import two_product, two_sum
 from infoset.geometry.polygon import Points, append, close, copy, move, put
 
-_SPLIT = 134217729.0
-"""2^27 + 1, which splits a float into two halves of 26 bits."""
 _SINGLE = 4e-16
 """A difference of two products of differences has an error of less than (3 + 16 u) u of their sizes, u = 1.1e-16."""
-
-
-@inlined
-def two_sum(a: float, b: float) -> tuple[float, float]:
-    """Return the rounded sum and its rounding error."""
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
-
-
-@inlined
-def two_product(a: float, b: float) -> tuple[float, float]:
-    """Return the rounded product and its rounding error (T. J. Dekker, 1971)."""
-    product = a * b
-    high_a, high_b = _SPLIT * a, _SPLIT * b
-    high_a -= high_a - a
-    high_b -= high_b - b
-    low_a, low_b = a - high_a, b - high_b
-    return product, low_a * low_b - (((product - high_a * high_b) - low_a * high_b) - high_a * low_b)
 
 
 @compiled

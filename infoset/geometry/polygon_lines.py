@@ -8,8 +8,9 @@ import numpy as np
 
 from infoset._compile import compiled, inlined
 from infoset.arrays import Floats
+from infoset.geometry.double_words import two_product, two_sum
 from infoset.geometry.polygon import Points, put
-from infoset.geometry.polygon_exact import exact_sum, hull, tidy, two_product, two_sum
+from infoset.geometry.polygon_exact import exact_sum, hull, tidy
 
 FAR = 1e70
 """Coordinates of a box that contains all sets: a set that reaches it is unbounded."""

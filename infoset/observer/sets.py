@@ -169,7 +169,7 @@ class Member:
     def _apply(self, operation: str, *arguments: Any, **options: Any) -> Member:
         """Return the result of an operation; where rounding decides about facets, that of a larger set with fewer ones.
 
-        The last one is a box; its sum with a segment is then a larger box.
+        The last one is a box; its sum with a segment is then a larger box, and its image a box if need be.
         """
         polytope, box = self.polytope, 2 * self.polytope.space
         if self.max_facets is not None:
@@ -181,7 +181,13 @@ class Member:
             if operation == "add_segment":
                 operation, arguments = "enlarged", (np.abs(arguments[0]),)
             options = {}
-        moved = getattr(polytope, operation)(*arguments, **options)
+        try:
+            moved = getattr(polytope, operation)(*arguments, **options)
+        except UncertainHullError:
+            if self.max_facets is None or operation != "affine_map":
+                raise
+            image = polytope.vertices @ arguments[0].T + arguments[1]
+            moved = Polytope.from_box(image.min(axis=0), image.max(axis=0))
         return replace(self, polytope=moved, reduced=self.max_facets is not None)
 
     def recomputed(self, whole: Member) -> Member:

@@ -51,7 +51,7 @@ SPACE = st.integers(2, 4)
 
 
 def lies_in(inner: Polytope, outer: Polytope, by: float = ROUNDING) -> bool:
-    return float(outer.excess(inner.vertices).max()) <= by
+    return float(outer.margin(inner.vertices).min()) >= -by
 
 
 def same(one: Polytope, other: Polytope, by: float = ROUNDING) -> bool:

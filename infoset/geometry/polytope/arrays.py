@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.arrays import Flags, Floats, Integers
+from infoset.arrays import Floats, Integers
 from infoset.geometry._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
+from infoset.geometry.polygon_arrays import PolygonArrays
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import orthonormal
 from infoset.geometry.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
@@ -21,6 +22,8 @@ from infoset.limits import COUNT
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
+Box = tuple[Floats, Floats]
+"""Minimum and maximum coordinates, each of shape (n,)."""
 FLAT = 1e-11
 """Thickness below which points are flat, in coordinates in which they are one wide: ten tolerances of the kernel."""
 _FAR = 16.0
@@ -67,27 +70,21 @@ class PolytopeArrays:
         digits. The facets are the rays of a double description: O(m f) for f facets in the plane, O(m f^2) at worst.
         """
         array = finite_values("points", points, "m", "n")
-        centre, scale = _around(array.min(axis=0), array.max(axis=0))
+        centre, scale = coordinates(array.min(axis=0), array.max(axis=0))
         return cls._hull((array - centre) / scale, centre, scale, flat)
 
     @classmethod
     def from_constraints(
-        cls,
-        normals: ArrayLike,
-        offsets: ArrayLike,
-        across: ArrayLike | None = None,
-        levels: ArrayLike | None = None,
+        cls, normals: ArrayLike, offsets: ArrayLike, across: ArrayLike | None = None, levels: ArrayLike = ()
     ) -> Self:
-        """Return {x: normals x <= offsets, across x = levels}, of shapes (m, n), (m,), (k, n) and (k,); it may be
-        empty.
+        """Return {x: normals x <= offsets, across x = levels}, with the shapes (m, n), (m,), (k, n) and (k,).
 
-        Infinite offsets are no limit. One step of the double description for each row. An UnboundedPolytopeError, which
-        holds a direction, is raised if the set is unbounded.
+        It may be empty. Infinite offsets are no limit. One step of the double description for each row. An
+        UnboundedPolytopeError, which holds a direction, is raised if the set is unbounded.
         """
         rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "k", "n")
         if across is not None:
-            ends: ArrayLike = [] if levels is None else levels
-            flat, heights = constraint_values(("across", "levels"), across, ends, "k", rows.shape[1])
+            flat, heights = constraint_values(("across", "levels"), across, levels, "k", rows.shape[1])
             need_finite("levels", heights)
             rows, limits = np.vstack([rows, flat, -flat]), np.concatenate([limits, heights, -heights])
         return cls._of_rows(rows, limits)
@@ -134,15 +131,11 @@ class PolytopeArrays:
     @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Self:
         """Return a convex shapely Point, LineString or Polygon as a set of R^2; see `ConvexPolygons.from_shapely`."""
-        from infoset.geometry.polygon_arrays import PolygonArrays
-
         vertices = PolygonArrays.from_shapely(geometry).polygon()
         return cls.from_vertices(vertices) if len(vertices) else cls.empty(2)
 
     def to_shapely(self) -> BaseGeometry:
         """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
-        from infoset.geometry.polygon_arrays import PolygonArrays
-
         return PolygonArrays.from_points(self._of_plane().vertices).to_shapely()
 
     def _of_plane(self) -> Self:
@@ -165,15 +158,12 @@ class PolytopeArrays:
         chosen, columns = dd.pivots(start, flat, 0)
         own, rest = columns[1:], np.delete(np.arange(space), columns[1:])
         dimension = len(own)
-        equations = np.zeros((len(rest), space + 1))
+        equations = np.eye(space, space + 1)[rest]
         if len(rest):
-            basis = start[chosen][:, [*own, space]]
-            slopes = np.linalg.solve(basis, points[np.ix_(chosen, rest)]).T
+            slopes = np.linalg.solve(start[chosen][:, [*own, space]], points[np.ix_(chosen, rest)]).T
             equations[:, own], equations[:, -1] = -slopes[:, :-1], slopes[:, -1]
-            equations[np.arange(len(rest)), rest] = 1.0
         if not dimension:
-            nothing, none = np.zeros((0, space + 1)), np.zeros((1, 1), np.uint64)
-            return cls(points[:1].copy(), nothing, equations, none, centre, scale)
+            return cls(points[:1].copy(), equations[:0], equations, np.zeros((1, 1), np.uint64), centre, scale)
         inner = np.ascontiguousarray(points[:, own])
         rows = np.column_stack([-inner, np.ones(len(inner))])
         for joggle in _JOGGLES:
@@ -198,19 +188,13 @@ class PolytopeArrays:
         facets = self.facets * _units(self.facets)
         if not by.any():
             return replace(self, facets=facets)
-        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ by
+        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ by + dd.EPS * np.abs(facets[:, -1])
         flat, most = len(self.equations) > 0, dd.TIP + 32.0 * float(by.max())
         points = dd.push_out(self.points, facets, self.incidence, np.ones(len(self.points), bool), flat, most)
         return replace(self, points=points, facets=facets)
 
     @classmethod
-    def _of_rows(
-        cls,
-        rows: Floats,
-        limits: Floats,
-        origin: Floats | float = 0.0,
-        box: tuple[Floats, Floats] | None = None,
-    ) -> Self:
+    def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Box | None = None) -> Self:
         """Return {x: rows (x - origin) <= limits}.
 
         The coordinates in which the set is round are not known before the set, so it is computed again if others are
@@ -231,12 +215,10 @@ class PolytopeArrays:
             if found._is_round:
                 return found
             box = found.bounding_box()
-        with suppress(UnboundedPolytopeError, UncertainHullError):
+        with suppress(EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError):
             for _ in range(3):
-                better = cls._intersect(rows, limits, origin, *_around(*box))
-                if better.is_empty:
-                    break
-                found, box = better, better.bounding_box()
+                better = cls._intersect(rows, limits, origin, *coordinates(*box))
+                box, found = better.bounding_box(), better
                 if found._is_round:
                     break
         return found
@@ -265,37 +247,35 @@ class PolytopeArrays:
             ends = rays[:, -1] == 1.0
             if not ends.any():
                 return cls.empty(space)
-            if rank <= space:
-                raise UnboundedPolytopeError(np.linalg.svd(table)[2][-1, :-1] * scale)
-            if not ends.all():
-                raise UnboundedPolytopeError(rays[~ends][0, :-1] * scale)
-            incidence = dd.transposed(dd.transposed(on, len(table))[1:], len(rays))  # no point lies on the first row
+            free = np.linalg.svd(table)[2][-1:] if rank <= space else rays[~ends]
+            if len(free):
+                raise UnboundedPolytopeError(free[0, :-1] * scale)
+            incidence = dd.packed(dd.unpacked(on, len(table))[:, 1:])  # no point lies on the first row
             start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), incidence, centre, scale)
             with suppress(UncertainHullError):
-                return start._reduced(np.ones(len(rays), bool))
+                return start._reduced(0)
         raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet")
 
-    def _reduced(self, new: Flags) -> Self:
-        """Return the set without redundant vertices and facets; new vertices do not lie inside their facets.
+    def _reduced(self, old: int) -> Self:
+        """Return the set without redundant vertices and facets; vertices on facets after the first `old` move outward.
 
         Facets on which all vertices lie are equations of a set of lower dimension: the hull of its vertices.
         """
-        incidence, facets = self.incidence, self.facets
-        whole = np.bitwise_and.reduce(incidence, axis=0)
+        whole = np.bitwise_and.reduce(self.incidence, axis=0)
         flat = bool(whole.any()) or len(self.points) <= self.dimension
-        points = dd.push_out(self.points, facets, incidence & ~whole, new, flat or len(self.equations) > 0, dd.TIP)
+        new = np.asarray(dd.unpacked(self.incidence, len(self.facets))[:, old:].any(axis=1))
+        still = flat or len(self.equations) > 0
+        points = dd.push_out(self.points, self.facets, self.incidence & ~whole, new, still, dd.TIP)
         if flat:
-            return self._hull(points, self.centre, self.scale, 1e2 * FLAT)
-        used, sides, incidence = _lattice(incidence, len(facets), self.dimension)
-        return replace(self, points=points[used], facets=facets[sides], incidence=incidence)
+            hull = self._hull(points, self.centre, self.scale, 1e2 * FLAT)
+            if hull.dimension == self.dimension:  # of a thin set, the bits of the facets are rounding
+                raise UncertainHullError("rounding decides whether a set is flat")
+            return hull
+        used, sides, incidence = _lattice(self.incidence, len(self.facets), self.dimension)
+        return replace(self, points=points[used], facets=self.facets[sides], incidence=incidence)
 
     def _with_rows(
-        self,
-        rows: Floats,
-        limits: Floats,
-        origin: Floats | float = 0.0,
-        box: tuple[Floats, Floats] | None = None,
-        recompute: bool = True,
+        self, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Box | None = None, recompute: bool = True
     ) -> Self:
         """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all.
 
@@ -317,23 +297,21 @@ class PolytopeArrays:
         rays, count = np.column_stack([self.points, np.ones(len(self.points))]), len(self.facets)
         bits: dd.Bits = np.zeros((len(rays), (count + len(cuts) + 63) // 64), np.uint64)
         bits[:, : self.incidence.shape[1]] = self.incidence[:, : bits.shape[1]]
-        for number, cut in enumerate(cuts, count):
-            row = np.append(-scaled[cut, :-1], scaled[cut, -1])
+        for number, row in enumerate(scaled[cuts] * ([-1.0] * self.space + [1.0]), count):
             rays, bits = dd.insert(rays, bits, row, number, self.dimension - 1, True)
         if not len(rays) or not possible:
             return self.empty(self.space)
         part = replace(self, points=rays[:, :-1].copy(), facets=np.vstack([self.facets, scaled[cuts]]), incidence=bits)
-        new = np.asarray(dd.unpacked(bits, len(part.facets))[:, count:].any(axis=1))
         widths = np.ptp(part.points, axis=0)
         # An axis along which the part has no width is no reason: its equations fix that coordinate.
         if not (recompute and ((_FINE * widths < before) & (widths > FLAT * before)).any()):
             try:
-                return part._reduced(new)
+                return part._reduced(count)
             except UncertainHullError:
                 if not recompute:
                     raise
         better = self._of_rows(*everything, part.bounding_box())
-        return part._reduced(new) if better.is_empty else better
+        return part._reduced(count) if better.is_empty else better
 
     # Representation ---------------------------------------------------------------------------------------------------
 
@@ -357,62 +335,52 @@ class PolytopeArrays:
         """Vertices, shape (v, n)."""
         return self.centre + self.scale * self.points
 
-    @property
+    @cached_property
     def normals(self) -> Floats:
         """Normals of the facets, shape (f, n), of unit length, in the directions of the affine hull."""
-        return self._sides[0]
-
-    @property
-    def offsets(self) -> Floats:
-        """Offsets of the facets, shape (f,): normals x <= offsets."""
-        return self._sides[1]
-
-    @property
-    def across(self) -> Floats:
-        """Orthonormal normals of the affine hull, shape (n - dimension, n)."""
-        return self._sides[2]
-
-    @property
-    def levels(self) -> Floats:
-        """Levels of the affine hull, shape (n - dimension,): across x = levels."""
-        return self._sides[3]
+        if self.is_empty:
+            return np.zeros((1, self.space))
+        rows = self.facets[:, :-1] / self.scale
+        if len(self.equations):
+            columns, gradients = orthonormal(self._steps, rows @ self._steps)
+            rows = gradients @ columns.T
+        return np.asarray(rows / np.linalg.norm(rows, axis=1)[:, None])
 
     @cached_property
-    def _sides(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Normals and offsets, across and levels."""
+    def offsets(self) -> Floats:
+        """Offsets of the facets, shape (f,): normals x <= offsets."""
         if self.is_empty:
-            nothing = np.zeros((0, self.space))
-            return np.zeros((1, self.space)), -np.ones(1), nothing, nothing[:, 0]
-        rows, limits = (part[: len(self.facets)] for part in self._rows())
-        rounding = 4.0 * dd.EPS * np.abs(self.vertices).max(axis=0)
-        if not len(self.equations):
-            lengths = np.linalg.norm(rows, axis=1)
-            normals, offsets = rows / lengths[:, None], limits / lengths
-            rounded = (np.frexp(lengths)[0] != 0.5) | (self.centre.any() & (rows != 0.0)).any(axis=1)
-            return normals, offsets + rounded * (np.abs(normals) @ rounding), rows[:0], limits[:0]
-        steps = self._steps
-        columns, gradients = orthonormal(steps, self.facets[:, :-1] @ (steps / self.scale[:, None]))
-        normals = gradients @ columns.T
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
-        across = orthonormal((self.equations[:, :-1] / self.scale).T, np.zeros((0, len(self.equations))))[0].T
-        levels = 0.5 * dd.supports(self.vertices, across) - 0.5 * dd.supports(self.vertices, -across)
-        return normals, dd.supports(self.vertices, normals), across, levels
+            return -np.ones(1)
+        if len(self.equations):
+            return dd.supports(self.vertices, self.normals)
+        rows, limits = self._rows()
+        lengths, rounding = np.linalg.norm(rows, axis=1), 4.0 * dd.EPS * np.abs(self.vertices).max(axis=0)
+        rounded = (np.frexp(lengths)[0] != 0.5) | (self.centre.any() & (rows != 0.0)).any(axis=1)
+        return np.asarray(limits / lengths + rounded * (np.abs(self.normals) @ rounding))
+
+    @cached_property
+    def across(self) -> Floats:
+        """Orthonormal normals of the affine hull, shape (n - dimension, n)."""
+        return orthonormal((self.equations[:, :-1] / self.scale).T, np.zeros((0, len(self.equations))))[0].T
+
+    @cached_property
+    def levels(self) -> Floats:
+        """Levels of the affine hull, shape (n - dimension,): across x = levels."""
+        return 0.5 * dd.supports(self.vertices, self.across) - 0.5 * dd.supports(self.vertices, -self.across)
 
     @cached_property
     def _steps(self) -> Floats:
         """A basis of the directions of the affine hull, shape (n, d): changes of d coordinates by their scales."""
-        own, steps = self._own, np.zeros((self.space, self.dimension))
-        steps[own] = np.eye(len(own))
-        steps[np.delete(np.arange(self.space), own)] = -self.equations[:, own]
+        (own, others), steps = self._own, np.zeros((self.space, self.dimension))
+        steps[own], steps[others] = np.eye(len(own)), -self.equations[:, own]
         return self.scale[:, None] * steps
 
     @property
-    def _own(self) -> Integers:
-        """The d coordinates of which the others are functions."""
-        # Columns of the identity in the equations, in their order, are those of the others.
-        bound = self.equations[:, :-1]
-        rest = [int(np.flatnonzero((unit == bound.T).all(axis=1))[0]) for unit in np.eye(len(bound))]
-        return np.delete(np.arange(self.space), rest)
+    def _own(self) -> tuple[Integers, Integers]:
+        """The d coordinates of which the others are functions, and the others, in the order of their equations."""
+        bound = self.equations[:, :-1]  # the columns of the others are those of the identity
+        others = np.array([(unit == bound.T).all(axis=1).argmax() for unit in np.eye(len(bound))], np.int64)
+        return np.delete(np.arange(self.space), others), others
 
     def constraints(self) -> tuple[Floats, Floats]:
         """Return normals, shape (k, n), of unit length, and offsets, shape (k,): the set is normals x <= offsets.
@@ -453,18 +421,13 @@ class PolytopeArrays:
         )
 
 
-def coordinates(lower: Floats, upper: Floats, minimum: Floats) -> tuple[Floats, Floats]:
+def coordinates(lower: Floats, upper: Floats, minimum: Floats | None = None) -> tuple[Floats, Floats]:
     """Return a centre and scales, powers of two, for a set between two points, or as wide as `minimum`, each (n,)."""
-    widths = np.maximum(upper - lower, minimum)
+    sizes = np.maximum(np.abs(lower), np.abs(upper))
+    # By default a set that is nearly flat along an axis is not enlarged to rounding errors.
+    widths = np.maximum(upper - lower, 1e-10 * sizes if minimum is None else minimum)
     scale = np.ldexp(1.0, np.frexp(np.where(widths > 0.0, widths, 1.0))[1] - 1)
-    far = np.maximum(np.abs(lower), np.abs(upper)) > _FAR * scale
-    return np.where(far, 0.5 * lower + 0.5 * upper, 0.0), scale
-
-
-def _around(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """Return the coordinates of a set between two points."""
-    # The minimum width also keeps a set that is nearly flat along an axis from being blown up to rounding errors.
-    return coordinates(lower, upper, 1e-10 * np.maximum(np.abs(lower), np.abs(upper)))
+    return np.where(sizes > _FAR * scale, 0.5 * lower + 0.5 * upper, 0.0), scale
 
 
 def _guess(rows: Floats, limits: Floats, share: float) -> Floats:
@@ -472,12 +435,10 @@ def _guess(rows: Floats, limits: Floats, share: float) -> Floats:
     large = np.abs(rows) > 1e-14 * np.abs(rows).max(axis=1, initial=0.0, keepdims=True)  # others may be rounding
     used = np.where(large.any(axis=0), large, rows != 0.0) & (limits[:, None] != 0.0)
     counts, order = used.sum(axis=0), np.arange(rows.shape[1])
-    if not counts.any():
-        return np.ones(rows.shape[1])
     sizes = np.where(used, np.abs(limits)[:, None] / np.where(used, np.abs(rows), 1.0), np.inf)
     sizes = np.sort(sizes, axis=0)[(share * np.maximum(counts - 1, 0)).astype(np.int64), order]
-    # Where no row is tight away from zero, the unit is that of the others.
-    sizes[counts == 0] = np.sort(sizes[counts > 0])[(counts > 0).sum() // 2]
+    if not counts.all():  # where no row is tight away from zero, the unit is that of the others
+        sizes[counts == 0] = np.append(np.sort(sizes[counts > 0]), 1.0)[(counts > 0).sum() // 2]
     return np.asarray(np.ldexp(1.0, np.frexp(sizes)[1]))
 
 
@@ -509,9 +470,9 @@ def _lattice(incidence: dd.Bits, count: int, dimension: int) -> tuple[Integers, 
 
     An UncertainHullError is raised unless each vertex has d facets and edges, and each facet d vertices and ridges.
     """
-    used = np.flatnonzero(dd.maximal(incidence, dimension))
+    used = np.flatnonzero(dd.maximal(incidence, dd.transposed(incidence, count), dimension))
     on = dd.transposed(incidence[used], count)
-    sides = np.flatnonzero(dd.maximal(on, dimension))
+    sides = np.flatnonzero(dd.maximal(on, incidence[used], dimension))
     on, incidence = on[sides], dd.transposed(on[sides], len(used))
     agree = min(len(used), len(sides)) > dimension and dd.have_neighbours(incidence, dimension)
     if not (agree and dd.have_neighbours(on, dimension)):

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
+from infoset.geometry.double_words import two_product, two_sum
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.kernels import Kernels
 
@@ -31,6 +32,9 @@ TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
 _RADIAL = 1e-13
 """The same up to which a vertex of more than n facets moves away from the centre: others need several steps."""
+_MOVES, _SWEEP = 60, 3
+"""Number of moves of a vertex across its facets, and of those after which one may be lost again: longer sweeps move the
+vertex farther at sharp corners, shorter ones take more moves."""
 MAX_CROSSINGS = 50_000
 """Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
 EPS = float(np.finfo(np.float64).eps)
@@ -66,6 +70,24 @@ def _within(one: Bits, other: Bits, holder: Bits) -> bool:
     return True
 
 
+@_kernels.inlined
+def _dot(one: Floats, other: Floats) -> float:
+    """Return the sum of products of the entries of `one` and the first ones of the other."""
+    total = 0.0
+    for i in range(len(one)):
+        total += one[i] * other[i]
+    return total
+
+
+@_kernels.inlined
+def _size(ray: Floats) -> float:
+    """Return the maximum absolute entry."""
+    size = 0.0
+    for value in ray:
+        size = max(size, abs(value))
+    return size
+
+
 @_kernels.allocation_free
 def _forbids(rays: Floats, signs: Integers, p: Any, q: Any, k: int) -> bool:
     """Whether a third ray k, on all rows on which p and q lie, shows that p and q span no edge.
@@ -73,26 +95,21 @@ def _forbids(rays: Floats, signs: Integers, p: Any, q: Any, k: int) -> bool:
     Rounding can leave three rays in the plane of one edge: k forbids the edge only if it is between p and q or
     outside their plane. Of equal rays on the same side of the new row the first one has the edge.
     """
-    pp = pq = pk = kk = 0.0
-    for i in range(rays.shape[1]):
-        pp += rays[p, i] * rays[p, i]
-        pq += rays[p, i] * rays[q, i]
-        pk += rays[p, i] * rays[k, i]
-        kk += rays[k, i] * rays[k, i]
-    uu = uk = 0.0  # u is the part of q orthogonal to p
-    for i in range(rays.shape[1]):
-        u = rays[q, i] - pq / pp * rays[p, i]
+    one, two, third = rays[p], rays[q], rays[k]
+    pp, pq, pk = _dot(one, one), _dot(one, two), _dot(one, third)
+    qq, kk = _dot(two, two), _dot(third, third)
+    uu = uk = away = 0.0  # u is the part of q orthogonal to p
+    for i in range(len(one)):
+        u = two[i] - pq / pp * one[i]
         uu += u * u
-        uk += u * rays[k, i]
+        uk += u * third[i]
     if uu == 0.0:
         return False
     beta = uk / uu
     alpha = (pk - beta * pq) / pp
-    away = qq = 0.0
-    for i in range(rays.shape[1]):
-        rest = rays[k, i] - alpha * rays[p, i] - beta * rays[q, i]
+    for i in range(len(one)):
+        rest = third[i] - alpha * one[i] - beta * two[i]
         away += rest * rest
-        qq += rays[q, i] * rays[q, i]
     if away > COLLINEAR**2 * kk:
         return True
     near_p, near_q = abs(beta) * math.sqrt(qq / kk) < COLLINEAR, abs(alpha) * math.sqrt(pp / kk) < COLLINEAR
@@ -114,11 +131,9 @@ def _combine(p: Floats, q: Floats, alpha: float, beta: float, affine: bool, resu
         for i in range(len(p)):  # q is the nearer point
             result[i] = q[i] + beta / total * (p[i] - p[last] * q[i])
         return
-    size = 0.0
     for i in range(len(p)):
         result[i] = alpha * q[i] + beta * p[i]
-        size = max(size, abs(result[i]))
-    result *= math.ldexp(1.0, -math.frexp(size)[1])
+    result *= math.ldexp(1.0, -math.frexp(_size(result))[1])
 
 
 @_kernels.compiled
@@ -191,23 +206,15 @@ def insert(rays: Floats, bits: Bits, row: Floats, number: int, least: int, affin
     """
     heights, signs = sides(rays, row)
     word, bit = number // 64, _1 << np.uint64(number % 64)
-    on, above = signs == 0, signs > 0
-    marks = bits.copy()
-    for i in range(len(rays)):
-        if on[i]:
-            marks[i, word] |= bit
-    if on.sum() + above.sum() == len(rays):
+    marks, on, above = bits.copy(), signs == 0, signs > 0
+    marks[:, word] |= on * bit
+    if (signs >= 0).all():
         return rays, marks
     new, new_marks = crossings(rays, bits, heights, signs, least, affine)
-    for i in range(len(new)):
-        new_marks[i, word] |= bit
+    new_marks[:, word] |= bit
     # New rays are compared with those on the row, which come first.
-    return _merged(
-        np.concatenate((rays[on], rays[above], new)),
-        np.concatenate((marks[on], marks[above], new_marks)),
-        on.sum(),
-        on.sum() + above.sum(),
-    )
+    rays, bits = np.concatenate((rays[on], rays[above], new)), np.concatenate((marks[on], marks[above], new_marks))
+    return _merged(rays, bits, on.sum(), len(rays) - len(new))
 
 
 @_kernels.compiled
@@ -215,18 +222,16 @@ def _merged(rays: Floats, bits: Bits, on: int, old: int) -> tuple[Floats, Bits]:
     """Return rays without new ones (from number `old`) that equal one of the first `on` ones or an earlier new one.
 
     The ray that stays lies on the rows of both. Otherwise rays that rounding doubles would multiply. Equal rays are
-    neighbours in the order of one coordinate.
+    neighbours in the order of one coordinate, along a direction that is not an axis.
     """
     k, size = rays.shape
     numbers, kept = np.concatenate((np.arange(on), np.arange(old, k))), np.ones(k, np.bool_)
     unit, keys = rays[numbers], np.zeros(len(numbers))
     for n in range(len(numbers)):
-        length = 0.0
-        for j in range(size):
-            length = max(length, abs(unit[n, j]))
+        length = _size(unit[n])
         for j in range(size):
             unit[n, j] /= length
-            keys[n] += unit[n, j] * (1.0 + 0.618 * j)  # a direction that is not an axis
+            keys[n] += unit[n, j] * (1.0 + 0.618 * j)
     order = np.argsort(keys)
     for place in range(len(order)):
         for after in range(place + 1, len(order)):
@@ -272,23 +277,17 @@ def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, 
         return np.empty((0, size)), np.empty((0, 1), np.uint64), len(chosen)
     rays = np.ascontiguousarray(np.linalg.inv(rows[chosen]).T)
     bits = np.zeros((size, (m + 63) // 64), np.uint64)
-    inside = np.zeros(m, np.bool_)
     for i in range(size):
-        inside[chosen[i]] = True
-        length = 0.0
         if affine:
-            rays[i, size - 1] = 1.0 if i == 0 else 0.0
-        for j in range(size):
-            length = max(length, abs(rays[i, j]))
-            if i != j:
-                bits[i, chosen[j] // 64] |= np.uint64(1) << np.uint64(chosen[j] % 64)
+            rays[i, -1] = 1.0 if i == 0 else 0.0
         if not affine or i > 0:
-            rays[i] *= math.ldexp(1.0, -math.frexp(length)[1])
+            rays[i] *= math.ldexp(1.0, -math.frexp(_size(rays[i]))[1])
+        word, bit = chosen[i] // 64, _1 << np.uint64(chosen[i] % 64)
+        bits[:, word] |= bit  # a ray lies on all of these rows but one
+        bits[i, word] ^= bit
     for i in range(m):
-        if not inside[i]:
+        if (chosen != i).all():
             rays, bits = insert(rays, bits, rows[i], i, size - 2, affine)
-            if len(rays) == 0:
-                break
     return rays, bits, size
 
 
@@ -325,24 +324,20 @@ def _members(bits: Bits, result: Integers) -> int:
 
 
 @_kernels.compiled
-def maximal(bits: Bits, least: int) -> Flags:
+def maximal(bits: Bits, transpose: Bits, least: int) -> Flags:
     """Return which sets of bits have at least `least` bits and are in no other set; the first of equal ones is kept."""
     k, words = bits.shape
-    mine, counts, kept = np.empty(64 * words, np.int64), np.empty(k, np.int64), np.zeros(k, np.bool_)
-    columns, holders = np.zeros((64 * words, (k + 63) // 64), np.uint64), np.empty(k, np.int64)
+    mine, holders, counts = np.empty(64 * words, np.int64), np.empty(k, np.int64), np.empty(k, np.int64)
     for i in range(k):
-        counts[i] = _members(bits[i], mine)
-        for bit in mine[: counts[i]]:
-            columns[bit, i // 64] |= _1 << np.uint64(i % 64)
-    for i in range(k):
-        if counts[i] < least:
-            continue
-        common = columns[mine[0]].copy() if _members(bits[i], mine) else ~columns[0]
-        for bit in mine[1 : counts[i]]:
-            common &= columns[bit]
-        kept[i] = True
+        counts[i] = _common(bits[i], bits[i])
+    kept = counts >= least
+    for n in np.flatnonzero(kept):
+        _members(bits[n], mine)
+        common = transpose[mine[0]].copy()
+        for bit in mine[1 : counts[n]]:
+            common &= transpose[bit]
         for j in holders[: _members(common, holders)]:
-            kept[i] &= j == i or (counts[j] == counts[i] and j > i)
+            kept[n] &= j == n or (counts[j] == counts[n] and j > n)
     return kept
 
 
@@ -360,27 +355,14 @@ def have_neighbours(bits: Bits, dimension: int) -> bool:
 
 
 @_kernels.allocation_free
-def _product(a: float, b: float) -> tuple[float, float]:
-    """Return a b and its rounding error (Dekker)."""
-    c, d = 134217729.0 * a, 134217729.0 * b
-    a_high, b_high = c - (c - a), d - (d - b)
-    a_low, b_low = a - a_high, b - b_high
-    p = a * b
-    return p, ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low
-
-
-@_kernels.allocation_free
 def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
     """Return start + a . b as the sum of two numbers, as exact as with doubled digits (Ogita, Rump and Oishi)."""
     high, low = start, 0.0
     for i in range(len(b)):
-        p, e = _product(a[i], b[i])
-        total = high + p
-        part = total - high
-        low += ((high - (total - part)) + (p - part)) + e
-        high = total
-    total = high + low
-    return total, low - (total - high)
+        product, rounded = two_product(a[i], b[i])
+        high, lost = two_sum(high, product)
+        low += lost + rounded
+    return two_sum(high, low)
 
 
 @_kernels.compiled
@@ -397,66 +379,52 @@ def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats,
 @_kernels.compiled
 def supports(points: Floats, normals: Floats) -> Floats:
     """Return max normal . point of each normal, shape (f,), rounded up from nearly exact products."""
-    result = np.empty(len(normals))
+    result = np.full(len(normals), -np.inf)
     for f in range(len(normals)):
-        highest = -np.inf
         for i in range(len(points)):
             height, terms = 0.0, 0.0
             for j in range(points.shape[1]):
                 height += normals[f, j] * points[i, j]
                 terms += abs(normals[f, j] * points[i, j])
             # Only points that may be highest are worth the precise product.
-            if height + 8.0 * EPS * terms >= highest:
+            if height + 8.0 * EPS * terms >= result[f]:
                 high, low = precise_dot(normals[f], points[i], 0.0)
-                if low > 0.0:
-                    high = math.nextafter(high, math.inf)
-                highest = max(highest, high)
-        result[f] = highest
+                result[f] = max(result[f], math.nextafter(high, math.inf) if low > 0.0 else high)
     return result
 
 
 @_kernels.allocation_free
-def _along(row: Floats, step: Floats) -> tuple[float, float]:
-    """Return row . step of the first entries of a row, and their sum of squares."""
-    along = square = 0.0
-    for j in range(len(step)):
-        along += row[j] * step[j]
-        square += row[j] * row[j]
-    return along, square
+def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, step: Floats) -> None:
+    """Enlarge a step until it moves a point by its needs across its facets.
 
-
-@_kernels.allocation_free
-def _least_factor(facets: Floats, mine: Integers, needs: Floats, step: Floats) -> float:
-    """Return the minimum factor of a step away from the centre that moves a point by its needs across its facets."""
-    factor = 0.0
-    for m in range(len(mine)):
-        along, _ = _along(facets[mine[m]], step)
-        if along > 0.0 and needs[m] > factor * along:
-            factor = needs[m] / along
-    return factor
-
-
-@_kernels.allocation_free
-def _solve(table: Floats, result: Floats) -> None:
-    """Write the solution of the linear equations (a, b), a x = b, to a zero result, which stays zero if singular."""
-    n = len(table)
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            best = i if abs(table[i, k]) > abs(table[best, k]) else best
-        if table[best, k] == 0.0:
-            return
-        for j in range(k, n + 1):
-            table[k, j], table[best, j] = table[best, j], table[k, j]
-        for i in range(k + 1, n):
-            factor = table[i, k] / table[k, k]
-            for j in range(k, n + 1):
-                table[i, j] -= factor * table[k, j]
-    for k in range(n - 1, -1, -1):
-        value = table[k, n]
-        for j in range(k + 1, n):
-            value -= table[k, j] * result[j]
-        result[k] = value / table[k, k]
+    Each move is across the facet that is missed most, and along those of the moves before in its sweep. At a sharp
+    corner of many facets something may be left. `basis`, shape (`_SWEEP`, n), is a working array.
+    """
+    size = 0
+    for _ in range(_MOVES):
+        facet, most = -1, EPS * math.sqrt(_dot(step, step))  # far below the rounding of the coordinates
+        for m in range(len(mine)):
+            gap = needs[m] - _dot(step, facets[mine[m]])
+            if gap > most:
+                facet, most = m, gap
+        if facet < 0:
+            break
+        normal, free = facets[mine[facet]], basis[size]
+        for j in range(len(free)):
+            free[j] = normal[j]
+        for k in range(2 * size):  # twice, for rounding
+            along = _dot(free, basis[k % size])
+            for j in range(len(free)):
+                free[j] -= along * basis[k % size, j]
+        length = math.sqrt(_dot(free, free))
+        if length < 1e-12:  # it depends on those of the sweep
+            size = 0
+            continue
+        share = (most + 0.25 * abs(needs[facet])) / _dot(free, normal)
+        for j in range(len(free)):
+            step[j] += share * free[j]
+            free[j] /= length
+        size = (size + 1) % len(basis)
 
 
 @_kernels.compiled
@@ -464,58 +432,44 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
     """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
-    its outer side covers the set. A point that is exactly on its facets stays. The others move to the common point of n
-    facets that are moved outward by rounding; to the outer sides of more than n facets, one after the other (Agmon and
-    Motzkin); and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves by more
-    than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
+    its outer side covers the set. A point that is exactly on its facets stays. The others move across their facets
+    (`_cross_facets`), and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves
+    by more than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
     v, n = points.shape
-    result, middle, away, step = points.copy(), np.zeros(n), np.empty(n), np.empty(n)
-    for i in range(v):
-        for j in range(n):
-            middle[j] += points[i, j] / v
-    mine, needs, table = np.empty(len(facets), np.int64), np.empty(len(facets)), np.empty((n, n + 1))
+    result, middle, basis = points.copy(), points.sum(axis=0) / v, np.empty((min(_SWEEP, n), n))
+    mine, needs = np.empty(len(facets), np.int64), np.empty(len(facets))
     for i in range(v):
         moved, count = 0.0, _members(bits[i], mine)
-        for attempt in range(3 if chosen[i] else 0):
+        for attempt in range(4 if chosen[i] else 0):
             inside = False
             for m in range(count):
                 f = mine[m]
-                high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
-                inside |= high < 0.0 or (high == 0.0 and low < 0.0)
-                terms = 0.0
+                height, terms = -facets[f, n], abs(facets[f, n])
                 for j in range(n):
-                    terms += abs(facets[f, j] * points[i, j])
-                needs[m] = 0.4 * attempt * EPS * terms - high  # rounding of coordinates
+                    product = facets[f, j] * result[i, j]
+                    height += product
+                    terms += abs(product)
+                rounding = 8.0 * EPS * terms
+                if abs(height) > rounding:
+                    needs[m] = 2.0 * rounding - height if height < 0.0 else -height
+                    inside |= height < 0.0
+                    continue
+                high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
+                needs[m] = 0.2 * attempt * EPS * terms - high  # rounding of coordinates
+                inside |= high < 0.0 or (high == 0.0 and low < 0.0)
             if not inside:
                 break
-            for j in range(n):
-                away[j], step[j] = points[i, j] - middle[j], 0.0
-            factor = _least_factor(facets, mine[:count], needs, away)
-            if not flat and (count == n or factor * math.sqrt(_along(away, away)[0]) > _RADIAL):
-                if count == n:
-                    for m in range(n):
-                        table[m, :n], table[m, n] = facets[mine[m], :n], needs[m]
-                    _solve(table, step)
-                rounding = 0.0
-                for _ in range(50):  # with 15, sharp corners lose the true state of an observer
-                    done, rounding = True, EPS * math.sqrt(_along(step, step)[0])  # far below that of the coordinates
-                    for m in range(count):
-                        along, square = _along(facets[mine[m]], step)
-                        gap = needs[m] - along
-                        if gap > rounding:
-                            part = (gap + 0.25 * abs(needs[m])) / square
-                            for j in range(n):
-                                step[j] += part * facets[mine[m], j]
-                            done = False
-                    if done:
-                        break
-                for m in range(count):  # what is left, at sharp corners, away from the centre
-                    needs[m] -= _along(facets[mine[m]], step)[0] + rounding
-                factor = _least_factor(facets, mine[:count], needs, away)
-            for j in range(n):
-                step[j] += factor * away[j]
-            length = math.sqrt(_along(step, step)[0])
+            away, factor = points[i] - middle, 0.0
+            for m in range(count):
+                along = _dot(away, facets[mine[m]])
+                if along > 0.0 and needs[m] > factor * along:
+                    factor = needs[m] / along
+            step = factor * away
+            if not flat and attempt < 2 and (count == n or factor * math.sqrt(_dot(away, away)) > _RADIAL):
+                step[:] = 0.0
+                _cross_facets(facets, mine[:count], needs[:count], basis, step)
+            length = math.sqrt(_dot(step, step))
             if length == 0.0 or moved >= most:
                 break
             share = min(1.0, (most - moved) / length)

@@ -26,7 +26,7 @@ from infoset.geometry.polytope._measures import largest_ball, nearest_difference
 from infoset.geometry.polytope.arrays import FLAT, PolytopeArrays, coordinates
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.geometry.polytope.reduction import reduced_outward
-from infoset.limits import Limits, real_values
+from infoset.limits import Limits
 
 _MAX_CONDITION = 1e6
 """Condition of a matrix, in scaled coordinates, up to which facets are mapped; beyond, they are those of a hull."""
@@ -108,8 +108,7 @@ class Polytope(PolytopeArrays, ConvexSet):
     @staticmethod
     def _shift(offset: ArrayLike, space: int) -> Floats:
         """Return an offset, shape (space,), from such an array or from one number for all coordinates."""
-        shift = real_values("offset", offset)
-        shift = finite_values("offset", shift, *[space] * min(shift.ndim, 1))
+        shift = finite_values("offset", offset, *[space] * min(np.ndim(offset), 1))
         return np.ascontiguousarray(np.broadcast_to(shift, (space,)))
 
     def translate(self, offset: ArrayLike) -> Polytope:
@@ -128,7 +127,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         rows, limits = self._rows(moved)
         mapped, rounded = dd.affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
         found = self._of_rows(mapped, limits)
-        if found.is_empty or len(found.equations) or not (rounded.any() or moved.any()):
+        if found.dimension < found.space or not (rounded.any() or moved.any()):
             return found
         return found.enlarged(2.0 * dd.EPS * np.abs(found.vertices).max(axis=0))
 
@@ -155,8 +154,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if self.dimension < self.space:
             return self.minkowski_sum(self.from_vertices([-along, along]))
         along = along / self.scale
-        row = np.append(along / np.abs(along).max(), 0.0)
-        heights, signs = dd.sides(self.facets, row)
+        heights, signs = dd.sides(self.facets, np.append(along / np.abs(along).max(), 0.0))
         ridges = dd.transposed(self.incidence, len(self.facets))
         new, common = dd.crossings(self.facets, ridges, heights, signs, self.space - 1, False)
         directed = np.abs(new[:, :-1]).max(axis=1, initial=0.0) > dd.ON  # not of two opposite facets
@@ -173,7 +171,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1] @ along) + 2.0 * dd.EPS * np.abs(facets[:, -1])
         whole = replace(self, points=points, facets=facets, incidence=dd.packed(incidence))
         try:
-            whole = whole._around(errors)._reduced(np.zeros(len(points), bool))
+            whole = whole._around(errors)._reduced(len(facets))
         except UncertainHullError:
             if not hull:
                 raise
@@ -193,18 +191,14 @@ class Polytope(PolytopeArrays, ConvexSet):
         return start._around(margin / start.scale)
 
     def _prism(self, margin: Floats) -> Polytope:
-        """Return a flat set and its translations across the affine hull by a `margin`, shape (n,), or 3e-8 of its size.
-
-        The other coordinates have the coefficient one in one equation alone.
-        """
+        """Return a flat set and its translations across it by a `margin`, shape (n,), or 3e-8 of its coordinates."""
         # A coordinate that is zero in all points has no scale yet: that of the margin.
         is_zero = (self.points == 0.0).all(axis=0) & (self.centre == 0.0) & (margin > 0.0)
         scale = np.where(is_zero, np.ldexp(1.0, np.frexp(margin)[1]), self.scale)
         sizes = np.maximum(margin / scale, _THICK * np.abs(self.vertices / scale).max(axis=0))
         heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, _THICK)
         points, on = self.points, dd.unpacked(self.incidence, len(self.facets))
-        others = np.delete(np.arange(self.space), self._own)
-        for axis, height in zip(others, heights, strict=True):
+        for axis, height in zip(self._own[1], heights, strict=True):
             along, above = np.eye(self.space)[axis] * height, np.repeat([False, True], len(points))
             points = np.vstack([points - along, points + along])
             on = np.column_stack([np.vstack([on, on]), above, ~above])
@@ -261,8 +255,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         slack_ulp: float = 0.0,
         recompute: bool = True,
     ) -> Polytope:
-        """Return the intersection with one or more strips lower <= normals x <= upper, or the set itself if they
-        contain it.
+        """Return the part in one or more strips lower <= normals x <= upper, or the set itself if they contain it.
 
         `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,); infinite ones give
         half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
@@ -270,12 +263,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         decides about vertices, is computed again from all half-spaces, which may take long. Without `recompute` the
         small part is known to 1e-12 of the set, and where rounding decides, an UncertainHullError is raised.
         """
-        rows = real_values("normals", normals)
-        rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
-        minimum, most = (
-            np.broadcast_to(bound_values(name, bound, (), (len(rows),)), len(rows))
-            for name, bound in (("lower", lower), ("upper", upper))
-        )
+        rows = np.atleast_2d(finite_values("normals", normals, *["m"] * (np.ndim(normals) > 1), self.space))
+        minimum, most = bound_values("lower", lower, (), (len(rows),)), bound_values("upper", upper, (), (len(rows),))
         not_negative("slack_ulp", slack_ulp)
         if self.is_empty:
             return self
@@ -296,8 +285,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         """
         numbers = axis_numbers(axes, self.space, self.space - 1)
         fixed = finite_values("values", values, *[len(numbers)] * min(np.ndim(values), 1))
-        rest = np.delete(np.arange(self.space), numbers)
-        return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(rest)
+        return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(np.delete(np.arange(self.space), numbers))
 
     def reduce_outward(self, cap: int, max_vertices: int | None = None) -> Polytope:
         """Return a polytope with at most `cap` (>= 2n) facets that contains the set.
@@ -328,44 +316,34 @@ class Polytope(PolytopeArrays, ConvexSet):
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a `direction`, both of shape (n,). O(v n)."""
         row = finite_values("direction", direction, self.space)
-        heights = self.needed().vertices @ row
-        return np.asarray(self.vertices[int(heights.argmax())])
+        return np.asarray(self.vertices[int((self.needed().vertices @ row).argmax())])
 
     @cached_property
-    def _misfits(self) -> tuple[Floats, Floats]:
-        """Distances of the vertices beyond the facets and from the affine hull: rounding of this representation."""
-        x = self.vertices
-        beyond = (x @ self.normals.T - self.offsets).max(axis=0, initial=0.0)
-        away = np.abs(x @ self.across.T - self.levels).max(axis=0, initial=0.0)
+    def _misfits(self) -> Floats:
+        """Distances of the vertices beyond the rows of `constraints`: rounding of this representation."""
+        rows, limits = self.constraints()
         # Points within a few tolerances of the double description count as in the affine hull.
-        away = away + 4.0 * dd.ON * (np.abs(self.across) @ np.abs(x).max(axis=0, initial=0.0))
-        return beyond, away
+        near = np.where(np.arange(len(rows)) < len(self.facets), 0.0, 4.0 * dd.ON)
+        beyond = (self.vertices @ rows.T - limits).max(axis=0, initial=0.0)
+        return np.asarray(beyond + near * (np.abs(rows) @ np.abs(self.vertices).max(axis=0)))
 
-    def excess(self, points: ArrayLike) -> Floats:
-        """Return the maximum distance of `points`, shape (..., n), beyond a facet or from the affine hull.
+    def margin(self, points: ArrayLike) -> Floats:
+        """Return the minimum distance of `points`, shape (..., n), from the facets, positive inside, shape (...).
 
-        It has shape (...), and is at most 0 inside, also for the vertices: the rounding of a scalar product, and of the
-        representation (distances of vertices beyond facets), is subtracted. Infinite for the empty set.
+        In a flat set it is at most minus the distance from the affine hull, in the empty set -inf. It is not negative
+        at the vertices: the rounding of a scalar product, and of the representation (distances of vertices beyond
+        facets), is added. Outside, -`margin` is at most the `distance`.
         """
         x = finite_values("points", points, "...", self.space)
         if self.is_empty:
-            return np.full(x.shape[:-1], np.inf)
+            return np.full(x.shape[:-1], -np.inf)
         reach = (self.space + 2) * dd.EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
-        over, apart = self._misfits
-        beyond = x @ self.normals.T - self.offsets - over - reach @ np.abs(self.normals).T
-        away = np.abs(x @ self.across.T - self.levels) - apart - reach @ np.abs(self.across).T
-        return np.asarray(np.maximum(beyond.max(axis=-1, initial=-np.inf), away.max(axis=-1, initial=-np.inf)))
-
-    def margin(self, points: ArrayLike) -> Floats:
-        """Return the distances of `points`, shape (..., n), from the nearest facet, positive inside: -`excess`.
-
-        Outside, -`margin` is at most the `distance`.
-        """
-        return -self.excess(points)
+        rows, limits = self.constraints()
+        return np.asarray((limits + self._misfits + reach @ np.abs(rows).T - x @ rows.T).min(axis=-1))
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
-        """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`excess`)."""
-        return np.asarray(self.excess(points) <= not_negative("tolerance", tolerance))
+        """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`margin`)."""
+        return np.asarray(self.margin(points) >= -not_negative("tolerance", tolerance))
 
     def is_subset(self, other: Polytope, tolerance: float = 0.0) -> bool:
         """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
@@ -385,7 +363,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if not self.dimension:
             return np.zeros((1, 1), np.int64), np.ones(1)
         corners = simplices_of(dd.transposed(self.incidence, len(self.facets)), self.dimension)
-        inner = self.points[:, self._own]
+        inner = self.points[:, self._own[0]]
         return corners, np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
 
     def area(self) -> float:
@@ -406,10 +384,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return np.asarray(self.centre + self.scale * np.einsum("ij,ijk->ik", weights, self.points[chosen]))
 
     def chebyshev_centre(self) -> tuple[Floats, float]:
-        """Return the centre, shape (n,), and the radius of a largest ball in the set, within its affine hull.
-
-        A linear program (HiGHS).
-        """
+        """Return the centre, shape (n,), and radius of a largest ball in the set, within its affine hull (HiGHS)."""
         middle = self.needed().vertices.mean(axis=0)
         if not self.dimension:
             return middle, 0.0
@@ -429,10 +404,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return np.asarray(x + nearest_difference(self.needed().vertices, x[None, :])) if x not in self else x
 
     def distance(self, other: Polytope | ArrayLike) -> float:
-        """Return the distance from `other`, a polytope or a point, shape (n,); inf if a set is empty.
-
-        As `closest_point`.
-        """
+        """Return the distance from a polytope or point `other`, shape (n,); inf if one is empty. As `closest_point`."""
         if isinstance(other, Polytope):
             points = self._need_other(other).vertices
         else:

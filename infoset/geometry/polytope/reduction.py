@@ -36,7 +36,7 @@ def reduced_outward(polytope: Shape, cap: int, max_vertices: int) -> Shape:
     bits = np.ascontiguousarray(bits[:, : (len(sides) + 63) // 64])
     outer = replace(polytope, points=rays[:, :-1].copy(), facets=sides, incidence=bits)
     try:
-        return outer._reduced(np.asarray(dd.unpacked(bits, len(sides))[:, 2 * space :].any(axis=1)))
+        return outer._reduced(2 * space)
     except UncertainHullError:  # few facets are always possible
         return reduced_outward(polytope, max(2 * space, cap // 2), max_vertices)
 

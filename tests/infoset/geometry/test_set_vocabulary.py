@@ -31,7 +31,6 @@ ONLY_POLYTOPES = {
     **dict.fromkeys(["normals", "offsets", "across", "levels"], "stored facets and affine hull; polygons compute them"),
     **dict.fromkeys(["space", "dimension"], "a polygon is in R^2, and its number of vertices shows its dimension"),
     "needed": "the set itself, or an error: members of a batch that are empty are masked",
-    "excess": "-margin; needed where no sign must change",
     **dict.fromkeys(["points", "facets", "equations", "incidence", "centre", "scale"], "arrays in scaled coordinates"),
     "separating_direction": "a witness; polygons decide exactly whether they meet",
     "enlarged": "outward by given errors; kernels of polygons do this at each step",

@@ -50,8 +50,8 @@ def assert_same(got: Polytope, exact: RationalSet, size: Floats) -> None:
         return
     wanted = Polytope.from_vertices(exact.vertices / size)
     scaled = Polytope.from_vertices(got.vertices / size)
-    assert float(wanted.excess(scaled.vertices).max()) <= 1e-9
-    assert float(scaled.excess(wanted.vertices).max()) <= 1e-9
+    assert float(wanted.margin(scaled.vertices).min()) >= -1e-9
+    assert float(scaled.margin(wanted.vertices).min()) >= -1e-9
     assert np.abs(got.bounding_box() - exact.bounds.T).max(axis=0) / size == pytest.approx(0.0, abs=2e-9)
 
 
@@ -128,7 +128,7 @@ def test_measures(seed: int, space: int, kind: str) -> None:
     points = points_of(kind, seed, space)
     one = Polytope.from_vertices(points)
     size = float(np.abs(points).max())
-    assert (one.excess(one.vertices) <= 0.0).all()
+    assert (one.margin(one.vertices) >= 0.0).all()
     assert one.contains(points, 1e-9 * size).all()
     centre, radius = one.chebyshev_centre()
     assert one.contains(centre, 1e-9 * size)
@@ -151,7 +151,8 @@ def test_measures(seed: int, space: int, kind: str) -> None:
         assert one.is_subset(fewer, 1e-9 * size)
         normals, offsets = one.constraints()
         again = Polytope.from_constraints(normals, offsets)
-        assert (len(again.vertices), len(again.normals)) == (len(one.vertices), len(one.normals))
+        assert len(again.normals) == len(one.normals)
+        assert again.equals(one, 1e-9 * size)  # rounded offsets can divide a vertex of many facets
         share = one.cut(np.eye(space)[0], upper=float(one.centroid()[0])).volume() / one.volume()
         assert float((one.sample(20_000)[:, 0] < one.centroid()[0]).mean()) == pytest.approx(share, abs=0.02)
 
@@ -162,7 +163,7 @@ def test_boxes_are_exact(space: int) -> None:
     lower, upper = np.zeros(space), np.arange(1.0, space + 1.0) / 3.0
     box = Polytope.from_box(lower, upper)
     assert sorted(map(tuple, box.vertices.tolist())) == sorted(itertools.product(*zip(lower, upper, strict=True)))
-    assert (box.excess(box.vertices) <= 0.0).all()
+    assert (box.margin(box.vertices) >= 0.0).all()
     assert not box.contains(upper + 1e-14).all()
     flat = Polytope.from_box([0.0] * space, [0.0] * (space - 1) + [1e-12])
     assert (flat.dimension, len(flat.vertices)) == (1, 2)

@@ -38,7 +38,7 @@ def test_flat_box_point_and_segment() -> None:
     flat = Polytope.from_box([0.0, 1.0, 2.0], [1.0, 1.0, 4.0])
     assert (len(flat.vertices), len(flat.normals), flat.dimension, flat.space) == (4, 4, 2, 3)
     assert flat.volume() == pytest.approx(2.0)
-    assert flat.excess([0.5, 1.1, 3.0]) == pytest.approx(0.1)
+    assert flat.margin([0.5, 1.1, 3.0]) == pytest.approx(-0.1)
     point = Polytope.from_vertices([[1.0, 2.0]])
     assert (point.dimension, point.volume(), len(point.normals)) == (0, 1.0, 0)
     segment = Polytope.from_vertices([[0.0, 0.0], [3.0, 4.0], [1.5, 2.0]])
@@ -73,7 +73,7 @@ def test_hull_is_the_exact_one(seed: int, size: int, flat: int, extra: int) -> N
     hull = Polytope.from_vertices(points)
     assert hull.dimension == rank
     # Every point is inside, every vertex is a point, and supports are those of the points.
-    assert float(hull.excess(points).max()) < 1e-9 * np.abs(points).max()
+    assert float(hull.margin(points).min()) > -1e-9 * np.abs(points).max()
     found = directions(seed, size)
     np.testing.assert_allclose(
         hull.support_function(found), (points @ found.T).max(axis=0), atol=1e-9 * np.abs(points).max()
