@@ -18,6 +18,7 @@ allocation_free, inlined, pasted = _kernels.allocation_free, _kernels.inlined, _
 def record_of(fields: type) -> np.dtype[Any]:
     """Return the type of array elements with the fields of a class; kernels take the address of such a record."""
     kinds = {float: np.float64, int: np.int64, bool: np.bool_}
+    # Next to a pair of types NumPy ignores `align`.
     aligned = np.dtype([(name, kinds[kind]) for name, kind in get_type_hints(fields).items()], align=True)
     return np.dtype((np.record, aligned))
 

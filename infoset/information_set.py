@@ -280,8 +280,8 @@ class InformationSet(InformationSetView):
 
     def _refine_if_few(self, active: Flags, emptied: SetStatus) -> Flags:
         """Make a new grid where too few sections are left. Set the status of empty sets; return where to recover."""
-        empty, number = self._state.with_few_sections(active)
-        if not number:
+        empty = active & (self.section_counts < self.model.fewest_sections)
+        if not empty.any():
             return empty
         self._state.refine(empty, 2 * self.model.fewest_sections + 1)
         empty &= ~self.living.any(axis=1)

@@ -132,7 +132,7 @@ class SetQueries:
     @property
     def section_counts(self) -> NDArray[np.int64]:
         """Number of living sections, shape (B,)."""
-        return np.asarray(np.count_nonzero(self._state.living, axis=1))
+        return self._state.section_counts
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
         """Return the minimum and the maximum range of the living sections, m; zeros where none lives."""

@@ -146,7 +146,7 @@ class Engagements:
         return self._information.inconsistency
 
     def advance(self, observe: Callable[[Step], None] | None = None) -> None:
-        """Simulate one step; `observe` is called after the decision, before the impulse."""
+        """Simulate one step while `flying`; `observe` is called after the decision, before the impulse."""
         model, thruster = self.scenario.set_model, self.scenario.thruster
         sight = self._truth.sight()
         self._tracking = self._flying & self._information.tracking
@@ -344,7 +344,7 @@ class Engagements:
         arrivals_s = self._arrivals_s()
         lost = self._information.inconsistent
         margin = self._truth_section.min_margin_m(arrivals_s)
-        payoff, known = self._label_ends.published_m, self._label_ends.left
+        payoff, known = self._label_ends.published_m.copy(), self._label_ends.left
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()
         # Without a closest approach within the maximum number of steps, the miss is the present range.
@@ -371,7 +371,7 @@ class Engagements:
             lateral_miss_m=lateral.T,
             guarantees=self._model.is_guaranteed,
             redraws=self._draws.redraws,
-            burns_m_s=self._burns_m_s if self._number_of_burn else None,
+            burns_m_s=self._burns_m_s.copy() if self._number_of_burn else None,
             b_plane_t_rad=self.scenario.b_plane_t_rad,
         )
 

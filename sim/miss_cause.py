@@ -40,13 +40,18 @@ class MissCause(Enum):
 class DecisionLog:
     """What decides the causes of misses, recorded in a flight of B engagements and evaluated after it.
 
+    Parameters
+    ----------
+    lateral : tuple of int
+        Shape (C, B) of impulses.
+    steps : int
+        Maximum number of steps.
+
     Notes
     -----
     With the lateral miss m of the true motion, its arrival T and the executed impulses u_j at the times t_j, the miss
     without the impulses from decision i on is M_i = m + sum over j >= i of u_j (T - t_j): no motion is simulated again.
     Cost: O(B) in a step, O(K B) after a flight with K decisions.
-
-    `lateral` is the shape (C, B) of impulses, `steps` the maximum number of steps.
     """
 
     def __init__(self, scenario: Scenario, lateral: tuple[int, int], steps: int) -> None:
@@ -79,18 +84,18 @@ class DecisionLog:
         steps = np.array(self._steps, dtype=np.int64) + thruster.delay_steps
         tracking, budget_m_s, ends_m = self._tracking[:number], self._budget_m_s[:number], self._ends_m[: number + 1]
         times_s: Floats = self._scenario.step_s * steps.astype(np.float64)
-        changes = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
-        changes *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
+        miss = np.zeros((number + 1, *lateral_miss_m.shape))
+        miss[:-1] = self._executed_m_s[np.minimum(steps, len(self._executed_m_s) - 1)]
+        miss[:-1] *= np.maximum(arrival_s - times_s[:, None], 0.0)[:, None]
+        miss = np.cumsum(miss[::-1], axis=0)[::-1] + lateral_miss_m
         causes, last = np.full(len(missed), None, dtype=object), _last(tracking)
         if missed.any():
-            later = np.cumsum(changes[::-1, :, missed], axis=0)[::-1]
-            miss = np.append(later, np.zeros((1, *later.shape[1:])), axis=0) + lateral_miss_m[:, missed]
-            at_decisions = miss, tracking[:, missed], budget_m_s[:, missed], ends_m[..., missed]
+            at_decisions = miss[..., missed], tracking[:, missed], budget_m_s[:, missed], ends_m[..., missed]
             causes[missed] = self._causes(*at_decisions, times_s, arrival_s[missed])
         lower_m, upper_m = _chosen(ends_m, last)
         return {
             "causes": tuple(causes),
-            "unguided_miss_m": modulus(changes[::-1].sum(axis=0) + lateral_miss_m),
+            "unguided_miss_m": modulus(miss[0]),
             "engine_corrects_m": max_correctable_m(times_s, thruster, arrival_s),
             "budget_corrects_m": max_correctable_m(times_s, thruster, arrival_s, budget=thruster.budget_m_s),
             "last_possible_m": np.ma.MaskedArray(modulus(0.5 * (upper_m - lower_m)), mask=last < 0),

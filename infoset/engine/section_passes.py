@@ -408,16 +408,12 @@ def keep_labels_all(active: Flags, minimum: Floats, maximum: Floats, sections: S
 
 
 @entry
-def too_few_all(active: Flags, fewest: int, sections: Sections, few: Flags) -> int:
-    """Write which active engagements have less than `fewest` living sections, shape (B,); return their number."""
-    number = 0
-    for b in range(len(sections.used)):
-        living = 0
+def count_all(sections: Sections, counts: Integers) -> None:
+    """Write the number of living sections of each engagement, shape (B,)."""
+    for b in range(len(counts)):
+        counts[b] = 0
         for s in range(sections.used[b]):
-            living += sections.slots[b, s].living
-        few[b] = active[b] and living < fewest
-        number += few[b]
-    return number
+            counts[b] += sections.slots[b, s].living
 
 
 @entry

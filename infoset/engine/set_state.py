@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Flags, Floats, Integers
 from infoset.engine import chain_storage, chains, section_life, section_passes
 from infoset.engine.chain_storage import Chains
 from infoset.engine.guaranteed_miss import GuaranteedMiss
@@ -110,6 +110,13 @@ class SetState:
         return self.sections.slots["living"]
 
     @property
+    def section_counts(self) -> Integers:
+        """Number of living sections, shape (B,)."""
+        counts = np.empty(self.batch, dtype=np.int64)
+        section_passes.count_all(self.sections, counts)
+        return counts
+
+    @property
     def ranges(self) -> Floats:
         """Range of every slot now, m, shape (B, S)."""
         return self.labels - self.law.closing_speed * (self.law.step * self.elapsed)
@@ -203,11 +210,6 @@ class SetState:
         removed = np.zeros(self.labels.shape, dtype=bool)
         lower, upper = self.lower_label, self.upper_label
         return removed, section_passes.keep_labels_all(active, lower, upper, self.sections, removed)
-
-    def with_few_sections(self, active: Flags) -> tuple[Flags, int]:
-        """Return which active engagements have fewer living sections than the model allows, and their number."""
-        few = np.empty(self.batch, dtype=bool)
-        return few, section_passes.too_few_all(active, self.model.fewest_sections, self.sections, few)
 
     def widest(self, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
         """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`.

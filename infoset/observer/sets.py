@@ -186,7 +186,7 @@ class Member:
         except UncertainHullError:
             if self.max_facets is None or operation != "affine_map":
                 raise
-            image = polytope.vertices @ arguments[0].T + arguments[1]
+            image = polytope.vertices @ arguments[0].T + arguments[1]  # `predicted` adds the rounding of the terms
             moved = Polytope.from_box(image.min(axis=0), image.max(axis=0))
         return replace(self, polytope=moved, reduced=self.max_facets is not None)
 

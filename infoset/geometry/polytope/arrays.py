@@ -371,12 +371,12 @@ class PolytopeArrays:
     @cached_property
     def _steps(self) -> Floats:
         """A basis of the directions of the affine hull, shape (n, d): changes of d coordinates by their scales."""
-        (own, others), steps = self._own, np.zeros((self.space, self.dimension))
+        (own, others), steps = self._own_and_others, np.zeros((self.space, self.dimension))
         steps[own], steps[others] = np.eye(len(own)), -self.equations[:, own]
         return self.scale[:, None] * steps
 
     @property
-    def _own(self) -> tuple[Integers, Integers]:
+    def _own_and_others(self) -> tuple[Integers, Integers]:
         """The d coordinates of which the others are functions, and the others, in the order of their equations."""
         bound = self.equations[:, :-1]  # the columns of the others are those of the identity
         others = np.array([(unit == bound.T).all(axis=1).argmax() for unit in np.eye(len(bound))], np.int64)
@@ -424,7 +424,7 @@ class PolytopeArrays:
 def coordinates(lower: Floats, upper: Floats, minimum: Floats | None = None) -> tuple[Floats, Floats]:
     """Return a centre and scales, powers of two, for a set between two points, or as wide as `minimum`, each (n,)."""
     sizes = np.maximum(np.abs(lower), np.abs(upper))
-    # By default a set that is nearly flat along an axis is not enlarged to rounding errors.
+    # By default a scale is at least 1e-10 of the coordinates: rounding would fill the width of a thinner set.
     widths = np.maximum(upper - lower, 1e-10 * sizes if minimum is None else minimum)
     scale = np.ldexp(1.0, np.frexp(np.where(widths > 0.0, widths, 1.0))[1] - 1)
     return np.where(sizes > _FAR * scale, 0.5 * lower + 0.5 * upper, 0.0), scale
@@ -435,10 +435,12 @@ def _guess(rows: Floats, limits: Floats, share: float) -> Floats:
     large = np.abs(rows) > 1e-14 * np.abs(rows).max(axis=1, initial=0.0, keepdims=True)  # others may be rounding
     used = np.where(large.any(axis=0), large, rows != 0.0) & (limits[:, None] != 0.0)
     counts, order = used.sum(axis=0), np.arange(rows.shape[1])
+    if not counts.any():
+        return np.ones(rows.shape[1])
     sizes = np.where(used, np.abs(limits)[:, None] / np.where(used, np.abs(rows), 1.0), np.inf)
     sizes = np.sort(sizes, axis=0)[(share * np.maximum(counts - 1, 0)).astype(np.int64), order]
     if not counts.all():  # where no row is tight away from zero, the unit is that of the others
-        sizes[counts == 0] = np.append(np.sort(sizes[counts > 0]), 1.0)[(counts > 0).sum() // 2]
+        sizes[counts == 0] = np.sort(sizes[counts > 0])[(counts > 0).sum() // 2]
     return np.asarray(np.ldexp(1.0, np.frexp(sizes)[1]))
 
 

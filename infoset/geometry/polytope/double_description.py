@@ -31,10 +31,12 @@ COLLINEAR = 1e-9
 TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
 _RADIAL = 1e-13
-"""The same up to which a vertex of more than n facets moves away from the centre: others need several steps."""
-_MOVES, _SWEEP = 60, 3
-"""Number of moves of a vertex across its facets, and of those after which one may be lost again: longer sweeps move the
-vertex farther at sharp corners, shorter ones take more moves."""
+"""The same up to which a vertex of more than n facets moves away from the centre."""
+_MOVES = 60
+"""Maximum number of moves of a vertex across its facets."""
+_SWEEP = 3
+"""Number of moves that are orthogonal to each other: longer sweeps move a vertex farther at sharp corners, shorter ones
+need more moves."""
 MAX_CROSSINGS = 50_000
 """Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
 EPS = float(np.finfo(np.float64).eps)
@@ -325,7 +327,10 @@ def _members(bits: Bits, result: Integers) -> int:
 
 @_kernels.compiled
 def maximal(bits: Bits, transpose: Bits, least: int) -> Flags:
-    """Return which sets of bits have at least `least` bits and are in no other set; the first of equal ones is kept."""
+    """Return which sets of bits have at least `least` >= 1 bits and are in no other set, of equal ones the first.
+
+    `transpose` has the bits of the columns.
+    """
     k, words = bits.shape
     mine, holders, counts = np.empty(64 * words, np.int64), np.empty(k, np.int64), np.empty(k, np.int64)
     for i in range(k):
@@ -394,11 +399,11 @@ def supports(points: Floats, normals: Floats) -> Floats:
 
 
 @_kernels.allocation_free
-def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, step: Floats) -> None:
-    """Enlarge a step until it moves a point by its needs across its facets.
+def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, step: Floats) -> bool:
+    """Enlarge a step until it moves a point by its needs across its facets, and return whether it does.
 
     Each move is across the facet that is missed most, and along those of the moves before in its sweep. At a sharp
-    corner of many facets something may be left. `basis`, shape (`_SWEEP`, n), is a working array.
+    corner it may fail. `basis`, shape (`_SWEEP`, n), is a working array.
     """
     size = 0
     for _ in range(_MOVES):
@@ -408,7 +413,7 @@ def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, 
             if gap > most:
                 facet, most = m, gap
         if facet < 0:
-            break
+            return True
         normal, free = facets[mine[facet]], basis[size]
         for j in range(len(free)):
             free[j] = normal[j]
@@ -425,6 +430,7 @@ def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, 
             step[j] += share * free[j]
             free[j] /= length
         size = (size + 1) % len(basis)
+    return False
 
 
 @_kernels.compiled
@@ -433,7 +439,7 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
     its outer side covers the set. A point that is exactly on its facets stays. The others move across their facets
-    (`_cross_facets`), and for what is left, at a sharp corner or in a `flat` set, away from the centre. No point moves
+    (`_cross_facets`), or where this fails, at a sharp corner, and in a `flat` set, away from the centre. No point moves
     by more than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
     v, n = points.shape
@@ -467,8 +473,9 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
                     factor = needs[m] / along
             step = factor * away
             if not flat and attempt < 2 and (count == n or factor * math.sqrt(_dot(away, away)) > _RADIAL):
-                step[:] = 0.0
-                _cross_facets(facets, mine[:count], needs[:count], basis, step)
+                across = np.zeros(n)
+                if _cross_facets(facets, mine[:count], needs[:count], basis, across):
+                    step = across
             length = math.sqrt(_dot(step, step))
             if length == 0.0 or moved >= most:
                 break

@@ -26,7 +26,7 @@ from infoset.geometry.polytope._measures import largest_ball, nearest_difference
 from infoset.geometry.polytope.arrays import FLAT, PolytopeArrays, coordinates
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.geometry.polytope.reduction import reduced_outward
-from infoset.limits import Limits
+from infoset.limits import Limits, real_values
 
 _MAX_CONDITION = 1e6
 """Condition of a matrix, in scaled coordinates, up to which facets are mapped; beyond, they are those of a hull."""
@@ -108,7 +108,8 @@ class Polytope(PolytopeArrays, ConvexSet):
     @staticmethod
     def _shift(offset: ArrayLike, space: int) -> Floats:
         """Return an offset, shape (space,), from such an array or from one number for all coordinates."""
-        shift = finite_values("offset", offset, *[space] * min(np.ndim(offset), 1))
+        shift = real_values("offset", offset)
+        shift = finite_values("offset", shift, *[space] * min(shift.ndim, 1))
         return np.ascontiguousarray(np.broadcast_to(shift, (space,)))
 
     def translate(self, offset: ArrayLike) -> Polytope:
@@ -191,14 +192,14 @@ class Polytope(PolytopeArrays, ConvexSet):
         return start._around(margin / start.scale)
 
     def _prism(self, margin: Floats) -> Polytope:
-        """Return a flat set and its translations across it by a `margin`, shape (n,), or 3e-8 of its coordinates."""
+        """Return a flat set that is enlarged across its affine hull by a `margin`, shape (n,), at least by 3e-8."""
         # A coordinate that is zero in all points has no scale yet: that of the margin.
         is_zero = (self.points == 0.0).all(axis=0) & (self.centre == 0.0) & (margin > 0.0)
         scale = np.where(is_zero, np.ldexp(1.0, np.frexp(margin)[1]), self.scale)
         sizes = np.maximum(margin / scale, _THICK * np.abs(self.vertices / scale).max(axis=0))
         heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, _THICK)
         points, on = self.points, dd.unpacked(self.incidence, len(self.facets))
-        for axis, height in zip(self._own[1], heights, strict=True):
+        for axis, height in zip(self._own_and_others[1], heights, strict=True):
             along, above = np.eye(self.space)[axis] * height, np.repeat([False, True], len(points))
             points = np.vstack([points - along, points + along])
             on = np.column_stack([np.vstack([on, on]), above, ~above])
@@ -261,9 +262,10 @@ class Polytope(PolytopeArrays, ConvexSet):
         half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
         satisfies the bounds up to rounding is not lost. A part that is much smaller than the set, or where rounding
         decides about vertices, is computed again from all half-spaces, which may take long. Without `recompute` the
-        small part is known to 1e-12 of the set, and where rounding decides, an UncertainHullError is raised.
+        small part is known to 1e-12 of the set.
         """
-        rows = np.atleast_2d(finite_values("normals", normals, *["m"] * (np.ndim(normals) > 1), self.space))
+        rows = real_values("normals", normals)
+        rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
         minimum, most = bound_values("lower", lower, (), (len(rows),)), bound_values("upper", upper, (), (len(rows),))
         not_negative("slack_ulp", slack_ulp)
         if self.is_empty:
@@ -363,7 +365,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if not self.dimension:
             return np.zeros((1, 1), np.int64), np.ones(1)
         corners = simplices_of(dd.transposed(self.incidence, len(self.facets)), self.dimension)
-        inner = self.points[:, self._own[0]]
+        inner = self.points[:, self._own_and_others[0]]
         return corners, np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
 
     def area(self) -> float:

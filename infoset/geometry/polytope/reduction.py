@@ -37,8 +37,8 @@ def reduced_outward(polytope: Shape, cap: int, max_vertices: int) -> Shape:
     outer = replace(polytope, points=rays[:, :-1].copy(), facets=sides, incidence=bits)
     try:
         return outer._reduced(2 * space)
-    except UncertainHullError:  # few facets are always possible
-        return reduced_outward(polytope, max(2 * space, cap // 2), max_vertices)
+    except UncertainHullError:  # with a cap below 2n it is the bounding box
+        return reduced_outward(polytope, cap // 2, max_vertices)
 
 
 @_kernels.compiled

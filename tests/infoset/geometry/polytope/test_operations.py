@@ -149,8 +149,7 @@ def test_measures(seed: int, space: int, kind: str) -> None:
         fewer = one.reduce_outward(2 * space + 2)
         assert len(fewer.normals) <= 2 * space + 2
         assert one.is_subset(fewer, 1e-9 * size)
-        normals, offsets = one.constraints()
-        again = Polytope.from_constraints(normals, offsets)
+        again = Polytope.from_constraints(*one.constraints())
         assert len(again.normals) == len(one.normals)
         assert again.equals(one, 1e-9 * size)  # rounded offsets can divide a vertex of many facets
         share = one.cut(np.eye(space)[0], upper=float(one.centroid()[0])).volume() / one.volume()

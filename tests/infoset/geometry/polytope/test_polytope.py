@@ -301,7 +301,8 @@ def test_unbounded_says_along_what() -> None:
     with pytest.raises(UnboundedPolytopeError, match="along") as caught:
         Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0, 1.0, 1.0])
     assert caught.value.direction @ [1.0, 0.0] < -0.9
-    with pytest.raises(UnboundedPolytopeError):
-        Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0]], [1.0, 1.0])
+    for limits in ([1.0, 1.0], [np.inf, np.inf]):
+        with pytest.raises(UnboundedPolytopeError):
+            Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0]], limits)
     with pytest.raises(UnboundedPolytopeError):
         Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [0.0, 0.0], [[0.0, 1.0, 0.0]], [0.0])
