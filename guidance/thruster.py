@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from infoset.arrays import Floats
+from infoset.arrays import Floats, some
 from infoset.limits import POSITIVE, Limits, NotNegative, Part, Positive, check_fields
 
 _DELAY = Limits(minimum=0, maximum=100_000, whole=True)  # a flight has no more steps
@@ -122,10 +122,10 @@ class Thruster:
         """
         size, limit = modulus(wanted_m_s), np.minimum(self.max_impulse_m_s, budget_left_m_s)
         given, over = wanted_m_s, size > limit
-        if over.any():
+        if some(over):
             given = np.where(over, wanted_m_s / np.maximum(size, MIN_FLOAT) * limit, wanted_m_s)
             # Rounding must not make the modulus greater than the limit.
-            while (above := modulus(given) > limit).any():
+            while some(above := modulus(given) > limit):
                 given = np.where(above, np.nextafter(given, 0.0), given)
         idle = (size < self.min_impulse_m_s) | (budget_left_m_s < self.min_impulse_m_s)
         return np.where(idle, 0.0, given)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Flags, Floats, some
 from infoset.engine import section_life, section_passes
 from infoset.engine.history import ANGLE, IMPULSE, RATE, WIDENING
 from infoset.engine.section_law import BOUND_SLACK
@@ -123,7 +123,7 @@ class InformationSet(InformationSetView):
         """
         PART.need("relative_error", relative_error)
         measured = real_array("range_m", range_m, (self.batch,))
-        if (measured < 0.0).any():
+        if some(measured < 0.0):
             raise ValueError(f"range_m must not be negative: got {shown(range_m)}")
         state, active = self._state, self._active(where)
         travelled = self.model.closing_speed_m_s * self.time_s
@@ -213,7 +213,7 @@ class InformationSet(InformationSetView):
         impulse = self._lateral("impulse_m_s", impulse_m_s)
         state = self._state
         active = self._computes_phi & flags("where", where, (self.batch,)) & impulse.any(axis=0)
-        if active.any():
+        if some(active):
             state.history.record(IMPULSE, impulse, active)
             state.shift(active, impulse)
 
@@ -281,7 +281,7 @@ class InformationSet(InformationSetView):
     def _refine_if_few(self, active: Flags, emptied: SetStatus) -> Flags:
         """Make a new grid where too few sections are left. Set the status of empty sets; return where to recover."""
         empty = active & (self.section_counts < self.model.fewest_sections)
-        if not empty.any():
+        if not some(empty):
             return empty
         self._state.refine(empty, 2 * self.model.fewest_sections + 1)
         empty &= ~self.living.any(axis=1)
@@ -297,7 +297,7 @@ class InformationSet(InformationSetView):
         `event` is None for a range, which the history does not contain. `lower` and `upper`, shape (B,), are the limits
         of the labels before the measurement, m.
         """
-        if not empty.any():
+        if not some(empty):
             return
         state, history = self._state, self._state.history
         for b in np.flatnonzero(empty & (state.lost_step < 0)):

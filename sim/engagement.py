@@ -24,7 +24,7 @@ from guidance.noise import NoiseSource, checked_measurements
 from guidance.strategy import checked_impulses
 from guidance.thruster import MIN_FLOAT, modulus
 from infoset import BearingSensor, InformationSet, InformationSetView, PredictedMiss
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Flags, Floats, some
 from infoset.sensors import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.closed_form import worst_shift_m
@@ -160,7 +160,7 @@ class Engagements:
         if situation.may_fire:
             self._decisions.decide(self.step, tracking, self._budget, miss)
         spent = self._budget < thruster.min_impulse_m_s
-        if spent.any():
+        if some(spent):
             self._spent |= spent & (modulus(wanted) >= thruster.min_impulse_m_s)
         self._queue.append(thruster.give(wanted, self._budget))
         self._budget = np.maximum(self._budget - modulus(self._queue[-1]), 0.0)
@@ -182,7 +182,7 @@ class Engagements:
         self._truth_section.predict()
         passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
         passing = self._flying & passage.passed
-        if passing.any():
+        if some(passing):
             self._miss = np.where(passing, passage.min_distance_m, self._miss)
             self._lateral_miss = np.where(passing, passage.lateral_m, self._lateral_miss)
             self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
@@ -220,7 +220,7 @@ class Engagements:
             if self.step % self._every[name] == 0 and sensor.measures_at(before_s)
         }
         self._seen = {}
-        if not due or not self._tracking.any():
+        if not due or not some(self._tracking):
             return {}
         uniform = {name: self._draws.errors[name][..., self.step] for name in due if name in self._draws.errors}
         time_s = self.step * self.scenario.set_model.step_s

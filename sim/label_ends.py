@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from infoset import SetModel
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Flags, Floats, some
 from infoset.engine.section_law import impulse_doubts, section_laws
 from sim.results import Results
 
@@ -45,7 +45,7 @@ class LabelEnds:
 
     def ends_now(self, control_is_over: Flags) -> bool:
         """Return whether control ends now in an engagement where it had not ended before."""
-        return bool((control_is_over > self._is_over).any())
+        return some(control_is_over > self._is_over)
 
     def fire(self, impulse_m_s: Floats, where: Flags, time_s: float) -> None:
         """Move the labels that have left and have not arrived by impulses of shape (C, B), m/s."""

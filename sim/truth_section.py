@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset import SetModel
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Flags, Floats, some
 from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, RATE, History
 from infoset.engine.replays import margins_along
 from infoset.engine.section_law import BOUND_SLACK, law_table, section_laws
@@ -72,7 +72,7 @@ class TruthSection:
 
     def shift(self, impulse_m_s: Floats, where: Flags) -> None:
         """Store the impulse of this step, m/s, shape (C, B)."""
-        if where.any():
+        if some(where):
             self._history.record(IMPULSE, impulse_m_s, where)
 
     def predict(self) -> None:

@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from infoset.arrays import Flags, Floats, Integers
+from infoset.arrays import Flags, Floats, Integers, some
 from infoset.engine import chain_storage, chains, section_life, section_passes
 from infoset.engine.chain_storage import Chains
 from infoset.engine.guaranteed_miss import GuaranteedMiss
@@ -124,7 +124,7 @@ class SetState:
     @property
     def summaries(self) -> Floats:
         """Summaries of the living sections, shape (C, B, S, columns). The columns of z may be out of date."""
-        if self.sections.stale.any():
+        if some(self.sections.stale):
             self._update(SUMMARISED)
         return self.sections.summaries
 
@@ -138,7 +138,7 @@ class SetState:
 
     def _catch_up(self) -> None:
         """Move the sections that are behind to the present step."""
-        if self.sections.behind.any():
+        if some(self.sections.behind):
             self._update(MOVED)
 
     def _update(self, wanted: int) -> None:
