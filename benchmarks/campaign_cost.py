@@ -63,7 +63,7 @@ def main() -> None:
                 rise, fixed = np.polyfit(ticks, values, 1)
                 line = fixed + rise * np.array(ticks)
                 off = float(np.abs(values / line - 1.0).max())
-                print(f"{noise.value}: {name}: {fixed:.3g} + {rise:.3g} n, within {off:.0%}: {np.round(values, 3)}")  # noqa: T201
+                print(f"{noise.value}: {name}: {fixed:.3g} + {rise:.3g} n, within {off:.0%}: {np.round(values, 3)}")
                 axes.plot(ticks, values, linestyle="", marker="o", markersize=4.0, color=look["color"])
                 axes.plot(ticks, line, label=f"{noise.value} noise", **look)
         for axes, ticks, label in ((left, RUNS, "runs"), (right, SECTIONS, "sections at the start")):

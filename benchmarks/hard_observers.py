@@ -10,7 +10,6 @@ distance relative to the terms of normal . x.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterable
 
@@ -86,15 +85,16 @@ def show(name: str, case_of: Callable[[int], Case], seeds: Iterable[int]) -> Non
         except UncertainHullError:
             refused += 1
     ms = np.array(times_ms)
-    sys.stdout.write(
+    print(
         f"{count} systems {name}: median {np.median(ms):.2f}, 99 % {np.quantile(ms, 0.99):.1f}, greatest "
         f"{ms.max():.0f} ms a step; {(ms > 50.0).sum()} of {len(ms)} steps over 50 ms; refused {refused}, "
-        f"emptied {emptied}, lost {len(lost)}, by {max(lost, default=0.0):.1e} of the terms at most\n"
+        f"emptied {emptied}, lost {len(lost)}, by {max(lost, default=0.0):.1e} of the terms at most",
+        flush=True,
     )
-    sys.stdout.flush()
 
 
 if __name__ == "__main__":
+    show("of 3 to 6 states, with the time to compile", random_case, range(4))
     for size in range(3, 7):
         show(f"of {size} states, errors at their bounds", random_case, range(size - 3, 1000, 4))
     show("singular, flat or in different units", degenerate_case, range(600))

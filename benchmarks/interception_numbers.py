@@ -89,7 +89,7 @@ def main() -> None:
     lines.append("figure 4, 10/50/90/99 %")
     for number, scenario in curve_scenarios(load_scenario("asteroid-1997")):
         lines.append(line(f"curve {number}", simulate(scenario, options.runs), CURVE_LEVELS))
-    print("\n".join(lines))  # noqa: T201
+    print("\n".join(lines))
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ def main() -> None:
         ):
             rows.append((name, *timed(partial(with_zonoopt, zonoopt, problem, measured, bounds), len(measured))))
     lines = [f"{name:36} {us:10.3f} us a set-step   error of the bounds {error:.2g}" for name, us, error in rows]
-    print("\n".join([*lines, *notes]))  # noqa: T201
+    print("\n".join([*lines, *notes]))
     print_many_states(int(sys.argv[1]) if len(sys.argv) > 1 else SYSTEMS)
 
 
@@ -90,7 +90,7 @@ def print_row(name: str, runs: list[tuple[Floats, Floats]]) -> None:
     excess = np.concatenate([more for _, more in runs])
     spread = f"median {np.median(ms):6.2f}, 99 % {np.quantile(ms, 0.99):6.1f}, greatest {ms.max():6.1f} ms a step"
     more = f"{excess.mean():.1%} too large, median {np.median(excess):.1%}, {excess.max():.1%} at most"
-    print(f"{name:32} {spread}; widths {more}", flush=True)  # noqa: T201
+    print(f"{name:32} {spread}; widths {more}", flush=True)
 
 
 def clohessy_wiltshire() -> tuple[LinearObserver, Floats, Floats, Floats, float]:

@@ -39,9 +39,9 @@ def main() -> None:
         folder = Path(name)
         infoset(folder, "engage", "asteroid-1997", "--noise", "both", "--record", "a.npz", "--quiet")
         browser = driver.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        print(f"{browser.browser_type.name} {browser.version}")  # noqa: T201
-        print("| page | command, s | processor, s | size, MB | first draw, s | frames/s, 1300 px | 390 px |")  # noqa: T201
-        print("|---|---|---|---|---|---|---|")  # noqa: T201
+        print(f"{browser.browser_type.name} {browser.version}")
+        print("| page | command, s | processor, s | size, MB | first draw, s | frames/s, 1300 px | 390 px |")
+        print("|---|---|---|---|---|---|---|")
         for title, command in PAGES.items():
             took_s, busy_s = np.min([timed(folder, command) for _ in range(REPEATS)], axis=0)
             file = folder / "page.html"
@@ -51,7 +51,7 @@ def main() -> None:
             frames = [max(rate for _, rate in measured) for measured in (wide, narrow)]
             size = file.stat().st_size / 1e6
             cells = f"{took_s:.2f} | {busy_s:.2f} | {size:.2f}"
-            print(f"| {title} | {cells} | {first_s:.2f} | {frames[0]:.0f} | {frames[1]:.0f} |")  # noqa: T201
+            print(f"| {title} | {cells} | {first_s:.2f} | {frames[0]:.0f} | {frames[1]:.0f} |")
         browser.close()
 
 

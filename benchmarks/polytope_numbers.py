@@ -31,8 +31,8 @@ def main() -> None:
         cdd = importlib.import_module("cdd")
     except ImportError:
         cdd = None
-        print("pycddlib is not installed: no ratios")  # noqa: T201
-    print("n  points  facets | H of V, ms  cddlib  ratio | V of H, ms  cddlib  ratio")  # noqa: T201
+        print("pycddlib is not installed: no ratios")
+    print("n  points  facets | H of V, ms  cddlib  ratio | V of H, ms  cddlib  ratio")
     worst = 0.0
     for space, count in SIZES:
         points = np.random.default_rng([space, count]).normal(size=(count, space))
@@ -45,8 +45,8 @@ def main() -> None:
             mine, other = in_turn(ours, theirs if cdd else None)
             worst = max(worst, mine / other)
             line += f" | {mine:10.3f}  {other:6.3f}  {mine / other:5.2f}"
-        print(line)  # noqa: T201
-    print(f"target: at most {TARGET:g} times cddlib; the greatest ratio is {worst:.2f}")  # noqa: T201
+        print(line)
+    print(f"target: at most {TARGET:g} times cddlib; the greatest ratio is {worst:.2f}")
 
 
 def in_turn(ours: Callable[[], object], theirs: Callable[[], object] | None) -> tuple[float, float]:

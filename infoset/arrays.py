@@ -9,5 +9,5 @@ Integers = NDArray[np.int64]
 
 
 def some(flags: Flags) -> bool:
-    """Return whether any flag is true: a fifth of the time of `flags.any()` for a batch."""
+    """Return whether any flag is true; faster than `flags.any()` for a batch."""
     return bool(np.count_nonzero(flags))

@@ -6,7 +6,7 @@ from infoset.kernels import Kernels
 
 _SPLIT = 134217729.0
 """2^27 + 1, which splits a float into two halves of 26 bits."""
-_kernels = Kernels()  # without the liberties of the package's other kernels, which would drop the errors
+_kernels = Kernels()  # without fast-math: reordered sums would lose the errors
 
 
 @_kernels.inlined

@@ -192,7 +192,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return start._around(margin / start.scale)
 
     def _prism(self, margin: Floats) -> Polytope:
-        """Return a flat set that is enlarged across its affine hull by a `margin`, shape (n,), at least by 3e-8."""
+        """Return a flat set, enlarged across its affine hull by a `margin`, shape (n,), or 3e-8 of its coordinates."""
         # A coordinate that is zero in all points has no scale yet: that of the margin.
         is_zero = (self.points == 0.0).all(axis=0) & (self.centre == 0.0) & (margin > 0.0)
         scale = np.where(is_zero, np.ldexp(1.0, np.frexp(margin)[1]), self.scale)

@@ -37,7 +37,7 @@ def reduced_outward(polytope: Shape, cap: int, max_vertices: int) -> Shape:
     outer = replace(polytope, points=rays[:, :-1].copy(), facets=sides, incidence=bits)
     try:
         return outer._reduced(2 * space)
-    except UncertainHullError:  # with a cap below 2n it is the bounding box
+    except UncertainHullError:  # at last it is the bounding box
         return reduced_outward(polytope, cap // 2, max_vertices)
 
 

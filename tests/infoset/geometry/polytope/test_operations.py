@@ -151,7 +151,9 @@ def test_measures(seed: int, space: int, kind: str) -> None:
         assert one.is_subset(fewer, 1e-9 * size)
         again = Polytope.from_constraints(*one.constraints())
         assert len(again.normals) == len(one.normals)
-        assert again.equals(one, 1e-9 * size)  # rounded offsets can divide a vertex of many facets
+        # Rounded offsets can divide a vertex of many facets.
+        apart = np.abs(again.vertices[:, None] - one.vertices).max(axis=2)
+        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= 1e-10 * size
         share = one.cut(np.eye(space)[0], upper=float(one.centroid()[0])).volume() / one.volume()
         assert float((one.sample(20_000)[:, 0] < one.centroid()[0]).mean()) == pytest.approx(share, abs=0.02)
 
