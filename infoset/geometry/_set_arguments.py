@@ -64,6 +64,12 @@ def constraint_values(names: tuple[str, str], rows: ArrayLike, limits: ArrayLike
     return normals, ends
 
 
+def offset_values(offset: ArrayLike, *shape: Any) -> Floats:
+    """Return offsets of a shape (..., n), from such an array or from one number for all coordinates."""
+    values = real_values("offset", offset)
+    return finite_values("offset", values if values.ndim else np.full(shape[-1], values), *shape)
+
+
 def box_ends(lower: ArrayLike, upper: ArrayLike, *shape: str | int) -> tuple[Floats, Floats]:
     """Return the ends of boxes, of the same shape."""
     minimum = finite_values("lower", lower, *shape)

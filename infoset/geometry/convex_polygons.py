@@ -13,6 +13,7 @@ from infoset.geometry._set_arguments import (
     axis_numbers,
     finite_values,
     not_negative,
+    offset_values,
     present_axes,
 )
 from infoset.geometry.convex_set import ConvexSet
@@ -103,10 +104,10 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
         `offset` has the shape (2,), (..., 2) or (m,), or is 0. O(n), as `linear_map`.
         """
-        rows, shift = real_values("matrix", matrix), real_values("offset", offset)
+        rows = real_values("matrix", matrix)
         if rows.shape[-2:] == (2, 2):
-            return self.linear_map(rows).translate(shift if shift.ndim else np.full(2, shift))
-        return self.polytope().affine_map(rows, shift)
+            return self.linear_map(rows).translate(offset_values(offset, "...", 2))
+        return self.polytope().affine_map(rows, offset)
 
     def translate(self, offset: ArrayLike) -> ConvexPolygons:
         """Return the polygons moved by an offset, shape (2,) or (..., 2). O(n); each coordinate is rounded once."""
@@ -119,10 +120,10 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         O(n). The vertices are mapped by the inverse matrix, whose entries are within a few ulp of themselves. If the
         matrix is singular, the preimage is unbounded or empty; a ValueError is raised if it is unbounded.
         """
-        rows, shift = real_values("matrix", matrix), real_values("offset", offset)
+        rows = real_values("matrix", matrix)
         if rows.shape[-1:] != (2,):
-            return self.polytope().preimage(rows, shift)
-        matrices, moved = self._each("matrix", rows, 2, 2), self.translate(-shift if shift.ndim else np.full(2, -shift))
+            return self.polytope().preimage(rows, offset)
+        matrices, moved = self._each("matrix", rows, 2, 2), self.translate(-offset_values(offset, "...", 2))
         inverse = np.zeros(matrices.shape)
         kernels.invert(matrices, inverse)
         if inverse.any(axis=(1, 2)).all():

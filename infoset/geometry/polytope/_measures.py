@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 from scipy.optimize import linprog
 
-from infoset.arrays import Floats, Integers
+from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry.polytope.errors import UncertainHullError
 
 HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
@@ -16,11 +15,11 @@ _MAX_STEPS = 1000
 _PRECISION = 1e-14
 
 
-def simplices_of(sides: NDArray[np.uint64], dimension: int) -> Integers:
+def simplices_of(sides: Flags, dimension: int) -> Integers:
     """Return the vertices of simplices that divide a polytope, shape (k, d + 1).
 
-    `sides` are the bits of the vertices of each facet. A face is the union of the pyramids over those of its own facets
-    that do not contain its first vertex, which are intersections of it with others.
+    `sides`, shape (f, v), are which vertices are on each facet. A face is the union of the pyramids over those of its
+    own facets that do not contain its first vertex, which are intersections of it with others.
 
     References
     ----------
@@ -42,7 +41,7 @@ def simplices_of(sides: NDArray[np.uint64], dimension: int) -> Integers:
                 ]
         return known[face]
 
-    sets = [int.from_bytes(bits.astype("<u8").tobytes(), "little") for bits in sides]
+    sets = [int.from_bytes(bits.tobytes(), "little") for bits in np.packbits(sides, axis=1, bitorder="little")]
     whole = 0
     for side in sets:
         whole |= side

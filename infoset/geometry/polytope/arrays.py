@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.arrays import Floats, Integers
+from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
 from infoset.geometry.polygon_arrays import PolygonArrays
 from infoset.geometry.polytope import double_description as dd
@@ -22,8 +22,6 @@ from infoset.limits import COUNT
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-Box = tuple[Floats, Floats]
-"""Minimum and maximum coordinates, each of shape (n,)."""
 FLAT = 1e-11
 """Thickness below which points are flat, in coordinates in which they are one wide: ten tolerances of the kernel."""
 _FAR = 16.0
@@ -34,8 +32,6 @@ _VOID = 1e-13
 """Violation of a row without a direction, relative to the largest offset, that is rounding."""
 _SHORT = 1e-15
 """Length of a row, relative to the longest one, below which it has no direction."""
-SMALL = 2.0**10
-"""Ratio of two sets' widths from which half-spaces are intersected in the coordinates of the smaller one."""
 _FINE = 2.0**14
 """Ratio of widths from which a part is computed again in its own coordinates: it is known to 1e-12 of the whole."""
 _JOGGLES = (0.0, 1e-10, 1e-8, 1e-6)
@@ -49,7 +45,7 @@ class PolytopeArrays:
     points: Floats
     facets: Floats
     equations: Floats
-    incidence: dd.Bits
+    incidence: Flags
     centre: Floats
     scale: Floats
 
@@ -60,7 +56,7 @@ class PolytopeArrays:
         """Return the empty set of R^n, n = `space`."""
         COUNT.need("space", space)
         nothing = np.zeros((0, space + 1))
-        return cls(nothing[:, 1:], nothing, nothing, np.zeros((0, 1), np.uint64), np.zeros(space), np.ones(space))
+        return cls(nothing[:, 1:], nothing, nothing, np.zeros((0, 0), np.bool_), np.zeros(space), np.ones(space))
 
     @classmethod
     def from_vertices(cls, points: ArrayLike, flat: float = FLAT) -> Self:
@@ -99,7 +95,7 @@ class PolytopeArrays:
         points, unit, wide = np.array(list(itertools.product(*ends))), np.eye(len(least)), least < top
         facets = np.column_stack([np.vstack([unit[wide], -unit[wide]]), np.concatenate([top[wide], -least[wide]])])
         on = points @ facets[:, :-1].T == facets[:, -1]
-        return cls(points, facets, np.column_stack([unit[~wide], top[~wide]]), dd.packed(on), centre, scale)
+        return cls(points, facets, np.column_stack([unit[~wide], top[~wide]]), on, centre, scale)
 
     @classmethod
     def from_ball(cls, centre: ArrayLike, radius: float, *, outer: bool = True) -> Self:
@@ -136,34 +132,34 @@ class PolytopeArrays:
 
     def to_shapely(self) -> BaseGeometry:
         """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
-        return PolygonArrays.from_points(self._of_plane().vertices).to_shapely()
+        return self._polygon().to_shapely()
 
-    def _of_plane(self) -> Self:
-        """Return the set; it must be in the plane."""
+    def _polygon(self) -> PolygonArrays:
+        """Return a set of R^2 as a polygon."""
         if self.space != 2:
             raise ValueError(f"a set of R^2 is needed: project this one, of R^{self.space}, on two axes first")
-        return self
+        return PolygonArrays.from_points(self.vertices)
 
     # Double description -----------------------------------------------------------------------------------------------
 
     @classmethod
-    def _hull(cls, points: Floats, centre: Floats, scale: Floats, flat: float, errors: Floats | None = None) -> Self:
-        """Return the convex hull of points in scaled coordinates, known to `errors`, shape (n,).
+    def _hull(cls, points: Floats, centre: Floats, scale: Floats, flat: float = FLAT, allowed: bool = True) -> Self:
+        """Return the convex hull of points in scaled coordinates, or raise an UncertainHullError if not `allowed`.
 
         Points that span no more than d dimensions differ in d coordinates, found by complete pivoting. The hull is
         computed in these; the other coordinates are functions of them.
         """
-        space = points.shape[1]
-        start = np.column_stack([points, np.ones(len(points))])
+        if not allowed:
+            raise UncertainHullError("the set is the hull of points")
+        start, space = np.column_stack([points, np.ones(len(points))]), points.shape[1]
         chosen, columns = dd.pivots(start, flat, 0)
         own, rest = columns[1:], np.delete(np.arange(space), columns[1:])
         dimension = len(own)
         equations = np.eye(space, space + 1)[rest]
-        if len(rest):
-            slopes = np.linalg.solve(start[chosen][:, [*own, space]], points[np.ix_(chosen, rest)]).T
-            equations[:, own], equations[:, -1] = -slopes[:, :-1], slopes[:, -1]
+        slopes = np.linalg.solve(start[chosen][:, [*own, space]], points[np.ix_(chosen, rest)]).T
+        equations[:, own], equations[:, -1] = -slopes[:, :-1], slopes[:, -1]
         if not dimension:
-            return cls(points[:1].copy(), equations[:0], equations, np.zeros((1, 1), np.uint64), centre, scale)
+            return cls(points[:1].copy(), equations[:0], equations, np.zeros((1, 0), np.bool_), centre, scale)
         inner = np.ascontiguousarray(points[:, own])
         rows = np.column_stack([-inner, np.ones(len(inner))])
         for joggle in _JOGGLES:
@@ -171,14 +167,13 @@ class PolytopeArrays:
                 rows[:, :-1] = joggle * np.random.default_rng(0).uniform(-1.0, 1.0, inner.shape) - inner
             rays, on, _ = dd.extreme_rays(rows, False, 0.0)
             with suppress(UncertainHullError):
-                used, sides, incidence = _lattice(dd.transposed(on, len(rows)), len(rays), dimension)
+                used, sides, incidence = dd.lattice(on.T.copy(), dimension)
                 break
         else:
             raise UncertainHullError(f"rounding decides which of {len(points)} points are vertices")
         facets, normals = np.zeros((len(sides), space + 1)), np.ascontiguousarray(rays[sides, :-1])
         facets[:, own], facets[:, -1] = normals, dd.supports(inner, normals)
-        hull = cls(points[used], facets, equations, incidence, centre, scale)
-        return hull if errors is None else hull._around(errors)
+        return cls(points[used], facets, equations, incidence, centre, scale)
 
     def _around(self, by: Floats) -> Self:
         """Return a set that contains {y + e: |e_i| <= by_i}, in scaled coordinates, `by` of shape (n,).
@@ -194,7 +189,7 @@ class PolytopeArrays:
         return replace(self, points=points, facets=facets)
 
     @classmethod
-    def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Box | None = None) -> Self:
+    def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: tuple[Floats, ...] = ()) -> Self:
         """Return {x: rows (x - origin) <= limits}.
 
         The coordinates in which the set is round are not known before the set, so it is computed again if others are
@@ -205,7 +200,7 @@ class PolytopeArrays:
             return cls.empty(rows.shape[1])
         rows, limits = rows[limits < np.inf], limits[limits < np.inf]
         found = cls.empty(rows.shape[1])
-        if box is None:
+        if not box:
             # In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
             centre = np.zeros(rows.shape[1])
             with suppress(UnboundedPolytopeError, UncertainHullError):
@@ -250,8 +245,8 @@ class PolytopeArrays:
             free = np.linalg.svd(table)[2][-1:] if rank <= space else rays[~ends]
             if len(free):
                 raise UnboundedPolytopeError(free[0, :-1] * scale)
-            incidence = dd.packed(dd.unpacked(on, len(table))[:, 1:])  # no point lies on the first row
-            start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), incidence, centre, scale)
+            on = on[:, 1:].copy()  # no point lies on the first row
+            start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), on, centre, scale)
             with suppress(UncertainHullError):
                 return start._reduced(0)
         raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet")
@@ -261,9 +256,8 @@ class PolytopeArrays:
 
         Facets on which all vertices lie are equations of a set of lower dimension: the hull of its vertices.
         """
-        whole = np.bitwise_and.reduce(self.incidence, axis=0)
+        whole, new = self.incidence.all(axis=0), np.asarray(self.incidence[:, old:].any(axis=1))
         flat = bool(whole.any()) or len(self.points) <= self.dimension
-        new = np.asarray(dd.unpacked(self.incidence, len(self.facets))[:, old:].any(axis=1))
         still = flat or len(self.equations) > 0
         points = dd.push_out(self.points, self.facets, self.incidence & ~whole, new, still, dd.TIP)
         if flat:
@@ -271,45 +265,34 @@ class PolytopeArrays:
             if hull.dimension == self.dimension:  # of a thin set, the bits of the facets are rounding
                 raise UncertainHullError("rounding decides whether a set is flat")
             return hull
-        used, sides, incidence = _lattice(self.incidence, len(self.facets), self.dimension)
+        used, sides, incidence = dd.lattice(self.incidence, self.dimension)
         return replace(self, points=points[used], facets=self.facets[sides], incidence=incidence)
 
-    def _with_rows(
-        self, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Box | None = None, recompute: bool = True
-    ) -> Self:
-        """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all.
-
-        `box` are two ends that contain the part, if known.
-        """
+    def _with_rows(self, rows: Floats, limits: Floats, origin: Floats | float = 0.0, recompute: bool = True) -> Self:
+        """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all."""
         limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
         own, ends = self._rows(self.centre)
         everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
-        if box is not None and (SMALL * (box[1] - box[0]) < before * self.scale).any():
-            # Sets that touch each other do so within the rounding of their own coordinates.
-            better = self._of_rows(*everything, box)
-            if not better.is_empty:
-                return better
         scaled, possible = _scaled_rows(rows, limits, self.scale)
         heights = self.points @ scaled[:, :-1].T - scaled[:, -1]
         cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max())))
         if not len(cuts) and possible:
             return self
         rays, count = np.column_stack([self.points, np.ones(len(self.points))]), len(self.facets)
-        bits: dd.Bits = np.zeros((len(rays), (count + len(cuts) + 63) // 64), np.uint64)
-        bits[:, : self.incidence.shape[1]] = self.incidence[:, : bits.shape[1]]
+        bits = dd.packed(np.hstack([self.incidence, np.zeros((len(rays), len(cuts)), np.bool_)]))
         for number, row in enumerate(scaled[cuts] * ([-1.0] * self.space + [1.0]), count):
             rays, bits = dd.insert(rays, bits, row, number, self.dimension - 1, True)
         if not len(rays) or not possible:
             return self.empty(self.space)
-        part = replace(self, points=rays[:, :-1].copy(), facets=np.vstack([self.facets, scaled[cuts]]), incidence=bits)
+        facets = np.vstack([self.facets, scaled[cuts]])
+        part = replace(self, points=rays[:, :-1].copy(), facets=facets, incidence=dd.unpacked(bits, len(facets)))
+        if not recompute:
+            return part._reduced(count)
         widths = np.ptp(part.points, axis=0)
         # An axis along which the part has no width is no reason: its equations fix that coordinate.
-        if not (recompute and ((_FINE * widths < before) & (widths > FLAT * before)).any()):
-            try:
+        with suppress(UncertainHullError):
+            if not ((_FINE * widths < before) & (widths > FLAT * before)).any():
                 return part._reduced(count)
-            except UncertainHullError:
-                if not recompute:
-                    raise
         better = self._of_rows(*everything, part.bounding_box())
         return part._reduced(count) if better.is_empty else better
 
@@ -413,12 +396,8 @@ class PolytopeArrays:
         return self.needed().vertices.min(axis=0), self.vertices.max(axis=0)
 
     def __repr__(self) -> str:
-        if self.is_empty:
-            return f"<empty polytope in R^{self.space}>"
-        return (
-            f"<polytope of dimension {self.dimension} in R^{self.space}: "
-            f"{len(self.points)} vertices, {len(self.facets)} facets>"
-        )
+        kind = "empty polytope" if self.is_empty else f"polytope of dimension {self.dimension}"
+        return f"<{kind} in R^{self.space}: {len(self.points)} vertices, {len(self.facets)} facets>"
 
 
 def coordinates(lower: Floats, upper: Floats, minimum: Floats | None = None) -> tuple[Floats, Floats]:
@@ -451,7 +430,7 @@ def _units(rows: Floats) -> Floats:
 
 def _moved(rows: Floats, limits: Floats, shift: Floats) -> Floats:
     """Return the limits of rows (x - shift) from those of rows x."""
-    return dd.affine_image(shift[None], -rows, limits)[0][0] if shift.any() else limits
+    return dd.affine_image(shift[None], -rows, limits.copy())[0][0] if shift.any() else limits
 
 
 def _scaled_rows(rows: Floats, limits: Floats, scale: Floats) -> tuple[Floats, bool]:
@@ -465,18 +444,3 @@ def _scaled_rows(rows: Floats, limits: Floats, scale: Floats) -> tuple[Floats, b
     possible = bool((limits[~directed] >= -_VOID * np.abs(limits).max(initial=1e-300)).all())
     table = table[directed]
     return table * _units(table), possible
-
-
-def _lattice(incidence: dd.Bits, count: int, dimension: int) -> tuple[Integers, Integers, dd.Bits]:
-    """Return which vertices and which of `count` rows are not redundant, and the incidence of these.
-
-    An UncertainHullError is raised unless each vertex has d facets and edges, and each facet d vertices and ridges.
-    """
-    used = np.flatnonzero(dd.maximal(incidence, dd.transposed(incidence, count), dimension))
-    on = dd.transposed(incidence[used], count)
-    sides = np.flatnonzero(dd.maximal(on, incidence[used], dimension))
-    on, incidence = on[sides], dd.transposed(on[sides], len(used))
-    agree = min(len(used), len(sides)) > dimension and dd.have_neighbours(incidence, dimension)
-    if not (agree and dd.have_neighbours(on, dimension)):
-        raise UncertainHullError("rounding decides which points are vertices of a set")
-    return used, sides, incidence

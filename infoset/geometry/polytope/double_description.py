@@ -30,28 +30,15 @@ COLLINEAR = 1e-9
 """Distance of a ray from the plane of two others that contains it. A wrong one adds only points of the set."""
 TIP = 1e-12
 """Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
-_RADIAL = 1e-13
-"""The same up to which a vertex of more than n facets moves away from the centre."""
 _MOVES = 60
 """Maximum number of moves of a vertex across its facets."""
 _SWEEP = 3
-"""Number of moves that are orthogonal to each other: longer sweeps move a vertex farther at sharp corners, shorter ones
-need more moves."""
+"""Number of moves that are orthogonal to each other: longer sweeps move farther at sharp corners, shorter ones more."""
 MAX_CROSSINGS = 50_000
 """Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
 EPS = float(np.finfo(np.float64).eps)
 
-_1, _2, _4, _56 = np.uint64(1), np.uint64(2), np.uint64(4), np.uint64(56)
-_FIVES, _THREES = np.uint64(0x5555555555555555), np.uint64(0x3333333333333333)
-_FIFTEENS, _ONES = np.uint64(0x0F0F0F0F0F0F0F0F), np.uint64(0x0101010101010101)
-
-
-@_kernels.inlined
-def _ones(x: Any) -> Any:
-    """Return the number of bits of a word that are set."""
-    x = x - ((x >> _1) & _FIVES)
-    x = (x & _THREES) + ((x >> _2) & _THREES)
-    return (((x + (x >> _4)) & _FIFTEENS) * _ONES) >> _56
+_1 = np.uint64(1)
 
 
 @_kernels.inlined
@@ -59,7 +46,10 @@ def _common(one: Bits, other: Bits) -> int:
     """Return the number of common bits."""
     count = 0
     for word in range(len(one)):
-        count += int(_ones(one[word] & other[word]))
+        left = one[word] & other[word]
+        while left:  # one instruction in machine code
+            left &= left - _1
+            count += 1
     return count
 
 
@@ -163,10 +153,7 @@ def crossings(
     UncertainHullError is raised if more than `MAX_CROSSINGS` edges cross the row.
     O(above below (words + k words)) at worst.
     """
-    k, size = rays.shape
-    counts = np.empty(k, np.int64)
-    for i in range(k):
-        counts[i] = _common(bits[i], bits[i])
+    (k, size), counts = rays.shape, np.array([_common(one, one) for one in bits])
     room, count, blocker = 2 * k + 16, 0, 0
     result, marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)
     below = np.flatnonzero(signs < 0)
@@ -176,26 +163,22 @@ def crossings(
             if shared < least:
                 continue
             # Two simple vertices with a common line of facets are its ends.
-            if shared > least or counts[p] > least + 1 or counts[q] > least + 1:
-                edge = True
-                for step in range(-1, k):
-                    third = blocker if step < 0 else step  # the last one that forbade an edge often does it again
-                    if third in (p, q) or not _within(bits[p], bits[q], bits[third]):
-                        continue
-                    if _forbids(rays, signs, p, q, third):
-                        edge, blocker = False, third
-                        break
-                if not edge:
-                    continue
-            if count == MAX_CROSSINGS:
-                raise UncertainHullError("rounding decides which points are vertices: one half-space cuts 50000 edges")
-            if count == room:
-                room *= 2
-                result, marks = np.concatenate((result, result)), np.concatenate((marks, marks))
-            _combine(rays[p], rays[q], heights[p], -heights[q], affine, result[count])
-            for w in range(bits.shape[1]):
-                marks[count, w] = bits[p, w] & bits[q, w]
-            count += 1
+            simple = shared == least and counts[p] <= least + 1 and counts[q] <= least + 1
+            for step in range(-1, -1 if simple else k):
+                third = blocker if step < 0 else step  # the last one that forbade an edge often does it again
+                holds = third not in (p, q) and _within(bits[p], bits[q], bits[third])
+                if holds and _forbids(rays, signs, p, q, third):
+                    blocker = third
+                    break
+            else:
+                if count == MAX_CROSSINGS:
+                    raise UncertainHullError("rounding decides about vertices: one half-space cuts 50000 edges")
+                if count == room:
+                    room *= 2
+                    result, marks = np.concatenate((result, result)), np.concatenate((marks, marks))
+                _combine(rays[p], rays[q], heights[p], -heights[q], affine, result[count])
+                marks[count] = bits[p] & bits[q]
+                count += 1
     return result[:count], marks[:count]
 
 
@@ -223,28 +206,40 @@ def insert(rays: Floats, bits: Bits, row: Floats, number: int, least: int, affin
 def _merged(rays: Floats, bits: Bits, on: int, old: int) -> tuple[Floats, Bits]:
     """Return rays without new ones (from number `old`) that equal one of the first `on` ones or an earlier new one.
 
-    The ray that stays lies on the rows of both. Otherwise rays that rounding doubles would multiply. Equal rays are
-    neighbours in the order of one coordinate, along a direction that is not an axis.
+    The ray that stays lies on the rows of both. Otherwise rays that rounding doubles would multiply.
     """
-    k, size = rays.shape
-    numbers, kept = np.concatenate((np.arange(on), np.arange(old, k))), np.ones(k, np.bool_)
-    unit, keys = rays[numbers], np.zeros(len(numbers))
-    for n in range(len(numbers)):
-        length = _size(unit[n])
-        for j in range(size):
-            unit[n, j] /= length
-            keys[n] += unit[n, j] * (1.0 + 0.618 * j)
-    order = np.argsort(keys)
-    for place in range(len(order)):
-        for after in range(place + 1, len(order)):
-            one, two = min(order[place], order[after]), max(order[place], order[after])
-            if abs(keys[two] - keys[one]) > 4.0 * size * ON:
-                break
-            i, j = numbers[one], numbers[two]
-            if j >= old and kept[i] and kept[j] and (np.abs(unit[one] - unit[two]) <= ON).all():
+    kept, sizes = np.ones(len(rays), np.bool_), np.array([_size(ray) for ray in rays])
+    for j in range(old, len(rays)):
+        for number in range(on + j - old):
+            i = number if number < on else number - on + old
+            for c in range(rays.shape[1]):
+                if not kept[i] or abs(sizes[j] * rays[i, c] - sizes[i] * rays[j, c]) > ON * sizes[i] * sizes[j]:
+                    break
+            else:
                 bits[i] |= bits[j]
                 kept[j] = False
+                break
     return rays[kept], bits[kept]
+
+
+@_kernels.compiled
+def packed(flags: Flags) -> Bits:
+    """Return rows of flags, shape (k, m), as bits, shape (k, words)."""
+    bits = np.zeros((len(flags), (flags.shape[1] + 63) // 64), np.uint64)
+    for i in range(len(flags)):
+        for j in range(flags.shape[1]):
+            bits[i, j // 64] |= np.uint64(flags[i, j]) << np.uint64(j % 64)
+    return bits
+
+
+@_kernels.compiled
+def unpacked(bits: Bits, count: int) -> Flags:
+    """Return the first `count` bits of rows as flags, shape (k, count)."""
+    flags = np.empty((len(bits), count), np.bool_)
+    for i in range(len(bits)):
+        for j in range(count):
+            flags[i, j] = (bits[i, j // 64] >> np.uint64(j % 64)) & _1 == _1
+    return flags
 
 
 @_kernels.compiled
@@ -267,8 +262,8 @@ def pivots(rows: Floats, tolerance: float, first: int) -> tuple[Integers, Intege
 
 
 @_kernels.compiled
-def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, Bits, int]:
-    """Return the extreme rays, shape (k, D), of {z: rows z >= 0}, their bits, and the rank of the rows, shape (m, D).
+def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, Flags, int]:
+    """Return the extreme rays, shape (k, D), of {z: rows z >= 0}, which ray is on which row, and the rank of the rows.
 
     If `affine`, the first row is t >= 0, and rays with t > 0 have t = 1. It starts with the simplicial cone of D rows
     and inserts the others in their order; if the rank is below D to a `tolerance`, it returns no rays.
@@ -276,87 +271,56 @@ def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, 
     m, size = rows.shape
     chosen, _ = pivots(rows, tolerance, 0 if affine else -1)
     if len(chosen) < size:
-        return np.empty((0, size)), np.empty((0, 1), np.uint64), len(chosen)
-    rays = np.ascontiguousarray(np.linalg.inv(rows[chosen]).T)
-    bits = np.zeros((size, (m + 63) // 64), np.uint64)
+        return np.empty((0, size)), np.empty((0, m), np.bool_), len(chosen)
+    rays, on = np.ascontiguousarray(np.linalg.inv(rows[chosen]).T), np.zeros((size, m), np.bool_)
     for i in range(size):
         if affine:
             rays[i, -1] = 1.0 if i == 0 else 0.0
         if not affine or i > 0:
             rays[i] *= math.ldexp(1.0, -math.frexp(_size(rays[i]))[1])
-        word, bit = chosen[i] // 64, _1 << np.uint64(chosen[i] % 64)
-        bits[:, word] |= bit  # a ray lies on all of these rows but one
-        bits[i, word] ^= bit
+        on[:, chosen[i]] = True  # a ray lies on all of these rows but one
+        on[i, chosen[i]] = False
+    bits = packed(on)
     for i in range(m):
         if (chosen != i).all():
             rays, bits = insert(rays, bits, rows[i], i, size - 2, affine)
-    return rays, bits, size
-
-
-def packed(flags: Flags) -> Bits:
-    """Return rows of flags, shape (k, m), as bits, shape (k, words)."""
-    octets = np.zeros((len(flags), 8 * ((flags.shape[1] + 63) // 64)), np.uint8)
-    bits = np.packbits(flags, axis=1, bitorder="little")
-    octets[:, : bits.shape[1]] = bits
-    return octets.view("<u8").astype(np.uint64, copy=False)
-
-
-def unpacked(bits: Bits, count: int) -> Flags:
-    """Return the first `count` bits of rows as flags, shape (k, count)."""
-    octets = np.ascontiguousarray(bits).astype("<u8", copy=False).view(np.uint8)
-    return np.unpackbits(octets, axis=1, count=count, bitorder="little").view(np.bool_)
-
-
-def transposed(bits: Bits, count: int) -> Bits:
-    """Return the bits of `count` columns, shape (count, words), from those of rows."""
-    return packed(np.ascontiguousarray(unpacked(bits, count).T))
-
-
-@_kernels.allocation_free
-def _members(bits: Bits, result: Integers) -> int:
-    """Write the numbers of the bits that are set, and return how many they are."""
-    count = 0
-    for word in range(len(bits)):
-        left = bits[word]
-        while left:
-            result[count] = 64 * word + int(_ones((left & (~left + _1)) - _1))  # the zeros below the lowest one
-            left &= left - _1
-            count += 1
-    return count
+    return rays, unpacked(bits, m), size
 
 
 @_kernels.compiled
-def maximal(bits: Bits, transpose: Bits, least: int) -> Flags:
-    """Return which sets of bits have at least `least` >= 1 bits and are in no other set, of equal ones the first.
+def maximal(bits: Bits, least: int) -> tuple[Flags, bool]:
+    """Return which sets of bits have at least `least` bits and are in no other set, of equal ones the first.
 
-    `transpose` has the bits of the columns.
+    The other value is whether each shares `least` - 1 bits with `least` others: a vertex in d dimensions has d edges.
     """
-    k, words = bits.shape
-    mine, holders, counts = np.empty(64 * words, np.int64), np.empty(k, np.int64), np.empty(k, np.int64)
-    for i in range(k):
-        counts[i] = _common(bits[i], bits[i])
+    counts, near = np.array([_common(one, one) for one in bits]), np.zeros(len(bits), np.int64)
     kept = counts >= least
-    for n in np.flatnonzero(kept):
-        _members(bits[n], mine)
-        common = transpose[mine[0]].copy()
-        for bit in mine[1 : counts[n]]:
-            common &= transpose[bit]
-        for j in holders[: _members(common, holders)]:
-            kept[n] &= j == n or (counts[j] == counts[n] and j > n)
-    return kept
+    for i in range(len(bits)):
+        for j in range(i):
+            common = _common(bits[i], bits[j])
+            if common >= least - 1:
+                near[i] += 1
+                near[j] += 1
+                if common == min(counts[i], counts[j]):
+                    kept[i if counts[i] <= counts[j] else j] = False
+    return kept, bool((near >= least).all())
 
 
 @_kernels.compiled
-def have_neighbours(bits: Bits, dimension: int) -> bool:
-    """Whether each set of bits shares `dimension` - 1 bits with `dimension` others: a vertex has as many edges."""
-    k = len(bits)
-    found = np.zeros(k, np.int64)
-    for i in range(k):
-        for j in range(i):
-            if (found[i] < dimension or found[j] < dimension) and _common(bits[i], bits[j]) >= dimension - 1:
-                found[i] += 1
-                found[j] += 1
-    return bool((found >= dimension).all())
+def lattice(on: Flags, dimension: int) -> tuple[Integers, Integers, Flags]:
+    """Return which points and rows are not redundant, and which of these points lie on which rows, from all (v, f).
+
+    An UncertainHullError is raised unless each vertex has d facets and edges, and each facet d vertices and ridges.
+    """
+    used, sides, kept, edges = np.arange(len(on)), np.arange(on.shape[1]), np.zeros(1, np.bool_), False
+    while not kept.all():
+        needed, _ = maximal(packed(on.T), dimension)
+        sides, on = sides[needed], on[:, needed]
+        kept, edges = maximal(packed(on), dimension)
+        used, on = used[kept], on[kept]
+    if not (edges and maximal(packed(on.T), dimension)[1] and min(len(used), len(sides)) > dimension):
+        raise UncertainHullError("rounding decides which points are vertices of a set")
+    return used, sides, on
 
 
 @_kernels.allocation_free
@@ -434,7 +398,7 @@ def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, 
 
 
 @_kernels.compiled
-def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bool, most: float) -> Floats:
+def push_out(points: Floats, facets: Floats, on: Flags, chosen: Flags, flat: bool, most: float) -> Floats:
     """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
@@ -442,45 +406,32 @@ def push_out(points: Floats, facets: Floats, bits: Bits, chosen: Flags, flat: bo
     (`_cross_facets`), or where this fails, at a sharp corner, and in a `flat` set, away from the centre. No point moves
     by more than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
-    v, n = points.shape
-    result, middle, basis = points.copy(), points.sum(axis=0) / v, np.empty((min(_SWEEP, n), n))
-    mine, needs = np.empty(len(facets), np.int64), np.empty(len(facets))
-    for i in range(v):
-        moved, count = 0.0, _members(bits[i], mine)
-        for attempt in range(4 if chosen[i] else 0):
-            inside = False
-            for m in range(count):
-                f = mine[m]
-                height, terms = -facets[f, n], abs(facets[f, n])
-                for j in range(n):
-                    product = facets[f, j] * result[i, j]
-                    height += product
-                    terms += abs(product)
-                rounding = 8.0 * EPS * terms
-                if abs(height) > rounding:
-                    needs[m] = 2.0 * rounding - height if height < 0.0 else -height
-                    inside |= height < 0.0
-                    continue
-                high, low = precise_dot(facets[f, :n], result[i], -facets[f, n])
-                needs[m] = 0.2 * attempt * EPS * terms - high  # rounding of coordinates
-                inside |= high < 0.0 or (high == 0.0 and low < 0.0)
+    n = points.shape[1]
+    result, middle, basis = points.copy(), points.sum(axis=0) / len(points), np.empty((min(_SWEEP, n), n))
+    room, step = np.empty(len(facets)), np.empty(n)
+    for i in np.flatnonzero(chosen):
+        moved, mine = 0.0, np.flatnonzero(on[i])
+        needs = room[: len(mine)]
+        for attempt in range(4):
+            inside, rounding = False, 0.2 * attempt * EPS * (1.0 + _size(result[i]))
+            for m in range(len(mine)):
+                height, _ = precise_dot(facets[mine[m], :n], result[i], -facets[mine[m], n])
+                inside |= height < 0.0
+                needs[m] = rounding - height
             if not inside:
                 break
-            away, factor = points[i] - middle, 0.0
-            for m in range(count):
-                along = _dot(away, facets[mine[m]])
-                if along > 0.0 and needs[m] > factor * along:
-                    factor = needs[m] / along
-            step = factor * away
-            if not flat and attempt < 2 and (count == n or factor * math.sqrt(_dot(away, away)) > _RADIAL):
-                across = np.zeros(n)
-                if _cross_facets(facets, mine[:count], needs[:count], basis, across):
-                    step = across
+            step[:] = 0.0
+            if flat or not _cross_facets(facets, mine, needs, basis, step):
+                away, factor = points[i] - middle, 0.0
+                for m in range(len(mine)):
+                    along = _dot(away, facets[mine[m]])
+                    if along > 0.0 and needs[m] > factor * along:
+                        factor = needs[m] / along
+                step[:] = factor * away
             length = math.sqrt(_dot(step, step))
             if length == 0.0 or moved >= most:
                 break
             share = min(1.0, (most - moved) / length)
             moved += share * length
-            for j in range(n):
-                result[i, j] += share * step[j]
+            result[i] += share * step
     return result

@@ -9,7 +9,6 @@ from scipy.linalg import block_diag
 
 from infoset.arrays import Floats
 from infoset.geometry._set_arguments import need_set
-from infoset.geometry.polytope.double_description import packed, unpacked
 from infoset.geometry.polytope.polytope import Polytope
 
 _MAX_ROUNDS = 200
@@ -71,10 +70,10 @@ def product(*polytopes: Polytope) -> Polytope:
         raise ValueError("a product needs at least one polytope")
     if any(factor.is_empty for factor in polytopes):
         return Polytope.empty(sum(factor.space for factor in polytopes))
-    points, on = polytopes[0].points, unpacked(polytopes[0].incidence, len(polytopes[0].facets))
+    points, on = polytopes[0].points, polytopes[0].incidence
     for factor in polytopes[1:]:
-        count, more = len(factor.points), unpacked(factor.incidence, len(factor.facets))
-        on = np.hstack([np.repeat(on, count, axis=0), np.tile(more, (len(points), 1))])
+        count = len(factor.points)
+        on = np.hstack([np.repeat(on, count, axis=0), np.tile(factor.incidence, (len(points), 1))])
         points = np.hstack([np.repeat(points, count, axis=0), np.tile(factor.points, (len(points), 1))])
     facets, equations = (
         np.column_stack(
@@ -83,4 +82,4 @@ def product(*polytopes: Polytope) -> Polytope:
         for tables in ([one.facets for one in polytopes], [one.equations for one in polytopes])
     )
     centre, scale = (np.concatenate([getattr(one, name) for one in polytopes]) for name in ("centre", "scale"))
-    return Polytope(points, facets, equations, packed(on), centre, scale)
+    return Polytope(points, facets, equations, on, centre, scale)

@@ -18,12 +18,13 @@ from infoset.geometry._set_arguments import (
     finite_values,
     need_set,
     not_negative,
+    offset_values,
     present_axes,
 )
 from infoset.geometry.convex_set import ConvexSet
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, nearest_difference, simplices_of, triangle_of
-from infoset.geometry.polytope.arrays import FLAT, PolytopeArrays, coordinates
+from infoset.geometry.polytope.arrays import PolytopeArrays, coordinates
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.geometry.polytope.reduction import reduced_outward
 from infoset.limits import Limits, real_values
@@ -50,7 +51,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     The arrays are stored in scaled coordinates y, x = `centre` + `scale` y, with powers of two, which round nothing:
     `points`, shape (v, n), and rows (a, b) of `facets`, a . y <= b, shape (f, n + 1), and of `equations`, a . y = b,
-    shape (n - dimension, n + 1). Bit j of a row of `incidence`, shape (v, words), is set if the vertex is on facet j.
+    shape (n - dimension, n + 1). `incidence`, shape (v, f), is which vertex is on which facet.
 
     Operations on the empty set give the empty set; points such as its centroid do not exist (EmptyPolytopeError). All
     arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
@@ -71,15 +72,10 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.
 
         Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull, which
-        may take long.
-
-        Raises
-        ------
-        UncertainHullError
-            If it would be a hull, without `hull`.
+        may take long; without `hull` it is an UncertainHullError.
         """
         rows = finite_values("matrix", matrix, "m", self.space)
-        moved = self._shift(offset, len(rows))
+        moved = offset_values(offset, len(rows)).copy()  # kernels are compiled once
         if self.is_empty:
             return self.empty(len(rows))
         shift, rounded = dd.affine_image(self.centre[None], rows, moved)
@@ -93,24 +89,15 @@ class Polytope(PolytopeArrays, ConvexSet):
         errors += rounded / scale
         units = np.abs(matrix).max(axis=0) + 1e-300  # the condition does not depend on those of the columns
         if not len(rows) == self.dimension == self.space or np.linalg.cond(matrix / units) > _MAX_CONDITION:
-            if not hull:
-                raise UncertainHullError("the image is the hull of points")
-            return self._hull(points, centre, scale, FLAT, errors)
+            return self._hull(points, centre, scale, allowed=hull)._around(errors)
         normals = self.facets[:, :-1] @ np.linalg.inv(matrix)
         # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding. The hull
         # of the vertices may lack a sharp tip, so their supports would be too small.
         back, _ = dd.affine_image(normals, np.ascontiguousarray(matrix.T), np.zeros(self.space))
         away = np.abs(back - self.facets[:, :-1]) @ np.abs(self.points).max(axis=0)
-        ends, low = dd.affine_image(shift[None], normals, self.facets[:, -1])
+        ends, low = dd.affine_image(shift[None], normals, self.facets[:, -1].copy())
         facets = np.column_stack([normals, ends[0] + (low + away)])
         return replace(self, points=points, facets=facets, centre=centre, scale=scale)._around(errors)
-
-    @staticmethod
-    def _shift(offset: ArrayLike, space: int) -> Floats:
-        """Return an offset, shape (space,), from such an array or from one number for all coordinates."""
-        shift = real_values("offset", offset)
-        shift = finite_values("offset", shift, *[space] * min(shift.ndim, 1))
-        return np.ascontiguousarray(np.broadcast_to(shift, (space,)))
 
     def translate(self, offset: ArrayLike) -> Polytope:
         """Return the set moved by an offset, shape (n,): O((v + f) n)."""
@@ -122,7 +109,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         A step of the double description for each facet. An UnboundedPolytopeError is raised if the preimage is
         unbounded: the matrix has a null space.
         """
-        factor, moved = finite_values("matrix", matrix, self.space, "m"), self._shift(offset, self.space)
+        factor, moved = finite_values("matrix", matrix, self.space, "m"), offset_values(offset, self.space)
         if self.is_empty:
             return self.empty(factor.shape[1])
         rows, limits = self._rows(moved)
@@ -156,27 +143,25 @@ class Polytope(PolytopeArrays, ConvexSet):
             return self.minkowski_sum(self.from_vertices([-along, along]))
         along = along / self.scale
         heights, signs = dd.sides(self.facets, np.append(along / np.abs(along).max(), 0.0))
-        ridges = dd.transposed(self.incidence, len(self.facets))
+        ridges = dd.packed(self.incidence.T)
         new, common = dd.crossings(self.facets, ridges, heights, signs, self.space - 1, False)
         directed = np.abs(new[:, :-1]).max(axis=1, initial=0.0) > dd.ON  # not of two opposite facets
         new = new[directed]
         # Two facets that are nearly opposite give a facet in which rounding is large: it holds all vertices.
         new[:, -1] = dd.supports(self.points, np.ascontiguousarray(new[:, :-1]))
         facets, signs = np.vstack([self.facets, new]), np.append(signs, np.zeros(len(new)))
-        on = np.hstack([dd.unpacked(self.incidence, len(ridges)), dd.unpacked(common[directed], len(self.points)).T])
+        on = np.hstack([self.incidence, dd.unpacked(common[directed], len(self.points)).T])
         # A vertex moves to an end of the segment if it lies on a facet that faces this end.
         moves = [(on[:, end * signs > 0].any(axis=1), end) for end in (1.0, -1.0)]
         incidence = np.vstack([on[moved] & (end * signs >= 0) for moved, end in moves])
         starts = np.vstack([np.column_stack([self.points[moved], np.full(moved.sum(), end)]) for moved, end in moves])
         points, errors = dd.affine_image(starts, np.column_stack([np.eye(self.space), along]), np.zeros(self.space))
         facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1] @ along) + 2.0 * dd.EPS * np.abs(facets[:, -1])
-        whole = replace(self, points=points, facets=facets, incidence=dd.packed(incidence))
+        whole = replace(self, points=points, facets=facets, incidence=incidence)
         try:
             whole = whole._around(errors)._reduced(len(facets))
         except UncertainHullError:
-            if not hull:
-                raise
-            return self._hull(points, self.centre, self.scale, FLAT, errors)
+            return self._hull(points, self.centre, self.scale, allowed=hull)._around(errors)
         return whole if np.abs(points).max() < 64.0 else whole.affine_map(np.eye(self.space))
 
     def enlarged(self, by: ArrayLike) -> Polytope:
@@ -198,7 +183,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         scale = np.where(is_zero, np.ldexp(1.0, np.frexp(margin)[1]), self.scale)
         sizes = np.maximum(margin / scale, _THICK * np.abs(self.vertices / scale).max(axis=0))
         heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, _THICK)
-        points, on = self.points, dd.unpacked(self.incidence, len(self.facets))
+        points, on = self.points, self.incidence
         for axis, height in zip(self._own_and_others[1], heights, strict=True):
             along, above = np.eye(self.space)[axis] * height, np.repeat([False, True], len(points))
             points = np.vstack([points - along, points + along])
@@ -206,40 +191,31 @@ class Polytope(PolytopeArrays, ConvexSet):
         ends = np.stack([self.equations, -self.equations], axis=1)
         ends[:, :, -1] += heights[:, None]
         sides, none = np.vstack([self.facets, ends.reshape(-1, self.space + 1)]), self.equations[:0]
-        return replace(self, points=points, facets=sides, equations=none, incidence=dd.packed(on), scale=scale)
+        return replace(self, points=points, facets=sides, equations=none, incidence=on, scale=scale)
 
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
 
-        If the difference is flat, rounding decides whether it is empty.
-
-        Raises
-        ------
-        ValueError
-            If the other set is empty and this one is not: every point would satisfy the condition.
+        If the difference is flat, rounding decides whether it is empty. If only the other set is empty, every point
+        would satisfy the condition: an EmptyPolytopeError.
         """
         self._need_other(other)
         if self.is_empty:
             return self
-        if other.is_empty:
-            raise ValueError("the difference with an empty set is unbounded")
         rows, limits = self._rows(self.centre)
-        widths = dd.supports(other.vertices, rows)
+        widths = dd.supports(other.needed().vertices, rows)
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
-        lower, upper = np.array(self.bounding_box()) - other.bounding_box()
-        found = self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
-        return self._of_rows(rows, less, self.centre) if found.is_empty else found
+        return self.translate(-other.vertices[0])._with_rows(rows, less, self.centre)
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
-        sets = sorted((self, *map(self._need_other, others)), key=lambda one: (one.dimension, -len(one.facets)))
-        found = sets[0]
-        for one in sets[1:]:
+        sets = (self, *map(self._need_other, others))
+        # The coordinates of the smallest set, and of these the one with most facets.
+        found, *rest = sorted(sets, key=lambda one: (one.dimension, np.log2(one.scale).sum() // 16, -len(one.facets)))
+        for one in rest:
             if not found.is_empty:
-                ends = np.array([found.bounding_box(), one.bounding_box()])
-                box = ends[:, 0].max(axis=0), ends[:, 1].min(axis=0)
-                found = found._with_rows(*one._rows(one.centre), one.centre, box)
+                found = found._with_rows(*one._rows(one.centre), one.centre)
         return found
 
     def convex_hull(self, *others: Polytope) -> Polytope:
@@ -289,18 +265,17 @@ class Polytope(PolytopeArrays, ConvexSet):
         fixed = finite_values("values", values, *[len(numbers)] * min(np.ndim(values), 1))
         return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(np.delete(np.arange(self.space), numbers))
 
-    def reduce_outward(self, cap: int, max_vertices: int | None = None) -> Polytope:
-        """Return a polytope with at most `cap` (>= 2n) facets that contains the set.
+    def reduce_outward(self, cap: int, max_vertices: int = 10**9) -> Polytope:
+        """Return a polytope with at most `cap` (>= 2n) facets, and `max_vertices`, that contains the set.
 
         It starts with the bounding box. Then it is cut by the facet with the greatest excess, relative to the width of
         the set along its normal, until it has `cap` facets. A flat set becomes 3e-8 of its coordinates thick.
         """
         Limits(minimum=2 * self.space, whole=True).need("cap", cap)
-        most = 10**9 if max_vertices is None else max_vertices
-        if self.is_empty or (len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= most):
+        if self.is_empty or (len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= max_vertices):
             return self
         solid = self if self.dimension == self.space else self._prism(np.zeros(self.space))
-        return reduced_outward(solid, cap, most)
+        return reduced_outward(solid, cap, max_vertices)
 
     def _need_other(self, other: Polytope) -> Polytope:
         """Return another polytope; it must be in the same space."""
@@ -321,13 +296,13 @@ class Polytope(PolytopeArrays, ConvexSet):
         return np.asarray(self.vertices[int((self.needed().vertices @ row).argmax())])
 
     @cached_property
-    def _misfits(self) -> Floats:
-        """Distances of the vertices beyond the rows of `constraints`: rounding of this representation."""
+    def _outer_rows(self) -> tuple[Floats, Floats]:
+        """The rows of `constraints`, with offsets that no vertex exceeds because of the rounding of these rows."""
         rows, limits = self.constraints()
         # Points within a few tolerances of the double description count as in the affine hull.
-        near = np.where(np.arange(len(rows)) < len(self.facets), 0.0, 4.0 * dd.ON)
-        beyond = (self.vertices @ rows.T - limits).max(axis=0, initial=0.0)
-        return np.asarray(beyond + near * (np.abs(rows) @ np.abs(self.vertices).max(axis=0)))
+        near = 4.0 * dd.ON * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
+        near[: len(self.facets)] = 0.0
+        return rows, np.maximum(limits, self.support_function(rows)) + near
 
     def margin(self, points: ArrayLike) -> Floats:
         """Return the minimum distance of `points`, shape (..., n), from the facets, positive inside, shape (...).
@@ -339,9 +314,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         x = finite_values("points", points, "...", self.space)
         if self.is_empty:
             return np.full(x.shape[:-1], -np.inf)
-        reach = (self.space + 2) * dd.EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
-        rows, limits = self.constraints()
-        return np.asarray((limits + self._misfits + reach @ np.abs(rows).T - x @ rows.T).min(axis=-1))
+        rows, limits = self._outer_rows
+        rounding = (self.space + 2) * dd.EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
+        return np.asarray((limits + rounding @ np.abs(rows).T - x @ rows.T).min(axis=-1))
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
         """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`margin`)."""
@@ -364,13 +339,13 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Vertices of simplices that divide the set, shape (k, d + 1), and their determinants in d coordinates."""
         if not self.dimension:
             return np.zeros((1, 1), np.int64), np.ones(1)
-        corners = simplices_of(dd.transposed(self.incidence, len(self.facets)), self.dimension)
+        corners = simplices_of(self.incidence.T, self.dimension)
         inner = self.points[:, self._own_and_others[0]]
         return corners, np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
 
     def area(self) -> float:
         """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
-        return self.volume() if self._of_plane().dimension == 2 else 0.0
+        return self.volume() if len(self._polygon().polygon()) > 2 else 0.0
 
     def centroid(self) -> Floats:
         """Return the centroid within the affine hull, shape (n,), from a division into simplices."""
@@ -407,13 +382,11 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     def distance(self, other: Polytope | ArrayLike) -> float:
         """Return the distance from a polytope or point `other`, shape (n,); inf if one is empty. As `closest_point`."""
-        if isinstance(other, Polytope):
-            points = self._need_other(other).vertices
-        else:
-            points = finite_values("other", other, self.space)[None]
-        if self.is_empty or not len(points):
+        if not isinstance(other, Polytope):
+            other = self.from_vertices(finite_values("other", other, self.space)[None])
+        if self.is_empty or self._need_other(other).is_empty:
             return float("inf")
-        return float(np.linalg.norm(nearest_difference(self.vertices, points)))
+        return float(np.linalg.norm(nearest_difference(self.vertices, other.vertices)))
 
     def isdisjoint(self, other: Polytope) -> bool:
         """Return whether no point is in both sets, to rounding; see `separating_direction`."""
@@ -438,7 +411,4 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     def plot(self, axes: Any = None, **style: Any) -> None:
         """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""
-        self._of_plane()
-        points = self.vertices - self.vertices.mean(axis=0) if len(self.vertices) else self.vertices
-        order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
-        present_axes(axes).fill(*self.vertices[order].T, **style)
+        present_axes(axes).fill(*self._polygon().polygon().T, **style)

@@ -33,8 +33,7 @@ def reduced_outward(polytope: Shape, cap: int, max_vertices: int) -> Shape:
     bits = dd.packed(np.hstack([high, ~high, np.zeros((len(high), len(polytope.facets)), bool)]))
     rays, bits, chosen = _cut_by_worst(corners, bits, polytope.points, polytope.facets, cap, max_vertices)
     sides = np.vstack([box, polytope.facets[chosen]])
-    bits = np.ascontiguousarray(bits[:, : (len(sides) + 63) // 64])
-    outer = replace(polytope, points=rays[:, :-1].copy(), facets=sides, incidence=bits)
+    outer = replace(polytope, points=rays[:, :-1].copy(), facets=sides, incidence=dd.unpacked(bits, len(sides)))
     try:
         return outer._reduced(2 * space)
     except UncertainHullError:  # at last it is the bounding box
@@ -77,7 +76,8 @@ def _cut_by_worst(
             break
         row = np.empty(n + 1)
         row[:n], row[n] = -facets[worst, :n], facets[worst, n]
-        cut, cut_bits = dd.insert(rays, bits, row, 2 * n + count, n - 1, True)
+        affine = n > 0  # Numba would compile `insert` again for the constant True
+        cut, cut_bits = dd.insert(rays, bits, row, 2 * n + count, n - 1, affine)
         if len(cut) > max_vertices or (2 * n + count >= cap and _sides(cut_bits, 2 * n + count + 1, n) > cap):
             break
         rays, bits = cut, cut_bits
