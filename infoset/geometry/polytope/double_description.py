@@ -308,7 +308,7 @@ def maximal(bits: Bits, least: int) -> tuple[Flags, bool]:
 
 @_kernels.compiled
 def lattice(on: Flags, dimension: int) -> tuple[Integers, Integers, Flags]:
-    """Return which points and rows are not redundant, and which of these points lie on which rows, from all (v, f).
+    """Return the numbers of the points and rows that are not redundant, and which of these points lie on which row.
 
     An UncertainHullError is raised unless each vertex has d facets and edges, and each facet d vertices and ridges.
     """
@@ -413,7 +413,7 @@ def push_out(points: Floats, facets: Floats, on: Flags, chosen: Flags, flat: boo
         moved, mine = 0.0, np.flatnonzero(on[i])
         needs = room[: len(mine)]
         for attempt in range(4):
-            inside, rounding = False, 0.2 * attempt * EPS * (1.0 + _size(result[i]))
+            inside, rounding = False, 0.2 * attempt * EPS * (1.0 + _size(result[i]))  # that of its coordinates
             for m in range(len(mine)):
                 height, _ = precise_dot(facets[mine[m], :n], result[i], -facets[mine[m], n])
                 inside |= height < 0.0
