@@ -237,8 +237,8 @@ class Member:
         unit = np.ldexp(1.0, -np.frexp(np.maximum(terms, 1e-50))[1])
         normals, ends = strips.normals * unit[:, None], (strips.lower[run], strips.upper[run])
         excess, facets = np.zeros(len(terms)), len(self.polytope.facets)
-        # In more than four dimensions it takes long to compute a small part from more facets than a set may have.
-        recompute = self.max_facets is None or self.polytope.space < 5 or facets <= self.max_facets
+        # It takes long to compute a small part from more facets than a set may have.
+        recompute = self.max_facets is None or facets <= self.max_facets
         for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set
             lower, upper = (ends[0] - slack * terms) * unit, (ends[1] + slack * terms) * unit
             part = self._apply("cut", normals, lower, upper, recompute=recompute)
