@@ -228,7 +228,7 @@ def packed(flags: Flags) -> Bits:
     bits = np.zeros((len(flags), (flags.shape[1] + 63) // 64), np.uint64)
     for i in range(len(flags)):
         for j in range(flags.shape[1]):
-            bits[i, j // 64] |= np.uint64(flags[i, j]) << np.uint64(j % 64)
+            bits[i, j >> 6] |= np.uint64(flags[i, j]) << np.uint64(j & 63)
     return bits
 
 
@@ -238,7 +238,7 @@ def unpacked(bits: Bits, count: int) -> Flags:
     flags = np.empty((len(bits), count), np.bool_)
     for i in range(len(bits)):
         for j in range(count):
-            flags[i, j] = (bits[i, j // 64] >> np.uint64(j % 64)) & _1 == _1
+            flags[i, j] = (bits[i, j >> 6] >> np.uint64(j & 63)) & _1 == _1
     return flags
 
 
@@ -314,11 +314,12 @@ def lattice(on: Flags, dimension: int) -> tuple[Integers, Integers, Flags]:
     """
     used, sides, kept, edges = np.arange(len(on)), np.arange(on.shape[1]), np.zeros(1, np.bool_), False
     while not kept.all():
-        needed, _ = maximal(packed(on.T), dimension)
-        sides, on = sides[needed], on[:, needed]
+        bits = packed(on.T)
+        needed, _ = maximal(bits, dimension)
+        sides, on, bits = sides[needed], on[:, needed], bits[needed]
         kept, edges = maximal(packed(on), dimension)
         used, on = used[kept], on[kept]
-    if not (edges and maximal(packed(on.T), dimension)[1] and min(len(used), len(sides)) > dimension):
+    if not (edges and maximal(bits, dimension)[1] and min(len(used), len(sides)) > dimension):
         raise UncertainHullError("rounding decides which points are vertices of a set")
     return used, sides, on
 
@@ -406,32 +407,27 @@ def push_out(points: Floats, facets: Floats, on: Flags, chosen: Flags, flat: boo
     (`_cross_facets`), or where this fails, at a sharp corner, and in a `flat` set, away from the centre. No point moves
     by more than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
-    n = points.shape[1]
+    n, f = points.shape[1], len(facets)
     result, middle, basis = points.copy(), points.sum(axis=0) / len(points), np.empty((min(_SWEEP, n), n))
-    room, step = np.empty(len(facets)), np.empty(n)
+    numbers, room, step = np.empty(f, np.int64), np.empty(f), np.empty(n)
     for i in np.flatnonzero(chosen):
-        moved, mine = 0.0, np.flatnonzero(on[i])
-        needs = room[: len(mine)]
-        for attempt in range(4):
-            inside, rounding = False, 0.2 * attempt * EPS * (1.0 + _size(result[i]))  # that of its coordinates
-            for m in range(len(mine)):
-                height, _ = precise_dot(facets[mine[m], :n], result[i], -facets[mine[m], n])
+        inside, count, rounding = False, 0, n * EPS * (1.0 + _size(points[i]))  # that of the new coordinates
+        for k in range(f):
+            if on[i, k]:
+                height, _ = precise_dot(facets[k, :n], points[i], -facets[k, n])
                 inside |= height < 0.0
-                needs[m] = rounding - height
-            if not inside:
-                break
-            step[:] = 0.0
-            if flat or not _cross_facets(facets, mine, needs, basis, step):
-                away, factor = points[i] - middle, 0.0
-                for m in range(len(mine)):
-                    along = _dot(away, facets[mine[m]])
-                    if along > 0.0 and needs[m] > factor * along:
-                        factor = needs[m] / along
-                step[:] = factor * away
-            length = math.sqrt(_dot(step, step))
-            if length == 0.0 or moved >= most:
-                break
-            share = min(1.0, (most - moved) / length)
-            moved += share * length
-            result[i] += share * step
+                numbers[count], room[count] = k, rounding - height
+                count += 1
+        if not inside:
+            continue
+        mine, needs = numbers[:count], room[:count]
+        step[:] = 0.0
+        if flat or not _cross_facets(facets, mine, needs, basis, step):
+            away, factor = points[i] - middle, 0.0
+            for m in range(count):
+                along = _dot(away, facets[mine[m]])
+                if along > 0.0 and needs[m] > factor * along:
+                    factor = needs[m] / along
+            step[:] = factor * away
+        result[i] += min(1.0, most / math.sqrt(_dot(step, step) + 1e-300)) * step
     return result
