@@ -226,7 +226,7 @@ class LinearObserver:
         input_matrix: ArrayLike | None = None,
         offset: ArrayLike | None = None,
         runs: int | None = None,
-        max_facets: int | None = 45,
+        max_facets: int | None = 36,
     ) -> None:
         self.states = n = (real_values("state_matrix", state_matrix).shape or (0,))[-1]
         Limits(minimum=1, maximum=MAX_STATES, whole=True).need("the number of states", n)
