@@ -288,12 +288,11 @@ class PolytopeArrays:
         part = replace(self, points=rays[:, :-1].copy(), facets=facets, incidence=dd.unpacked(bits, len(facets)))
         if not recompute:
             return part._reduced(count)
-        widths = np.ptp(part.points, axis=0)
-        # An axis along which the part has no width is no reason: its equations fix that coordinate.
         with suppress(UncertainHullError):
-            if not ((_FINE * widths < before) & (widths > FLAT * before)).any():
+            if not (_FINE * np.ptp(part.points, axis=0) < before).any():
                 return part._reduced(count)
-        better = self._of_rows(*everything, part.bounding_box())
+        (lower, upper), error = part.bounding_box(), dd.ON * before * self.scale
+        better = self._of_rows(*everything, (lower - error, upper + error))
         return part._reduced(count) if better.is_empty else better
 
     # Representation ---------------------------------------------------------------------------------------------------

@@ -47,7 +47,7 @@ def _common(one: Bits, other: Bits) -> int:
     count = 0
     for word in range(len(one)):
         left = one[word] & other[word]
-        while left:  # one instruction in machine code
+        while left:  # LLVM makes one instruction of this loop
             left &= left - _1
             count += 1
     return count
@@ -310,6 +310,8 @@ def maximal(bits: Bits, least: int) -> tuple[Flags, bool]:
 def lattice(on: Flags, dimension: int) -> tuple[Integers, Integers, Flags]:
     """Return the numbers of the points and rows that are not redundant, and which of these points lie on which row.
 
+    Without some of the points, others of the rows are redundant, so it repeats while points go.
+
     An UncertainHullError is raised unless each vertex has d facets and edges, and each facet d vertices and ridges.
     """
     used, sides, kept, edges = np.arange(len(on)), np.arange(on.shape[1]), np.zeros(1, np.bool_), False
@@ -400,7 +402,7 @@ def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, 
 
 @_kernels.compiled
 def push_out(points: Floats, facets: Floats, on: Flags, chosen: Flags, flat: bool, most: float) -> Floats:
-    """Return points, shape (v, n), of which the `chosen` ones are not inside a facet on which they lie.
+    """Return points, shape (v, n): the `chosen` ones are not inside a facet on which they lie, if `most` allows.
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
     its outer side covers the set. A point that is exactly on its facets stays. The others move across their facets
@@ -409,18 +411,18 @@ def push_out(points: Floats, facets: Floats, on: Flags, chosen: Flags, flat: boo
     """
     n, f = points.shape[1], len(facets)
     result, middle, basis = points.copy(), points.sum(axis=0) / len(points), np.empty((min(_SWEEP, n), n))
-    numbers, room, step = np.empty(f, np.int64), np.empty(f), np.empty(n)
+    numbers, gaps, step = np.empty(f, np.int64), np.empty(f), np.empty(n)
     for i in np.flatnonzero(chosen):
         inside, count, rounding = False, 0, n * EPS * (1.0 + _size(points[i]))  # that of the new coordinates
         for k in range(f):
             if on[i, k]:
                 height, _ = precise_dot(facets[k, :n], points[i], -facets[k, n])
                 inside |= height < 0.0
-                numbers[count], room[count] = k, rounding - height
+                numbers[count], gaps[count] = k, rounding - height
                 count += 1
         if not inside:
             continue
-        mine, needs = numbers[:count], room[:count]
+        mine, needs = numbers[:count], gaps[:count]
         step[:] = 0.0
         if flat or not _cross_facets(facets, mine, needs, basis, step):
             away, factor = points[i] - middle, 0.0

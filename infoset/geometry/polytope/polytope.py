@@ -75,7 +75,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         may take long; without `hull` it is an UncertainHullError.
         """
         rows = finite_values("matrix", matrix, "m", self.space)
-        moved = offset_values(offset, len(rows)).copy()  # kernels are compiled once
+        moved = offset_values(offset, len(rows)).copy()  # kernels are compiled again for arrays that are read-only
         if self.is_empty:
             return self.empty(len(rows))
         shift, rounded = dd.affine_image(self.centre[None], rows, moved)
@@ -196,14 +196,20 @@ class Polytope(PolytopeArrays, ConvexSet):
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
 
-        If the difference is flat, rounding decides whether it is empty. If only the other set is empty, every point
-        would satisfy the condition: an EmptyPolytopeError.
+        It is part of the set moved by minus a point of the other. If it is flat, rounding decides if it is empty.
+
+        Raises
+        ------
+        ValueError
+            If the other set is empty and this one is not: every point would satisfy the condition.
         """
         self._need_other(other)
         if self.is_empty:
             return self
+        if other.is_empty:
+            raise ValueError("the difference with an empty set is unbounded")
         rows, limits = self._rows(self.centre)
-        widths = dd.supports(other.needed().vertices, rows)
+        widths = dd.supports(other.vertices, rows)
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
         return self.translate(-other.vertices[0])._with_rows(rows, less, self.centre)
@@ -211,7 +217,7 @@ class Polytope(PolytopeArrays, ConvexSet):
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
         sets = (self, *map(self._need_other, others))
-        # The coordinates of the smallest set, and of these the one with most facets.
+        # Start in the lowest dimension, in the smallest coordinates (to 2^16 in volume), with most facets.
         found, *rest = sorted(sets, key=lambda one: (one.dimension, np.log2(one.scale).sum() // 16, -len(one.facets)))
         for one in rest:
             if not found.is_empty:
@@ -266,7 +272,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         return self.cut(np.eye(self.space)[numbers], fixed, fixed).project(np.delete(np.arange(self.space), numbers))
 
     def reduce_outward(self, cap: int, max_vertices: int = 10**9) -> Polytope:
-        """Return a polytope with at most `cap` (>= 2n) facets, and `max_vertices`, that contains the set.
+        """Return a polytope with at most `cap` (>= 2n) facets, and `max_vertices` (>= 2^n), that contains the set.
 
         It starts with the bounding box. Then it is cut by the facet with the greatest excess, relative to the width of
         the set along its normal, until it has `cap` facets. A flat set becomes 3e-8 of its coordinates thick.
@@ -384,7 +390,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return the distance from a polytope or point `other`, shape (n,); inf if one is empty. As `closest_point`."""
         if not isinstance(other, Polytope):
             other = self.from_vertices(finite_values("other", other, self.space)[None])
-        if self.is_empty or self._need_other(other).is_empty:
+        if self._need_other(other).is_empty or self.is_empty:
             return float("inf")
         return float(np.linalg.norm(nearest_difference(self.vertices, other.vertices)))
 

@@ -215,8 +215,25 @@ def test_operations_on_empty_sets() -> None:
     for measure in (Polytope.centroid, Polytope.bounding_box, Polytope.chebyshev_centre, Polytope.sample):
         with pytest.raises(EmptyPolytopeError):
             measure(empty, *([3] if measure is Polytope.sample else []))
-    with pytest.raises(EmptyPolytopeError):
+    with pytest.raises(ValueError, match="unbounded"):
         box.minkowski_difference(empty)
+    with pytest.raises(ValueError, match=r"in R\^3"):
+        empty.distance(Polytope.from_box([0.0, 0.0], [1.0, 1.0]))
+
+
+@pytest.mark.parametrize("small", [1e-3, 1e-6, 3e-7, 1e-9])
+def test_a_part_that_is_far_smaller_than_the_sets_is_found_in_its_own_coordinates(small: float) -> None:
+    """Parts that are 1e12 times narrower than the first set were a point or a segment beside the part."""
+    wide = 1.0 / small
+    tall, broad = Polytope.from_box([-small, -wide], [small, wide]), Polytope.from_box([-wide, -small], [wide, small])
+    both = tall & broad
+    assert both.contains([[-small, -small], [small, small], [-small, small]]).all()
+    np.testing.assert_allclose(both.bounding_box(), [[-small] * 2, [small] * 2], rtol=1e-9)
+    line, square = Polytope.from_vertices([[-wide, 0.0], [wide, 0.0]]), Polytope.from_box([-small] * 2, [small] * 2)
+    for piece in (line & square, square & line):
+        np.testing.assert_allclose(piece.bounding_box(), [[-small, 0.0], [small, 0.0]], rtol=1e-9, atol=1e-300)
+    less = Polytope.from_box([0.0] * 2, [1e6] * 2).minkowski_difference(Polytope.from_box([0.0] * 2, [1e6 - small] * 2))
+    assert less.contains([small / 2.0] * 2)
 
 
 def test_axes_of_very_different_sizes() -> None:
