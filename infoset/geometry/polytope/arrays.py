@@ -6,7 +6,7 @@ import itertools
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,8 +48,6 @@ class PolytopeArrays:
     incidence: Flags
     centre: Floats
     scale: Floats
-
-    # Construction -----------------------------------------------------------------------------------------------------
 
     @classmethod
     def empty(cls, space: int) -> Self:
@@ -139,8 +137,6 @@ class PolytopeArrays:
         if self.space != 2:
             raise ValueError(f"a set of R^2 is needed: project this one, of R^{self.space}, on two axes first")
         return PolygonArrays.from_points(self.vertices)
-
-    # Double description -----------------------------------------------------------------------------------------------
 
     @classmethod
     def _hull(cls, points: Floats, centre: Floats, scale: Floats, flat: float = FLAT, allowed: bool = True) -> Self:
@@ -268,11 +264,17 @@ class PolytopeArrays:
         used, sides, incidence = dd.lattice(self.incidence, self.dimension)
         return replace(self, points=points[used], facets=self.facets[sides], incidence=incidence)
 
-    def _with_rows(self, rows: Floats, limits: Floats, origin: Floats | float = 0.0, recompute: bool = True) -> Self:
-        """Return the part where rows (x - origin) <= limits, shapes (m, n) and (m,); the set itself if this is all."""
+    def _with_rows(
+        self, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Any = None, recompute: bool = True
+    ) -> Self:
+        """Return the part where rows (x - origin) <= limits, between the ends of a `box` if known; or the set itself."""
         limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
         own, ends = self._rows(self.centre)
         everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
+        if box is not None and (_FINE * (box[1] - box[0]) < before * self.scale).any():
+            better = self._of_rows(*everything, box)
+            if not better.is_empty:
+                return better
         scaled, possible = _scaled_rows(rows, limits, self.scale)
         heights = self.points @ scaled[:, :-1].T - scaled[:, -1]
         cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max())))
@@ -288,14 +290,13 @@ class PolytopeArrays:
         part = replace(self, points=rays[:, :-1].copy(), facets=facets, incidence=dd.unpacked(bits, len(facets)))
         if not recompute:
             return part._reduced(count)
+        widths = np.ptp(part.points, axis=0)
+        # An axis along which the part has no width is no reason: its equations fix that coordinate.
         with suppress(UncertainHullError):
-            if not (_FINE * np.ptp(part.points, axis=0) < before).any():
+            if not ((_FINE * widths < before) & (widths > FLAT * before)).any():
                 return part._reduced(count)
-        (lower, upper), error = part.bounding_box(), dd.ON * before * self.scale
-        better = self._of_rows(*everything, (lower - error, upper + error))
+        better = self._of_rows(*everything, part.bounding_box())
         return part._reduced(count) if better.is_empty else better
-
-    # Representation ---------------------------------------------------------------------------------------------------
 
     @property
     def space(self) -> int:

@@ -310,12 +310,10 @@ def maximal(bits: Bits, least: int) -> tuple[Flags, bool]:
 def lattice(on: Flags, dimension: int) -> tuple[Integers, Integers, Flags]:
     """Return the numbers of the points and rows that are not redundant, and which of these points lie on which row.
 
-    Without some of the points, others of the rows are redundant, so it repeats while points go.
-
     An UncertainHullError is raised unless each vertex has d facets and edges, and each facet d vertices and ridges.
     """
     used, sides, kept, edges = np.arange(len(on)), np.arange(on.shape[1]), np.zeros(1, np.bool_), False
-    while not kept.all():
+    while not kept.all():  # without some of the points, others of the rows are redundant
         bits = packed(on.T)
         needed, _ = maximal(bits, dimension)
         sides, on, bits = sides[needed], on[:, needed], bits[needed]

@@ -62,8 +62,6 @@ class Polytope(PolytopeArrays, ConvexSet):
     vertices are in no order; `plot` and `to_shapely` order those of a set of the plane.
     """
 
-    # Sets -----------------------------------------------------------------------------------------------------------
-
     def linear_map(self, matrix: ArrayLike) -> Polytope:
         """Return {matrix x}, with a matrix of shape (m, n), singular or not."""
         return self.affine_map(matrix)
@@ -196,7 +194,7 @@ class Polytope(PolytopeArrays, ConvexSet):
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
 
-        It is part of the set moved by minus a point of the other. If it is flat, rounding decides if it is empty.
+        If the difference is flat, rounding decides whether it is empty.
 
         Raises
         ------
@@ -212,16 +210,19 @@ class Polytope(PolytopeArrays, ConvexSet):
         widths = dd.supports(other.vertices, rows)
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
-        return self.translate(-other.vertices[0])._with_rows(rows, less, self.centre)
+        lower, upper = np.array(self.bounding_box()) - other.bounding_box()
+        found = self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
+        return self._of_rows(rows, less, self.centre) if found.is_empty else found
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
-        sets = (self, *map(self._need_other, others))
-        # Start in the lowest dimension, in the smallest coordinates (to 2^16 in volume), with most facets.
-        found, *rest = sorted(sets, key=lambda one: (one.dimension, np.log2(one.scale).sum() // 16, -len(one.facets)))
-        for one in rest:
+        sets = sorted((self, *map(self._need_other, others)), key=lambda one: (one.dimension, -len(one.facets)))
+        found = sets[0]
+        for one in sets[1:]:
             if not found.is_empty:
-                found = found._with_rows(*one._rows(one.centre), one.centre)
+                ends = np.array([found.bounding_box(), one.bounding_box()])
+                box = ends[:, 0].max(axis=0), ends[:, 1].min(axis=0)
+                found = found._with_rows(*one._rows(one.centre), one.centre, box)
         return found
 
     def convex_hull(self, *others: Polytope) -> Polytope:
@@ -288,8 +289,6 @@ class Polytope(PolytopeArrays, ConvexSet):
         if need_set("other", other, Polytope).space != self.space:
             raise ValueError(f"other must be a polytope in R^{self.space}, as this one: got {other!r}")
         return other
-
-    # Measures ---------------------------------------------------------------------------------------------------------
 
     def support_function(self, directions: ArrayLike) -> Floats:
         """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the empty set. O(v n)."""
