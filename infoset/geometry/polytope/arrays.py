@@ -267,7 +267,7 @@ class PolytopeArrays:
     def _with_rows(
         self, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Any = None, recompute: bool = True
     ) -> Self:
-        """Return the part where rows (x - origin) <= limits, between the ends of a `box` if known; or the set itself."""
+        """Return the part where rows (x - origin) <= limits, between the ends of a `box`, if known; or the set."""
         limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
         own, ends = self._rows(self.centre)
         everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
