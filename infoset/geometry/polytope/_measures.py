@@ -18,8 +18,8 @@ _PRECISION = 1e-14
 def simplices_of(sides: Flags, dimension: int) -> Integers:
     """Return the vertices of simplices that divide a polytope, shape (k, d + 1).
 
-    `sides`, shape (f, v), are which vertices are on each facet. A face is the union of the pyramids over those of its
-    own facets that do not contain its first vertex, which are intersections of it with others.
+    `sides[i, j]`, shape (f, v), is whether vertex j is on facet i. A face is the union of the pyramids over those of
+    its own facets that do not contain its first vertex, which are intersections of it with others.
 
     References
     ----------

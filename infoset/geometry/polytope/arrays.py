@@ -6,7 +6,7 @@ import itertools
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,8 @@ from infoset.limits import COUNT
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
+Box = tuple[Floats, ...]
+"""Minimum and maximum coordinates, each of shape (n,); empty if they are not known."""
 FLAT = 1e-11
 """Thickness below which points are flat, in coordinates in which they are one wide: ten tolerances of the kernel."""
 _FAR = 16.0
@@ -185,7 +187,7 @@ class PolytopeArrays:
         return replace(self, points=points, facets=facets)
 
     @classmethod
-    def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: tuple[Floats, ...] = ()) -> Self:
+    def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Box = ()) -> Self:
         """Return {x: rows (x - origin) <= limits}.
 
         The coordinates in which the set is round are not known before the set, so it is computed again if others are
@@ -265,13 +267,13 @@ class PolytopeArrays:
         return replace(self, points=points[used], facets=self.facets[sides], incidence=incidence)
 
     def _with_rows(
-        self, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Any = None, recompute: bool = True
+        self, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Box = (), recompute: bool = True
     ) -> Self:
         """Return the part where rows (x - origin) <= limits, between the ends of a `box`, if known; or the set."""
         limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
         own, ends = self._rows(self.centre)
         everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
-        if box is not None and (_FINE * (box[1] - box[0]) < before * self.scale).any():
+        if box and (_FINE * (box[1] - box[0]) < before * self.scale).any():
             better = self._of_rows(*everything, box)
             if not better.is_empty:
                 return better

@@ -51,7 +51,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     The arrays are stored in scaled coordinates y, x = `centre` + `scale` y, with powers of two, which round nothing:
     `points`, shape (v, n), and rows (a, b) of `facets`, a . y <= b, shape (f, n + 1), and of `equations`, a . y = b,
-    shape (n - dimension, n + 1). `incidence`, shape (v, f), is which vertex is on which facet.
+    shape (n - dimension, n + 1). `incidence[i, j]`, shape (v, f), is whether vertex i is on facet j.
 
     Operations on the empty set give the empty set; points such as its centroid do not exist (EmptyPolytopeError). All
     arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
