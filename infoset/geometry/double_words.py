@@ -1,14 +1,18 @@
-"""Sums and products of two floats with their rounding errors, compiled: one float more holds what was rounded away."""
+"""Sums and products with their rounding errors, compiled: one float more holds what was rounded away."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
+from infoset.arrays import Floats
 from infoset.kernels import Kernels
 
+EPS = float(np.finfo(np.float64).eps)
 _kernels = Kernels()  # without fast-math: reordered sums would lose the errors
 
 
@@ -37,3 +41,42 @@ def two_product(a: float, b: float) -> tuple[float, float]:
     """Return the rounded product and its rounding error."""
     product = a * b
     return product, _fused(a, b, -product)
+
+
+@_kernels.allocation_free
+def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
+    """Return start + a . b as the sum of two numbers, as exact as with doubled digits (Ogita, Rump and Oishi)."""
+    high, low = start, 0.0
+    for i in range(len(b)):
+        product, rounded = two_product(a[i], b[i])
+        high, lost = two_sum(high, product)
+        low += lost + rounded
+    return two_sum(high, low)
+
+
+@_kernels.compiled
+def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats, Floats]:
+    """Return matrix x + shift of points, shape (k, m), rounded once, and the maximum rounding errors, shape (m,)."""
+    image, errors = np.empty((len(points), len(matrix))), np.zeros(len(matrix))
+    for j in range(len(matrix)):
+        for i in range(len(points)):
+            image[i, j], low = precise_dot(matrix[j], points[i], shift[j])
+            errors[j] = max(errors[j], abs(low))
+    return image, errors
+
+
+@_kernels.compiled
+def supports(points: Floats, normals: Floats) -> Floats:
+    """Return max normal . point of each normal, shape (f,), rounded up from nearly exact products."""
+    result = np.full(len(normals), -np.inf)
+    for f in range(len(normals)):
+        for i in range(len(points)):
+            height, terms = 0.0, 0.0
+            for j in range(points.shape[1]):
+                height += normals[f, j] * points[i, j]
+                terms += abs(normals[f, j] * points[i, j])
+            # Only points that may be highest are worth the precise product.
+            if height + 8.0 * EPS * terms >= result[f]:
+                high, low = precise_dot(normals[f], points[i], 0.0)
+                result[f] = max(result[f], math.nextafter(high, math.inf) if low > 0.0 else high)
+    return result

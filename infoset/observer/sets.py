@@ -202,11 +202,7 @@ class Member:
         if not (_SMALL * widths < before).any():
             return self
         larger = self._apply("enlarged", POLYTOPE_SLACK * before)
-        with suppress(UncertainHullError, UnboundedPolytopeError):
-            better = Polytope.from_constraints(*larger.polytope.constraints())
-            if better.dimension == better.space:  # not a thin set that rounding has made flat or empty
-                return replace(larger, polytope=better)
-        return larger
+        return replace(larger, polytope=larger.polytope.recomputed())
 
     def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
         """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w.
@@ -342,9 +338,11 @@ def polytope_of(shape: Set) -> Polytope:
 
 def _is_thin(one: Polytope) -> bool:
     """Whether rounding decides about the facets of a set with an interior."""
-    rows = one.facets[:, :-1]
-    depths = one.facets[:, -1] - (one.points @ rows.T).min(axis=0)
-    return bool((depths < _MIN_DEPTH * np.abs(rows).sum(axis=1)).any())
+    rows, ends = one.facets[:, :-1], one.facets[:, -1]
+    least = _MIN_DEPTH * np.abs(rows).sum(axis=1)
+    if (ends - rows @ one.points.mean(axis=0) >= least).all():  # a point is deep inside
+        return False
+    return bool((ends - (one.points @ rows.T).min(axis=0) < least).any())
 
 
 def sizes_of(shape: Set) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
+from infoset.geometry.double_words import EPS, affine_image, supports
 from infoset.geometry.polygon_arrays import PolygonArrays
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import orthonormal
@@ -25,18 +26,12 @@ if TYPE_CHECKING:
 Box = tuple[Floats, ...]
 """Minimum and maximum coordinates, each of shape (n,); empty if they are not known."""
 FLAT = 1e-11
-"""Thickness below which points are flat, in coordinates in which they are one wide: ten tolerances of the kernel."""
-_FAR = 16.0
-"""Ratio of coordinates to widths from which a set has a centre: differences from the centre are then exact."""
-_ROUND = 64.0
-"""Ratio of coordinates to a scale beyond which better coordinates are worth a second computation."""
-_VOID = 1e-13
-"""Violation of a row without a direction, relative to the largest offset, that is rounding."""
-_SHORT = 1e-15
-"""Length of a row, relative to the longest one, below which it has no direction."""
+"""Thickness below which points are flat, in coordinates in which they are one wide, and movement of their vertices."""
+_THIN = 1e-10
+"""Width of a set, relative to the coordinates, below which rounding would fill it: the minimum of a scale."""
 _FINE = 2.0**14
 """Ratio of widths from which a part is computed again in its own coordinates: it is known to 1e-12 of the whole."""
-_JOGGLES = (0.0, 1e-10, 1e-8, 1e-6)
+_JOGGLES = (0.0, 3e-10, 1e-6)
 """Movements of points or half-spaces, one after the other, until vertices and facets agree."""
 
 
@@ -65,8 +60,8 @@ class PolytopeArrays:
         `flat` is the relative thickness below which a set counts as flat: greater for points that are known to fewer
         digits. The facets are the rays of a double description: O(m f) for f facets in the plane, O(m f^2) at worst.
         """
-        array = finite_values("points", points, "m", "n")
-        centre, scale = coordinates(array.min(axis=0), array.max(axis=0))
+        array = finite_values("points", points, "m", "n").copy()  # in the order for which kernels are compiled
+        centre, scale = dd.coordinates(array.min(axis=0), array.max(axis=0), np.zeros(array.shape[1]), _THIN)
         return cls._hull((array - centre) / scale, centre, scale, flat)
 
     @classmethod
@@ -89,7 +84,7 @@ class PolytopeArrays:
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
         """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds are equal. Exact."""
         minimum, most = box_ends(lower, upper, "n")
-        centre, scale = coordinates(minimum, most, np.zeros(len(minimum)))
+        centre, scale = dd.coordinates(minimum.copy(), most.copy(), np.zeros(len(minimum)), 0.0)
         least, top = (minimum - centre) / scale, (most - centre) / scale
         ends = [dict.fromkeys(pair) for pair in zip(least, top, strict=True)]
         points, unit, wide = np.array(list(itertools.product(*ends))), np.eye(len(least)), least < top
@@ -151,8 +146,7 @@ class PolytopeArrays:
             raise UncertainHullError("the set is the hull of points")
         start, space = np.column_stack([points, np.ones(len(points))]), points.shape[1]
         chosen, columns = dd.pivots(start, flat, 0)
-        own, rest = columns[1:], np.delete(np.arange(space), columns[1:])
-        dimension = len(own)
+        own, rest, dimension = columns[1:], np.delete(np.arange(space), columns[1:]), len(columns) - 1
         equations = np.eye(space, space + 1)[rest]
         slopes = np.linalg.solve(start[chosen][:, [*own, space]], points[np.ix_(chosen, rest)]).T
         equations[:, own], equations[:, -1] = -slopes[:, :-1], slopes[:, -1]
@@ -170,20 +164,12 @@ class PolytopeArrays:
         else:
             raise UncertainHullError(f"rounding decides which of {len(points)} points are vertices")
         facets, normals = np.zeros((len(sides), space + 1)), np.ascontiguousarray(rays[sides, :-1])
-        facets[:, own], facets[:, -1] = normals, dd.supports(inner, normals)
+        facets[:, own], facets[:, -1] = normals, supports(inner, normals)
         return cls(points[used], facets, equations, incidence, centre, scale)
 
     def _around(self, by: Floats) -> Self:
-        """Return a set that contains {y + e: |e_i| <= by_i}, in scaled coordinates, `by` of shape (n,).
-
-        Facets move outward, and vertices to the outer sides of their facets.
-        """
-        facets = self.facets * _units(self.facets)
-        if not by.any():
-            return replace(self, facets=facets)
-        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1]) @ by + dd.EPS * np.abs(facets[:, -1])
-        flat, most = len(self.equations) > 0, dd.TIP + 32.0 * float(by.max())
-        points = dd.push_out(self.points, facets, self.incidence, np.ones(len(self.points), bool), flat, most)
+        """Return a set that contains {y + e: |e_i| <= by_i}, in scaled coordinates, `by` of shape (n,)."""
+        points, facets = dd.around(self.points, self.facets, self.incidence, by, len(self.equations) > 0)
         return replace(self, points=points, facets=facets)
 
     @classmethod
@@ -210,7 +196,8 @@ class PolytopeArrays:
             box = found.bounding_box()
         with suppress(EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError):
             for _ in range(3):
-                better = cls._intersect(rows, limits, origin, *coordinates(*box))
+                around = dd.coordinates(box[0], box[1], np.zeros(rows.shape[1]), _THIN)
+                better = cls._intersect(rows, limits, origin, *around)
                 box, found = better.bounding_box(), better
                 if found._is_round:
                     break
@@ -218,9 +205,9 @@ class PolytopeArrays:
 
     @property
     def _is_round(self) -> bool:
-        """Whether no other coordinates are much better; in none the empty set has points."""
-        widths = np.ptp(self.points, axis=0) if len(self.points) else 1.0
-        return bool(np.abs(self.points).max(initial=0.0) <= _ROUND and np.min(widths) * _ROUND >= 1.0)
+        """Whether no other coordinates are much better, by a factor of 64; in none the empty set has points."""
+        points = self.points
+        return self.is_empty or bool(np.abs(points).max() <= 64.0 and np.ptp(points, axis=0).min() >= 1.0 / 64.0)
 
     @classmethod
     def _intersect(cls, rows: Floats, limits: Floats, origin: Floats | float, centre: Floats, scale: Floats) -> Self:
@@ -243,8 +230,7 @@ class PolytopeArrays:
             free = np.linalg.svd(table)[2][-1:] if rank <= space else rays[~ends]
             if len(free):
                 raise UnboundedPolytopeError(free[0, :-1] * scale)
-            on = on[:, 1:].copy()  # no point lies on the first row
-            start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), on, centre, scale)
+            start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), on[:, 1:].copy(), centre, scale)
             with suppress(UncertainHullError):
                 return start._reduced(0)
         raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet")
@@ -254,10 +240,9 @@ class PolytopeArrays:
 
         Facets on which all vertices lie are equations of a set of lower dimension: the hull of its vertices.
         """
-        whole, new = self.incidence.all(axis=0), np.asarray(self.incidence[:, old:].any(axis=1))
-        flat = bool(whole.any()) or len(self.points) <= self.dimension
+        flat = len(self.points) <= self.dimension or bool(self.incidence.all(axis=0).any())
         still = flat or len(self.equations) > 0
-        points = dd.push_out(self.points, self.facets, self.incidence & ~whole, new, still, dd.TIP)
+        points = dd.push_out(self.points, self.facets, self.incidence, old, still, FLAT if still else dd.TIP)
         if flat:
             hull = self._hull(points, self.centre, self.scale, 1e2 * FLAT)
             if hull.dimension == self.dimension:  # of a thin set, the bits of the facets are rounding
@@ -271,34 +256,40 @@ class PolytopeArrays:
     ) -> Self:
         """Return the part where rows (x - origin) <= limits, between the ends of a `box`, if known; or the set."""
         limits, before = _moved(rows, limits, self.centre - origin), np.ptp(self.points, axis=0)
-        own, ends = self._rows(self.centre)
-        everything = np.vstack([own, rows]), np.append(ends, limits), self.centre
         if box and (_FINE * (box[1] - box[0]) < before * self.scale).any():
-            better = self._of_rows(*everything, box)
-            if not better.is_empty:
+            better = self._again(rows, limits, box)
+            if better.dimension == self.dimension:  # in these coordinates rounding decides about flatter parts
                 return better
         scaled, possible = _scaled_rows(rows, limits, self.scale)
         heights = self.points @ scaled[:, :-1].T - scaled[:, -1]
-        cuts = np.flatnonzero(heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max())))
+        cuts = scaled[heights.max(axis=0) > dd.ON * max(1.0, float(np.abs(self.points).max()))]
         if not len(cuts) and possible:
             return self
-        rays, count = np.column_stack([self.points, np.ones(len(self.points))]), len(self.facets)
-        bits = dd.packed(np.hstack([self.incidence, np.zeros((len(rays), len(cuts)), np.bool_)]))
-        for number, row in enumerate(scaled[cuts] * ([-1.0] * self.space + [1.0]), count):
-            rays, bits = dd.insert(rays, bits, row, number, self.dimension - 1, True)
+        rays, on = np.column_stack([self.points, np.ones(len(heights))]), np.zeros((len(heights), len(cuts)), np.bool_)
+        numbers, table = len(self.facets) + np.arange(len(cuts)), cuts * ([-1.0] * self.space + [1.0])
+        rays, on = dd.insert_rows(rays, np.hstack([self.incidence, on]), table, numbers, self.dimension - 1, True)
         if not len(rays) or not possible:
             return self.empty(self.space)
-        facets = np.vstack([self.facets, scaled[cuts]])
-        part = replace(self, points=rays[:, :-1].copy(), facets=facets, incidence=dd.unpacked(bits, len(facets)))
+        part = replace(self, points=rays[:, :-1].copy(), facets=np.vstack([self.facets, cuts]), incidence=on)
         if not recompute:
-            return part._reduced(count)
+            return part._reduced(len(self.facets))
         widths = np.ptp(part.points, axis=0)
         # An axis along which the part has no width is no reason: its equations fix that coordinate.
         with suppress(UncertainHullError):
             if not ((_FINE * widths < before) & (widths > FLAT * before)).any():
-                return part._reduced(count)
-        better = self._of_rows(*everything, part.bounding_box())
-        return part._reduced(count) if better.is_empty else better
+                return part._reduced(len(self.facets))
+        better = self._again(rows, limits, part.bounding_box())
+        return part._reduced(len(self.facets)) if better.is_empty else better
+
+    def recomputed(self) -> Self:
+        """Return the set computed from its facets in coordinates in which it is round; itself if rounding decides."""
+        better = self if self.is_empty else self._again(np.zeros((0, self.space)), np.zeros(0), self.bounding_box())
+        return better if better.dimension == self.dimension else self
+
+    def _again(self, rows: Floats, limits: Floats, box: Box) -> Self:
+        """Return the part where rows (x - centre) <= limits, computed in the coordinates of a `box` around it."""
+        own, ends = self._rows(self.centre)
+        return self._of_rows(np.vstack([own, rows]), np.append(ends, limits), self.centre, box)
 
     @property
     def space(self) -> int:
@@ -337,9 +328,9 @@ class PolytopeArrays:
         if self.is_empty:
             return -np.ones(1)
         if len(self.equations):
-            return dd.supports(self.vertices, self.normals)
+            return supports(self.vertices, self.normals)
         rows, limits = self._rows()
-        lengths, rounding = np.linalg.norm(rows, axis=1), 4.0 * dd.EPS * np.abs(self.vertices).max(axis=0)
+        lengths, rounding = np.linalg.norm(rows, axis=1), 4.0 * EPS * np.abs(self.vertices).max(axis=0)
         rounded = (np.frexp(lengths)[0] != 0.5) | (self.centre.any() & (rows != 0.0)).any(axis=1)
         return np.asarray(limits / lengths + rounded * (np.abs(self.normals) @ rounding))
 
@@ -351,7 +342,7 @@ class PolytopeArrays:
     @cached_property
     def levels(self) -> Floats:
         """Levels of the affine hull, shape (n - dimension,): across x = levels."""
-        return 0.5 * dd.supports(self.vertices, self.across) - 0.5 * dd.supports(self.vertices, -self.across)
+        return 0.5 * supports(self.vertices, self.across) - 0.5 * supports(self.vertices, -self.across)
 
     @cached_property
     def _steps(self) -> Floats:
@@ -382,13 +373,7 @@ class PolytopeArrays:
         return rows, _moved(rows, sides[:, -1], origin - self.centre)
 
     def needed(self) -> Self:
-        """Return the set itself.
-
-        Raises
-        ------
-        EmptyPolytopeError
-            If it is empty.
-        """
+        """Return the set itself; an EmptyPolytopeError is raised if it is empty."""
         if self.is_empty:
             raise EmptyPolytopeError("the polytope is empty")
         return self
@@ -400,15 +385,6 @@ class PolytopeArrays:
     def __repr__(self) -> str:
         kind = "empty polytope" if self.is_empty else f"polytope of dimension {self.dimension}"
         return f"<{kind} in R^{self.space}: {len(self.points)} vertices, {len(self.facets)} facets>"
-
-
-def coordinates(lower: Floats, upper: Floats, minimum: Floats | None = None) -> tuple[Floats, Floats]:
-    """Return a centre and scales, powers of two, for a set between two points, or as wide as `minimum`, each (n,)."""
-    sizes = np.maximum(np.abs(lower), np.abs(upper))
-    # By default a scale is at least 1e-10 of the coordinates: rounding would fill the width of a thinner set.
-    widths = np.maximum(upper - lower, 1e-10 * sizes if minimum is None else minimum)
-    scale = np.ldexp(1.0, np.frexp(np.where(widths > 0.0, widths, 1.0))[1] - 1)
-    return np.where(sizes > _FAR * scale, 0.5 * lower + 0.5 * upper, 0.0), scale
 
 
 def _guess(rows: Floats, limits: Floats, share: float) -> Floats:
@@ -425,24 +401,15 @@ def _guess(rows: Floats, limits: Floats, share: float) -> Floats:
     return np.asarray(np.ldexp(1.0, np.frexp(sizes)[1]))
 
 
-def _units(rows: Floats) -> Floats:
-    """Return powers of two, shape (m, 1): times these, the largest entry of each row is from 1/2 to 1."""
-    return np.asarray(np.ldexp(1.0, -np.frexp(np.abs(rows).max(axis=1, keepdims=True))[1]))
-
-
 def _moved(rows: Floats, limits: Floats, shift: Floats) -> Floats:
     """Return the limits of rows (x - shift) from those of rows x."""
-    return dd.affine_image(shift[None], -rows, limits.copy())[0][0] if shift.any() else limits
+    return affine_image(shift[None], -rows, limits.copy())[0][0] if shift.any() else limits
 
 
 def _scaled_rows(rows: Floats, limits: Floats, scale: Floats) -> tuple[Floats, bool]:
-    """Return rows (a, b), a . y <= b with x = scale y, and whether rows without a direction hold.
-
-    A row whose length is rounding has no direction.
-    """
+    """Return rows (a, b), a . y <= b with x = scale y, and whether rows without a direction hold, to rounding."""
     table = np.column_stack([rows * scale, limits])
     sizes = np.abs(table[:, :-1]).max(axis=1)
-    directed = sizes > _SHORT * sizes.max(initial=0.0)
-    possible = bool((limits[~directed] >= -_VOID * np.abs(limits).max(initial=1e-300)).all())
-    table = table[directed]
-    return table * _units(table), possible
+    directed = sizes > 1e-15 * sizes.max(initial=0.0)  # a length below is rounding
+    possible = bool((limits[~directed] >= -1e-13 * np.abs(limits).max(initial=1e-300)).all())
+    return dd.in_units(table[directed]), possible

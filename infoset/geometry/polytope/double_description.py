@@ -2,7 +2,8 @@
 
 A polytope {y: a . y <= b} is the cone {(y, t): b t - a . y >= 0, t >= 0}; its vertices are the extreme rays with t = 1
 (`affine`). In the dual, points y are the rows (-y, 1) of a cone whose extreme rays are the facets (a, b). Incidence is
-stored as bits: bit i of a ray is set if the ray lies on row i. A row's longest entry is about one.
+stored as bits: bit i of a ray is set if the ray lies on row i. A row's longest entry is about one. The second half of
+the file has the other kernels of polytopes: images, sums with a segment, and the outward movement by rounding.
 
 References
 ----------
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry.double_words import two_product, two_sum
+from infoset.geometry.double_words import EPS, affine_image, precise_dot, supports, two_sum
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.kernels import Kernels
 
@@ -29,37 +30,26 @@ ON = 1e-12
 COLLINEAR = 1e-9
 """Distance of a ray from the plane of two others that contains it. A wrong one adds only points of the set."""
 TIP = 1e-12
-"""Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates."""
-_MOVES = 60
-"""Maximum number of moves of a vertex across its facets."""
-_SWEEP = 3
-"""Number of moves that are orthogonal to each other: longer sweeps move farther at sharp corners, shorter ones more."""
-MAX_CROSSINGS = 50_000
-"""Number of edges that cross one row from which rounding decides: a larger set would take minutes for the next row."""
-EPS = float(np.finfo(np.float64).eps)
-
-_1 = np.uint64(1)
+"""Maximum movement of a vertex to the outer sides of its facets, in scaled coordinates, of a set with an interior."""
 
 
 @_kernels.inlined
-def _common(one: Bits, other: Bits) -> int:
-    """Return the number of common bits."""
+def _ones(word: Any) -> int:
+    """Return the number of bits of a word: LLVM makes one instruction of the loop, or one for several words."""
     count = 0
-    for word in range(len(one)):
-        left = one[word] & other[word]
-        while left:  # LLVM makes one instruction of this loop
-            left &= left - _1
-            count += 1
+    while word:
+        word &= word - np.uint64(1)
+        count += 1
     return count
 
 
-@_kernels.inlined
-def _within(one: Bits, other: Bits, holder: Bits) -> bool:
-    """Whether a set of bits holds all common bits of two others."""
-    for word in range(len(one)):  # noqa: SIM110 - Numba compiles no generator
-        if one[word] & other[word] & ~holder[word]:
-            return False
-    return True
+@_kernels.allocation_free
+def _common(one: Bits, others: Bits, counts: Integers) -> None:
+    """Write the numbers of common bits of a set, shape (words,), and of others, shape (words, k)."""
+    counts[:] = 0
+    for word in range(len(one)):
+        for k in range(len(counts)):
+            counts[k] += _ones(one[word] & others[word, k])
 
 
 @_kernels.inlined
@@ -80,8 +70,14 @@ def _size(ray: Floats) -> float:
     return size
 
 
+@_kernels.inlined
+def _unit(ray: Floats) -> float:
+    """Return a power of two: times this, the maximum absolute entry is from 1/2 to 1."""
+    return math.ldexp(1.0, -math.frexp(_size(ray))[1])
+
+
 @_kernels.allocation_free
-def _forbids(rays: Floats, signs: Integers, p: Any, q: Any, k: int) -> bool:
+def _forbids(rays: Floats, heights: Floats, p: Any, q: Any, k: int) -> bool:
     """Whether a third ray k, on all rows on which p and q lie, shows that p and q span no edge.
 
     Rounding can leave three rays in the plane of one edge: k forbids the edge only if it is between p and q or
@@ -105,15 +101,26 @@ def _forbids(rays: Floats, signs: Integers, p: Any, q: Any, k: int) -> bool:
     if away > COLLINEAR**2 * kk:
         return True
     near_p, near_q = abs(beta) * math.sqrt(qq / kk) < COLLINEAR, abs(alpha) * math.sqrt(pp / kk) < COLLINEAR
-    if near_p:
-        return bool(signs[k] == signs[p] and k < p)
-    if near_q:
-        return bool(signs[k] == signs[q] and k < q)
+    if near_p or near_q:
+        twin = p if near_p else q
+        return bool(heights[k] * heights[twin] > 0.0 and k < twin)
     return alpha > 0.0 and beta > 0.0
 
 
 @_kernels.allocation_free
-def _combine(p: Floats, q: Floats, alpha: float, beta: float, affine: bool, result: Floats) -> None:
+def _is_edge(rays: Floats, bits: Bits, heights: Floats, others: Integers, p: Any, q: Any) -> bool:
+    """Whether none of the `others`, numbers of rays, forbids an edge between p and q."""
+    for k in others:
+        holds = k not in (p, q)
+        for word in range(bits.shape[1]):
+            holds &= not bits[p, word] & bits[q, word] & ~bits[k, word]
+        if holds and _forbids(rays, heights, p, q, k):
+            return False
+    return True
+
+
+@_kernels.allocation_free
+def _combine(p: Floats, q: Floats, alpha: float, beta: float, affine: Any, result: Floats) -> None:
     """Write the ray alpha q + beta p; with t = 1 if it is a point. Coordinates that both points share stay exact."""
     last = len(p) - 1
     total = alpha * q[last] + beta * p[last] if affine else 0.0
@@ -125,81 +132,71 @@ def _combine(p: Floats, q: Floats, alpha: float, beta: float, affine: bool, resu
         return
     for i in range(len(p)):
         result[i] = alpha * q[i] + beta * p[i]
-    result *= math.ldexp(1.0, -math.frexp(_size(result))[1])
+    result *= _unit(result)
 
 
 @_kernels.compiled
-def sides(rays: Floats, row: Floats) -> tuple[Floats, Integers]:
-    """Return the heights row . z of rays, and their signs, 0 for rays on the row."""
-    heights, signs = np.empty(len(rays)), np.zeros(len(rays), np.int64)
-    for i in range(len(rays)):
-        height, length = 0.0, 0.0
-        for j in range(len(row)):
-            height += row[j] * rays[i, j]
-            length = max(length, abs(rays[i, j]))
-        heights[i] = height
-        if abs(height) > ON * length:
-            signs[i] = 1 if height > 0.0 else -1
-    return heights, signs
+def sides(rays: Floats, row: Floats) -> Floats:
+    """Return the heights row . z of rays, 0 for rays on the row."""
+    heights, lengths = np.array([_dot(row, ray) for ray in rays]), np.array([_size(ray) for ray in rays])
+    return np.asarray(heights * (np.abs(heights) > ON * lengths))
+
+
+@_kernels.allocation_free
+def _cross(one: Any, rays: Floats, bits: Bits, heights: Floats, least: int, affine: Any, work: tuple[Any, ...]) -> int:
+    """Write the rays, and their bits, in which edges of one ray cross the row, see `crossings`; return their number."""
+    columns, shared, near, result, marks = work
+    found, count = 0, 0
+    _common(bits[one], columns, shared)
+    for third in range(len(rays)):  # only rays with enough common rows can be the other end, or forbid an edge
+        near[found] = third
+        found += shared[third] >= least
+    for other in near[:found]:
+        p, q = (one, other) if heights[one] > 0.0 else (other, one)
+        if heights[p] > 0.0 > heights[q] and _is_edge(rays, bits, heights, near[:found], p, q):
+            _combine(rays[p], rays[q], heights[p], -heights[q], affine, result[count])
+            for word in range(bits.shape[1]):
+                marks[count, word] = bits[p, word] & bits[q, word]
+            count += 1
+    return count
 
 
 @_kernels.compiled
-def crossings(
-    rays: Floats, bits: Bits, heights: Floats, signs: Integers, least: int, affine: bool
-) -> tuple[Floats, Bits]:
+def crossings(rays: Floats, bits: Bits, heights: Floats, least: int, affine: Any) -> tuple[Floats, Bits]:
     """Return the rays in which edges cross a row, and the common bits of the ends of the edges.
 
-    `heights` and `signs` are those of `sides`, and `least` is the minimum number of rows on which an edge lies. An
-    UncertainHullError is raised if more than `MAX_CROSSINGS` edges cross the row.
-    O(above below (words + k words)) at worst.
+    `heights` are those of `sides`, and `least` is the minimum number of rows on which an edge lies. O(k words) for each
+    ray on the smaller side and each pair with as many rows. From 50 000 edges on it raises an UncertainHullError.
     """
-    (k, size), counts = rays.shape, np.array([_common(one, one) for one in bits])
-    room, count, blocker = 2 * k + 16, 0, 0
-    result, marks = np.empty((room, size)), np.empty((room, bits.shape[1]), np.uint64)
-    below = np.flatnonzero(signs < 0)
-    for p in np.flatnonzero(signs > 0):
-        for q in below:
-            shared = _common(bits[p], bits[q])
-            if shared < least:
-                continue
-            # Two simple vertices with a common line of facets are its ends.
-            simple = shared == least and counts[p] <= least + 1 and counts[q] <= least + 1
-            for step in range(-1, -1 if simple else k):
-                third = blocker if step < 0 else step  # the last one that forbade an edge often does it again
-                holds = third not in (p, q) and _within(bits[p], bits[q], bits[third])
-                if holds and _forbids(rays, signs, p, q, third):
-                    blocker = third
-                    break
-            else:
-                if count == MAX_CROSSINGS:
-                    raise UncertainHullError("rounding decides about vertices: one half-space cuts 50000 edges")
-                if count == room:
-                    room *= 2
-                    result, marks = np.concatenate((result, result)), np.concatenate((marks, marks))
-                _combine(rays[p], rays[q], heights[p], -heights[q], affine, result[count])
-                marks[count] = bits[p] & bits[q]
-                count += 1
+    (k, size), columns, count = rays.shape, np.ascontiguousarray(bits.T), 0
+    result, marks = np.empty((2 * k, size)), np.empty((2 * k, bits.shape[1]), np.uint64)
+    shared, near = np.empty(k, np.int64), np.empty(k, np.int64)
+    fewer = heights < 0.0 if (heights < 0.0).sum() < (heights > 0.0).sum() else heights > 0.0
+    for one in np.flatnonzero(fewer):
+        if count > 50_000:  # a larger set would take minutes for the next row
+            raise UncertainHullError("rounding decides about vertices: one half-space cuts 50000 edges")
+        if count + k > len(result):
+            result, marks = np.concatenate((result, result)), np.concatenate((marks, marks))
+        work = columns, shared, near, result[count:], marks[count:]
+        count += _cross(one, rays, bits, heights, least, affine, work)
     return result[:count], marks[:count]
 
 
 @_kernels.compiled
-def insert(rays: Floats, bits: Bits, row: Floats, number: int, least: int, affine: bool) -> tuple[Floats, Bits]:
+def insert(rays: Floats, bits: Bits, row: Floats, number: int, least: int, affine: Any) -> tuple[Floats, Bits]:
     """Return the rays with row . z >= 0, shape (k, D), and their bits, shape (k, words), for one more row.
 
     One step of the double description: rays on the wrong side go; each edge that crosses the row gives a ray. `number`
     is the bit of the row; see `sides` and `crossings`.
     """
-    heights, signs = sides(rays, row)
-    word, bit = number // 64, _1 << np.uint64(number % 64)
-    marks, on, above = bits.copy(), signs == 0, signs > 0
-    marks[:, word] |= on * bit
-    if (signs >= 0).all():
-        return rays, marks
-    new, new_marks = crossings(rays, bits, heights, signs, least, affine)
-    new_marks[:, word] |= bit
-    # New rays are compared with those on the row, which come first.
-    rays, bits = np.concatenate((rays[on], rays[above], new)), np.concatenate((marks[on], marks[above], new_marks))
-    return _merged(rays, bits, on.sum(), len(rays) - len(new))
+    heights = sides(rays, row)
+    new, marks = crossings(rays, bits, heights, least, affine)
+    on, above = heights == 0.0, heights > 0.0
+    word, bit, touching, old = number // 64, np.uint64(1) << np.uint64(number % 64), on.sum(), (heights >= 0.0).sum()
+    rays, bits = np.concatenate((rays[on], rays[above], new)), np.concatenate((bits[on], bits[above], marks))
+    bits[:touching, word] |= bit
+    bits[old:, word] |= bit
+    return _merged(rays, bits, touching, old)
 
 
 @_kernels.compiled
@@ -219,7 +216,7 @@ def _merged(rays: Floats, bits: Bits, on: int, old: int) -> tuple[Floats, Bits]:
                 bits[i] |= bits[j]
                 kept[j] = False
                 break
-    return rays[kept], bits[kept]
+    return (rays, bits) if kept.all() else (rays[kept], bits[kept])
 
 
 @_kernels.compiled
@@ -228,7 +225,8 @@ def packed(flags: Flags) -> Bits:
     bits = np.zeros((len(flags), (flags.shape[1] + 63) // 64), np.uint64)
     for i in range(len(flags)):
         for j in range(flags.shape[1]):
-            bits[i, j >> 6] |= np.uint64(flags[i, j]) << np.uint64(j & 63)
+            if flags[i, j]:
+                bits[i, j >> 6] |= np.uint64(1) << np.uint64(j & 63)
     return bits
 
 
@@ -238,12 +236,21 @@ def unpacked(bits: Bits, count: int) -> Flags:
     flags = np.empty((len(bits), count), np.bool_)
     for i in range(len(bits)):
         for j in range(count):
-            flags[i, j] = (bits[i, j >> 6] >> np.uint64(j & 63)) & _1 == _1
+            flags[i, j] = bits[i, j >> 6] >> np.uint64(j & 63) & np.uint64(1)
     return flags
 
 
 @_kernels.compiled
-def pivots(rows: Floats, tolerance: float, first: int) -> tuple[Integers, Integers]:
+def insert_rows(rays: Floats, on: Flags, rows: Floats, numbers: Integers, least: int, affine: Any) -> Any:
+    """Return the rays with row . z >= 0 for rows with some `numbers`, and which ray is on which row; see `insert`."""
+    bits = packed(on)
+    for k in range(len(rows)):
+        rays, bits = insert(rays, bits, rows[k], numbers[k], least, affine)
+    return rays, unpacked(bits, on.shape[1])
+
+
+@_kernels.compiled
+def pivots(rows: Floats, tolerance: float, first: Any) -> tuple[Integers, Integers]:
     """Return rows and columns of a regular part of a matrix, shapes (r,), by complete pivoting.
 
     A pivot up to `tolerance` ends it. If `first` >= 0, the first pivot is the last entry of that row.
@@ -261,7 +268,6 @@ def pivots(rows: Floats, tolerance: float, first: int) -> tuple[Integers, Intege
     return chosen, columns
 
 
-@_kernels.compiled
 def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, Flags, int]:
     """Return the extreme rays, shape (k, D), of {z: rows z >= 0}, which ray is on which row, and the rank of the rows.
 
@@ -272,19 +278,12 @@ def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, 
     chosen, _ = pivots(rows, tolerance, 0 if affine else -1)
     if len(chosen) < size:
         return np.empty((0, size)), np.empty((0, m), np.bool_), len(chosen)
-    rays, on = np.ascontiguousarray(np.linalg.inv(rows[chosen]).T), np.zeros((size, m), np.bool_)
-    for i in range(size):
-        if affine:
-            rays[i, -1] = 1.0 if i == 0 else 0.0
-        if not affine or i > 0:
-            rays[i] *= math.ldexp(1.0, -math.frexp(_size(rays[i]))[1])
-        on[:, chosen[i]] = True  # a ray lies on all of these rows but one
-        on[i, chosen[i]] = False
-    bits = packed(on)
-    for i in range(m):
-        if (chosen != i).all():
-            rays, bits = insert(rays, bits, rows[i], i, size - 2, affine)
-    return rays, unpacked(bits, m), size
+    rays, on = np.array(np.linalg.inv(rows[chosen]).T, np.float64, order="C"), np.zeros((size, m), np.bool_)
+    rays[:, -1] = np.eye(size)[0] if affine else rays[:, -1]
+    rays[int(affine) :] = in_units(rays)[int(affine) :]
+    on[:, chosen] = ~np.eye(size, dtype=np.bool_)  # a ray lies on all of these rows but one
+    others = np.delete(np.arange(m), chosen)
+    return *insert_rows(rays, on, rows[others], others, size - 2, affine), size
 
 
 @_kernels.compiled
@@ -293,17 +292,18 @@ def maximal(bits: Bits, least: int) -> tuple[Flags, bool]:
 
     The other value is whether each shares `least` - 1 bits with `least` others: a vertex in d dimensions has d edges.
     """
-    counts, near = np.array([_common(one, one) for one in bits]), np.zeros(len(bits), np.int64)
-    kept = counts >= least
-    for i in range(len(bits)):
+    columns, shared, k = np.ascontiguousarray(bits.T), np.empty(len(bits), np.int64), len(bits)
+    kept, near, counts = np.ones(k, np.bool_), np.zeros(k, np.int64), np.empty(k, np.int64)
+    for i in range(k):
+        _common(bits[i], columns, shared[: i + 1])
+        counts[i] = shared[i]
         for j in range(i):
-            common = _common(bits[i], bits[j])
-            if common >= least - 1:
+            if shared[j] >= least - 1:
                 near[i] += 1
                 near[j] += 1
-                if common == min(counts[i], counts[j]):
+                if shared[j] == min(counts[i], counts[j]):
                     kept[i if counts[i] <= counts[j] else j] = False
-    return kept, bool((near >= least).all())
+    return kept & (counts >= least), bool((near >= least).all())
 
 
 @_kernels.compiled
@@ -312,66 +312,74 @@ def lattice(on: Flags, dimension: int) -> tuple[Integers, Integers, Flags]:
 
     An UncertainHullError is raised unless each vertex has d facets and edges, and each facet d vertices and ridges.
     """
-    used, sides, kept, edges = np.arange(len(on)), np.arange(on.shape[1]), np.zeros(1, np.bool_), False
+    used, sides, kept, edges, ridges = np.arange(len(on)), np.arange(on.shape[1]), np.zeros(1, np.bool_), False, False
     while not kept.all():  # without some of the points, others of the rows are redundant
         bits = packed(on.T)
-        needed, _ = maximal(bits, dimension)
-        sides, on, bits = sides[needed], on[:, needed], bits[needed]
+        needed, ridges = maximal(bits, dimension)
+        if not needed.all():
+            sides, on, ridges = sides[needed], on[:, needed], maximal(bits[needed], dimension)[1]
         kept, edges = maximal(packed(on), dimension)
         used, on = used[kept], on[kept]
-    if not (edges and maximal(bits, dimension)[1] and min(len(used), len(sides)) > dimension):
+    if not (edges and ridges and min(len(used), len(sides)) > dimension):
         raise UncertainHullError("rounding decides which points are vertices of a set")
     return used, sides, on
 
 
-@_kernels.allocation_free
-def precise_dot(a: Floats, b: Floats, start: float) -> tuple[float, float]:
-    """Return start + a . b as the sum of two numbers, as exact as with doubled digits (Ogita, Rump and Oishi)."""
-    high, low = start, 0.0
-    for i in range(len(b)):
-        product, rounded = two_product(a[i], b[i])
-        high, lost = two_sum(high, product)
-        low += lost + rounded
-    return two_sum(high, low)
+@_kernels.compiled
+def coordinates(lower: Floats, upper: Floats, minimum: Floats, share: float) -> tuple[Floats, Floats]:
+    """Return a centre and scales, powers of two, for a set between two points, or as wide as `minimum`, each (n,).
+
+    A scale is at least a `share` of the coordinates. Differences from a centre far away are exact.
+    """
+    centre, scale = np.zeros(len(lower)), np.empty(len(lower))
+    for j in range(len(lower)):
+        size = max(abs(lower[j]), abs(upper[j]))
+        width = max(upper[j] - lower[j], minimum[j], share * size)
+        scale[j] = math.ldexp(1.0, math.frexp(width or 1.0)[1] - 1)
+        if size > 16.0 * scale[j]:
+            centre[j] = 0.5 * lower[j] + 0.5 * upper[j]
+    return centre, scale
 
 
 @_kernels.compiled
-def affine_image(points: Floats, matrix: Floats, shift: Floats) -> tuple[Floats, Floats]:
-    """Return matrix x + shift of points, shape (k, m), rounded once, and the maximum rounding errors, shape (m,)."""
-    image, errors = np.empty((len(points), len(matrix))), np.zeros(len(matrix))
-    for j in range(len(matrix)):
-        for i in range(len(points)):
-            image[i, j], low = precise_dot(matrix[j], points[i], shift[j])
-            errors[j] = max(errors[j], abs(low))
-    return image, errors
+def image(
+    points: Floats, facets: Floats, centre: Floats, scale: Floats, matrix: Floats, offset: Floats
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return points, facets, centre, scale and rounding errors of the image of a set, in its own coordinates.
 
-
-@_kernels.compiled
-def supports(points: Floats, normals: Floats) -> Floats:
-    """Return max normal . point of each normal, shape (f,), rounded up from nearly exact products."""
-    result = np.full(len(normals), -np.inf)
-    for f in range(len(normals)):
-        for i in range(len(points)):
-            height, terms = 0.0, 0.0
-            for j in range(points.shape[1]):
-                height += normals[f, j] * points[i, j]
-                terms += abs(normals[f, j] * points[i, j])
-            # Only points that may be highest are worth the precise product.
-            if height + 8.0 * EPS * terms >= result[f]:
-                high, low = precise_dot(normals[f], points[i], 0.0)
-                result[f] = max(result[f], math.nextafter(high, math.inf) if low > 0.0 else high)
-    return result
+    Facets are none unless the matrix is square with pivots above 1e-6. A facet a y <= b is a' y' <= b + a' s under y' =
+    matrix y + s; a' matrix differs from a by rounding. The hull of points may lack a tip: it gives too small supports.
+    """
+    (m, n), sizes = matrix.shape, np.array([_size(column) for column in points.T])
+    middle, rounded = affine_image(centre.reshape(1, n), matrix, offset)
+    matrix = matrix * scale
+    rough = matrix @ points.T + middle.T
+    lower, upper = np.array([row.min() for row in rough]), np.array([row.max() for row in rough])
+    # Of a coordinate that is zero but for rounding, the errors stay small in the new coordinates.
+    centre, scale = coordinates(lower, upper, 2.0**-10 * (np.abs(matrix) @ sizes), np.float64(0.0))
+    matrix, shift = matrix / scale.reshape(m, 1), (middle - centre) / scale
+    result, errors = affine_image(points, matrix, shift[0])
+    errors += rounded / scale
+    units = np.array([_size(column) for column in matrix.T]) + 1e-300  # its condition does not depend on them
+    if not m == n == len(pivots(matrix / units, 1e-6, np.int64(-1))[0]):
+        return result, facets[:0], centre, scale, errors
+    normals = np.ascontiguousarray(facets[:, :n]) @ np.linalg.inv(matrix)
+    back, low = affine_image(normals, np.ascontiguousarray(matrix.T), np.zeros(n))
+    away = (np.abs(back - facets[:, :n]) + low) @ sizes
+    ends, lost = affine_image(shift, normals, facets[:, n].copy())
+    outer = np.where(away + lost > 0.0, np.nextafter(ends[0] + (away + lost), np.inf), ends[0])
+    return result, np.column_stack((normals, outer)), centre, scale, errors
 
 
 @_kernels.allocation_free
 def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, step: Floats) -> bool:
     """Enlarge a step until it moves a point by its needs across its facets, and return whether it does.
 
-    Each move is across the facet that is missed most, and along those of the moves before in its sweep. At a sharp
-    corner it may fail. `basis`, shape (`_SWEEP`, n), is a working array.
+    Each move is across the facet that is missed most, and along those of the moves before in its sweep: at sharp
+    corners, longer sweeps would move farther, shorter ones more often; it may fail. `basis`, shape (3, n), is for work.
     """
     size = 0
-    for _ in range(_MOVES):
+    for _ in range(60):
         facet, most = -1, EPS * math.sqrt(_dot(step, step))  # far below the rounding of the coordinates
         for m in range(len(mine)):
             gap = needs[m] - _dot(step, facets[mine[m]])
@@ -398,36 +406,102 @@ def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, 
     return False
 
 
+@_kernels.allocation_free
+def _move_out(
+    point: Floats, facets: Floats, mine: Integers, centre: Floats, flat: bool, most: float, work: Any
+) -> None:
+    """Move a point, in place, to the outer sides of its facets, with the numbers `mine`; see `push_out`."""
+    needs, step, basis = work
+    inside, rounding = False, len(point) * EPS * (1.0 + _size(point))  # that of the new coordinates
+    for m in range(len(mine)):
+        height, _ = precise_dot(facets[mine[m]], point, -facets[mine[m], -1])
+        inside |= height < 0.0
+        needs[m] = rounding - height
+    if not inside:
+        return
+    step[:] = 0.0
+    if flat or not _cross_facets(facets, mine, needs, basis, step):
+        factor = 0.0
+        for j in range(len(point)):
+            step[j] = point[j] - centre[j]
+        for m in range(len(mine)):
+            along = _dot(step, facets[mine[m]])
+            if along > 0.0 and needs[m] > factor * along:
+                factor = needs[m] / along
+        step *= factor
+    share = min(1.0, most / math.sqrt(_dot(step, step) + 1e-300))
+    for j in range(len(point)):
+        point[j] += share * step[j]
+
+
 @_kernels.compiled
-def push_out(points: Floats, facets: Floats, on: Flags, chosen: Flags, flat: bool, most: float) -> Floats:
-    """Return points, shape (v, n): the `chosen` ones are not inside a facet on which they lie, if `most` allows.
+def push_out(points: Floats, facets: Floats, on: Flags, old: Any, flat: bool, most: float) -> Floats:
+    """Return points, shape (v, n): those on facets after the first `old` are not inside their facets, if `most` allows.
 
     Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
     its outer side covers the set. A point that is exactly on its facets stays. The others move across their facets
     (`_cross_facets`), or where this fails, at a sharp corner, and in a `flat` set, away from the centre. No point moves
     by more than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
     """
-    n, f = points.shape[1], len(facets)
-    result, middle, basis = points.copy(), points.sum(axis=0) / len(points), np.empty((min(_SWEEP, n), n))
-    numbers, gaps, step = np.empty(f, np.int64), np.empty(f), np.empty(n)
-    for i in np.flatnonzero(chosen):
-        inside, count, rounding = False, 0, n * EPS * (1.0 + _size(points[i]))  # that of the new coordinates
-        for k in range(f):
-            if on[i, k]:
-                height, _ = precise_dot(facets[k, :n], points[i], -facets[k, n])
-                inside |= height < 0.0
-                numbers[count], gaps[count] = k, rounding - height
-                count += 1
-        if not inside:
-            continue
-        mine, needs = numbers[:count], gaps[:count]
-        step[:] = 0.0
-        if flat or not _cross_facets(facets, mine, needs, basis, step):
-            away, factor = points[i] - middle, 0.0
-            for m in range(count):
-                along = _dot(away, facets[mine[m]])
-                if along > 0.0 and needs[m] > factor * along:
-                    factor = needs[m] / along
-            step[:] = factor * away
-        result[i] += min(1.0, most / math.sqrt(_dot(step, step) + 1e-300)) * step
+    n, f, result, centre = points.shape[1], len(facets), points.copy(), points.sum(axis=0) / len(points)
+    work, mine = (np.empty(f), np.empty(n), np.empty((min(3, n), n))), np.empty(f, np.int64)
+    whole = np.array([on[:, k].all() for k in range(f)])  # rows of the affine hull
+    for i in range(len(points)):
+        if on[i, old:].any():
+            count = 0
+            for k in range(f):
+                mine[count] = k
+                count += on[i, k] > whole[k]
+            _move_out(result[i], facets, mine[:count], centre, flat, most, work)
     return result
+
+
+@_kernels.compiled
+def in_units(rows: Floats) -> Floats:
+    """Return rows times powers of two: the maximum absolute entry of each row is from 1/2 to 1."""
+    return np.asarray(rows * np.array([_unit(row) for row in rows]).reshape(-1, 1))
+
+
+@_kernels.compiled
+def around(points: Floats, facets: Floats, on: Flags, by: Floats, flat: bool) -> tuple[Floats, Floats]:
+    """Return points and facets, in units, moved outward to contain {y + e: |e_i| <= by_i}, `by` of shape (n,)."""
+    facets = in_units(facets)
+    if not by.any():
+        return points, facets
+    for k in range(len(facets)):
+        facets[k, -1] += (1.0 + 8.0 * EPS) * _dot(by, np.abs(facets[k])) + EPS * abs(facets[k, -1])
+    return push_out(points, facets, on, np.int64(0), flat, TIP + 32.0 * by.max()), facets
+
+
+@_kernels.compiled
+def swept(points: Floats, facets: Floats, on: Flags, along: Floats) -> tuple[Floats, Floats, Flags, Floats]:
+    """Return points, facets, incidence and rounding errors of the sum with the segment from -along to along.
+
+    Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet. A vertex
+    moves to an end if it lies on a facet that faces this end.
+    """
+    heights = sides(facets, np.append(along / _size(along), 0.0))
+    # Numba compiles a kernel again for a Python constant, but not for one of NumPy.
+    new, marks = crossings(facets, packed(on.T), heights, len(along) - 1, np.bool_(False))
+    directed = np.array([_size(row[:-1]) > ON for row in new], np.bool_)  # not of two opposite facets
+    new = new[directed]
+    # Two facets that are nearly opposite give a facet in which rounding is large: it holds all vertices.
+    new[:, -1] = supports(points, np.ascontiguousarray(new[:, :-1]))
+    facets, ridges, count = np.concatenate((facets, new)), unpacked(marks[directed], len(points)), 0
+    result, errors = np.empty((2 * len(points), len(along))), np.zeros(len(along))
+    incidence = np.zeros((len(result), len(facets)), np.bool_)
+    for end in (1.0, -1.0):
+        for i in range(len(points)):
+            ahead = False
+            for k in range(len(heights)):
+                ahead |= on[i, k] & (end * heights[k] > 0.0)
+                incidence[count, k] = on[i, k] & (end * heights[k] >= 0.0)
+            if ahead:
+                incidence[count, len(heights) :] = ridges[:, i]
+                for j in range(len(along)):
+                    result[count, j], low = two_sum(points[i, j], end * along[j])
+                    errors[j] = max(errors[j], abs(low))
+                count += 1
+    for k in range(len(facets)):
+        facets[k, -1] += (1.0 + 8.0 * EPS) * abs(_dot(along, facets[k])) + 2.0 * EPS * abs(facets[k, -1])
+    return result[:count], facets, incidence[:count], errors

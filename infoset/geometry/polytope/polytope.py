@@ -22,17 +22,13 @@ from infoset.geometry._set_arguments import (
     present_axes,
 )
 from infoset.geometry.convex_set import ConvexSet
+from infoset.geometry.double_words import EPS, affine_image, supports
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, nearest_difference, simplices_of, triangle_of
-from infoset.geometry.polytope.arrays import PolytopeArrays, coordinates
+from infoset.geometry.polytope.arrays import PolytopeArrays
 from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.geometry.polytope.reduction import reduced_outward
 from infoset.limits import Limits, real_values
-
-_MAX_CONDITION = 1e6
-"""Condition of a matrix, in scaled coordinates, up to which facets are mapped; beyond, they are those of a hull."""
-_THICK = 3e-8
-"""Thickness of a flat set that is enlarged, relative to its coordinates: rounding does not lose it again."""
 
 
 class Polytope(PolytopeArrays, ConvexSet):
@@ -40,8 +36,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v, n), without redundant
     points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
-    rows of `across` are orthonormal. Construct it with `from_vertices`, `from_constraints`, `from_box`, `from_ball` or
-    `from_zonotope`.
+    rows of `across` are orthonormal. The constructors are the methods `from_...`.
 
     One algorithm, the double description, computes all sets. Vertices and facets that are given are kept; those that
     are computed are rounded outward, so that the set contains the exact one, and exceeds it by about 1e-12 of its size.
@@ -72,29 +67,13 @@ class Polytope(PolytopeArrays, ConvexSet):
         Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull, which
         may take long; without `hull` it is an UncertainHullError.
         """
-        rows = finite_values("matrix", matrix, "m", self.space)
-        moved = offset_values(offset, len(rows)).copy()  # kernels are compiled again for arrays that are read-only
+        rows = finite_values("matrix", matrix, "m", self.space).copy()  # kernels are compiled once, for such arrays
+        moved = offset_values(offset, len(rows)).copy()
         if self.is_empty:
             return self.empty(len(rows))
-        shift, rounded = dd.affine_image(self.centre[None], rows, moved)
-        matrix, shift = rows * self.scale, shift[0]
-        rough = self.points @ matrix.T
-        # Of a coordinate that is zero but for rounding, the errors stay small in the new coordinates.
-        minimum = 2.0**-10 * np.abs(matrix) @ np.abs(self.points).max(axis=0)
-        centre, scale = coordinates(rough.min(axis=0) + shift, rough.max(axis=0) + shift, minimum)
-        matrix, shift = matrix / scale[:, None], (shift - centre) / scale
-        points, errors = dd.affine_image(self.points, matrix, shift)
-        errors += rounded / scale
-        units = np.abs(matrix).max(axis=0) + 1e-300  # the condition does not depend on those of the columns
-        if not len(rows) == self.dimension == self.space or np.linalg.cond(matrix / units) > _MAX_CONDITION:
+        points, facets, centre, scale, errors = dd.image(self.points, self.facets, self.centre, self.scale, rows, moved)
+        if self.dimension < self.space or not len(facets):
             return self._hull(points, centre, scale, allowed=hull)._around(errors)
-        normals = self.facets[:, :-1] @ np.linalg.inv(matrix)
-        # A facet a y <= b is a' y' <= b + a' s under y' = matrix y + s; a' matrix differs from a by rounding. The hull
-        # of the vertices may lack a sharp tip, so their supports would be too small.
-        back, _ = dd.affine_image(normals, np.ascontiguousarray(matrix.T), np.zeros(self.space))
-        away = np.abs(back - self.facets[:, :-1]) @ np.abs(self.points).max(axis=0)
-        ends, low = dd.affine_image(shift[None], normals, self.facets[:, -1].copy())
-        facets = np.column_stack([normals, ends[0] + (low + away)])
         return replace(self, points=points, facets=facets, centre=centre, scale=scale)._around(errors)
 
     def translate(self, offset: ArrayLike) -> Polytope:
@@ -111,11 +90,11 @@ class Polytope(PolytopeArrays, ConvexSet):
         if self.is_empty:
             return self.empty(factor.shape[1])
         rows, limits = self._rows(moved)
-        mapped, rounded = dd.affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
+        mapped, rounded = affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
         found = self._of_rows(mapped, limits)
         if found.dimension < found.space or not (rounded.any() or moved.any()):
             return found
-        return found.enlarged(2.0 * dd.EPS * np.abs(found.vertices).max(axis=0))
+        return found.enlarged(2.0 * EPS * np.abs(found.vertices).max(axis=0))
 
     def minkowski_sum(self, other: Polytope) -> Polytope:
         """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two vertices."""
@@ -135,26 +114,11 @@ class Polytope(PolytopeArrays, ConvexSet):
         an UncertainHullError.
         """
         along = finite_values("half", half, self.space)
-        if self.is_empty or not along.any():
+        if self.is_empty or not (along / self.scale).any():
             return self
         if self.dimension < self.space:
             return self.minkowski_sum(self.from_vertices([-along, along]))
-        along = along / self.scale
-        heights, signs = dd.sides(self.facets, np.append(along / np.abs(along).max(), 0.0))
-        ridges = dd.packed(self.incidence.T)
-        new, common = dd.crossings(self.facets, ridges, heights, signs, self.space - 1, False)
-        directed = np.abs(new[:, :-1]).max(axis=1, initial=0.0) > dd.ON  # not of two opposite facets
-        new = new[directed]
-        # Two facets that are nearly opposite give a facet in which rounding is large: it holds all vertices.
-        new[:, -1] = dd.supports(self.points, np.ascontiguousarray(new[:, :-1]))
-        facets, signs = np.vstack([self.facets, new]), np.append(signs, np.zeros(len(new)))
-        on = np.hstack([self.incidence, dd.unpacked(common[directed], len(self.points)).T])
-        # A vertex moves to an end of the segment if it lies on a facet that faces this end.
-        moves = [(on[:, end * signs > 0].any(axis=1), end) for end in (1.0, -1.0)]
-        incidence = np.vstack([on[moved] & (end * signs >= 0) for moved, end in moves])
-        starts = np.vstack([np.column_stack([self.points[moved], np.full(moved.sum(), end)]) for moved, end in moves])
-        points, errors = dd.affine_image(starts, np.column_stack([np.eye(self.space), along]), np.zeros(self.space))
-        facets[:, -1] += (1.0 + 8.0 * dd.EPS) * np.abs(facets[:, :-1] @ along) + 2.0 * dd.EPS * np.abs(facets[:, -1])
+        points, facets, incidence, errors = dd.swept(self.points, self.facets, self.incidence, along / self.scale)
         whole = replace(self, points=points, facets=facets, incidence=incidence)
         try:
             whole = whole._around(errors)._reduced(len(facets))
@@ -179,8 +143,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         # A coordinate that is zero in all points has no scale yet: that of the margin.
         is_zero = (self.points == 0.0).all(axis=0) & (self.centre == 0.0) & (margin > 0.0)
         scale = np.where(is_zero, np.ldexp(1.0, np.frexp(margin)[1]), self.scale)
-        sizes = np.maximum(margin / scale, _THICK * np.abs(self.vertices / scale).max(axis=0))
-        heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, _THICK)
+        sizes = np.maximum(margin / scale, 3e-8 * np.abs(self.vertices / scale).max(axis=0))
+        heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, 3e-8)  # rounding does not lose it again
         points, on = self.points, self.incidence
         for axis, height in zip(self._own_and_others[1], heights, strict=True):
             along, above = np.eye(self.space)[axis] * height, np.repeat([False, True], len(points))
@@ -194,12 +158,7 @@ class Polytope(PolytopeArrays, ConvexSet):
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
 
-        If the difference is flat, rounding decides whether it is empty.
-
-        Raises
-        ------
-        ValueError
-            If the other set is empty and this one is not: every point would satisfy the condition.
+        If it is flat, rounding decides whether it is empty. A ValueError is raised if only the other set is empty.
         """
         self._need_other(other)
         if self.is_empty:
@@ -207,7 +166,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if other.is_empty:
             raise ValueError("the difference with an empty set is unbounded")
         rows, limits = self._rows(self.centre)
-        widths = dd.supports(other.vertices, rows)
+        widths = supports(other.vertices, rows)
         less = limits - widths
         less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
         lower, upper = np.array(self.bounding_box()) - other.bounding_box()
@@ -250,10 +209,10 @@ class Polytope(PolytopeArrays, ConvexSet):
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
         minimum, most = bound_values("lower", lower, (), (len(rows),)), bound_values("upper", upper, (), (len(rows),))
-        not_negative("slack_ulp", slack_ulp)
+        sizes = np.abs(self.vertices).max(axis=0, initial=0.0)
+        wider = not_negative("slack_ulp", slack_ulp) * EPS * (np.abs(rows) @ sizes)
         if self.is_empty:
             return self
-        wider = slack_ulp * dd.EPS * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
         rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - minimum])
         if np.isneginf(limits).any() or (minimum > most + 2.0 * wider).any():
             return self.empty(self.space)
@@ -320,7 +279,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if self.is_empty:
             return np.full(x.shape[:-1], -np.inf)
         rows, limits = self._outer_rows
-        rounding = (self.space + 2) * dd.EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
+        rounding = (self.space + 2) * EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
         return np.asarray((limits + rounding @ np.abs(rows).T - x @ rows.T).min(axis=-1))
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:

@@ -34,6 +34,7 @@ ONLY_POLYTOPES = {
     **dict.fromkeys(["points", "facets", "equations", "incidence", "centre", "scale"], "arrays in scaled coordinates"),
     "separating_direction": "a witness; polygons decide exactly whether they meet",
     "enlarged": "outward by given errors; kernels of polygons do this at each step",
+    "recomputed": "in coordinates of its own size; polygons are exact in any",
 }
 
 

@@ -571,7 +571,7 @@ def test_a_precise_measurement_is_one_cut(monkeypatch: pytest.MonkeyPatch) -> No
     a, c, generators = 0.4 * rng.normal(size=(6, 6)), np.eye(2, 6), 0.1 * rng.normal(size=(2, 6))
     start, disturbance = Zonotope.box(-np.ones(6), np.ones(6)), Zonotope(np.zeros(6), generators)
     observer = LinearObserver(a, c, start, noise=1e-3, disturbance=disturbance)
-    monkeypatch.setattr(Polytope, "_of_rows", counted)
+    monkeypatch.setattr(Polytope, "_of_rows", staticmethod(counted))
     x = np.zeros(6)
     for _ in range(4):
         observer.predict()

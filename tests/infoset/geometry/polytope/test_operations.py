@@ -393,3 +393,5 @@ def test_cuts_that_leave_a_billionth_of_a_set() -> None:
     box = Polytope.from_box([0, 0, 0], [1e9, 1, 1])
     np.testing.assert_allclose(box.cut([1, 0, 0], upper=1.0).volume(), 1.0, rtol=1e-9)
     np.testing.assert_allclose(box.cut([1, 1, 1], upper=1.0).volume(), 1.0 / 6.0, rtol=1e-9)
+    corner = box.cut([1, 1, 1], upper=1.0, recompute=False).recomputed()
+    np.testing.assert_allclose(corner.volume(), 1.0 / 6.0, rtol=1e-9)
