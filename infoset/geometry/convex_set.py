@@ -8,6 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from infoset.geometry._set_arguments import finite_values
+
 
 class ConvexSet:
     """What `ConvexPolygons` and `Polytope` share: operators and equality in terms of their methods."""
@@ -19,13 +21,22 @@ class ConvexSet:
     contains: Any
     intersection: Any
     is_subset: Any
-    linear_map: Any
     minkowski_sum: Any
-    translate: Any
 
     def equals(self, other: Self, tolerance: float = 0.0) -> Any:
         """Return whether each set is a subset of the other one, with the tolerance of `is_subset`."""
         return self.is_subset(other, tolerance) & other.is_subset(self, tolerance)
+
+    def linear_map(self, matrix: ArrayLike) -> Self:
+        """Return {matrix x}, with a matrix of shape (m, n), singular or not."""
+        image: Self = self.affine_map(matrix)
+        return image
+
+    def translate(self, offset: ArrayLike) -> Self:
+        """Return the set moved by an offset, shape (n,), at the cost of `affine_map`."""
+        space = self.vertices.shape[-1]
+        moved: Self = self.affine_map(np.eye(space), finite_values("offset", offset, space))
+        return moved
 
     def __and__(self, other: Self) -> Self:
         return self.intersection(other) if isinstance(other, type(self)) else NotImplemented

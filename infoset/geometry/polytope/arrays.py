@@ -109,10 +109,7 @@ class PolytopeArrays:
 
     @classmethod
     def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Self:
-        """Return {centre + sum of z_i generators[i]: -1 <= z_i <= 1}; `generators`, shape (g, n), has a row for each.
-
-        One hull for each generator: O(g^(n-1)) vertices.
-        """
+        """Return {centre + sum of z_i generators[i]: |z_i| <= 1}, generators of shape (g, n). O(g^(n-1)) vertices."""
         middle = finite_values("centre", centre, "n")
         zonotope = cls.from_vertices(middle[None, :])
         for row in finite_values("generators", generators, "g", len(middle)):
@@ -373,7 +370,13 @@ class PolytopeArrays:
         return rows, _moved(rows, sides[:, -1], origin - self.centre)
 
     def needed(self) -> Self:
-        """Return the set itself; an EmptyPolytopeError is raised if it is empty."""
+        """Return the set itself.
+
+        Raises
+        ------
+        EmptyPolytopeError
+            If it is empty.
+        """
         if self.is_empty:
             raise EmptyPolytopeError("the polytope is empty")
         return self

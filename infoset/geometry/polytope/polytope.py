@@ -57,10 +57,6 @@ class Polytope(PolytopeArrays, ConvexSet):
     vertices are in no order; `plot` and `to_shapely` order those of a set of the plane.
     """
 
-    def linear_map(self, matrix: ArrayLike) -> Polytope:
-        """Return {matrix x}, with a matrix of shape (m, n), singular or not."""
-        return self.affine_map(matrix)
-
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0, *, hull: bool = True) -> Polytope:
         """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.
 
@@ -75,10 +71,6 @@ class Polytope(PolytopeArrays, ConvexSet):
         if self.dimension < self.space or not len(facets):
             return self._hull(points, centre, scale, allowed=hull)._around(errors)
         return replace(self, points=points, facets=facets, centre=centre, scale=scale)._around(errors)
-
-    def translate(self, offset: ArrayLike) -> Polytope:
-        """Return the set moved by an offset, shape (n,): O((v + f) n)."""
-        return self.affine_map(np.eye(self.space), finite_values("offset", offset, self.space))
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m).
@@ -158,7 +150,12 @@ class Polytope(PolytopeArrays, ConvexSet):
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
 
-        If it is flat, rounding decides whether it is empty. A ValueError is raised if only the other set is empty.
+        If the difference is flat, rounding decides whether it is empty.
+
+        Raises
+        ------
+        ValueError
+            If the other set is empty and this one is not: every point would satisfy the condition.
         """
         self._need_other(other)
         if self.is_empty:
