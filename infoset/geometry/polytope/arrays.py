@@ -279,7 +279,7 @@ class PolytopeArrays:
         return part._reduced(len(self.facets)) if better.is_empty else better
 
     def recomputed(self) -> Self:
-        """Return the set computed from its facets in coordinates in which it is round; itself if rounding decides."""
+        """Return the set, computed again from its facets in coordinates of its size; itself if rounding decides."""
         better = self if self.is_empty else self._again(np.zeros((0, self.space)), np.zeros(0), self.bounding_box())
         return better if better.dimension == self.dimension else self
 

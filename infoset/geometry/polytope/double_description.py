@@ -1,9 +1,8 @@
 """Double description: the extreme rays of a polyhedral cone from its rows, one row after the other, compiled.
 
 A polytope {y: a . y <= b} is the cone {(y, t): b t - a . y >= 0, t >= 0}; its vertices are the extreme rays with t = 1
-(`affine`). In the dual, points y are the rows (-y, 1) of a cone whose extreme rays are the facets (a, b). Incidence is
-stored as bits: bit i of a ray is set if the ray lies on row i. A row's longest entry is about one. The second half of
-the file has the other kernels of polytopes: images, sums with a segment, and the outward movement by rounding.
+(`affine`). In the dual, points y are the rows (-y, 1) of a cone whose extreme rays are the facets (a, b). Bit i of a
+ray is set if it lies on row i. A row's longest entry is about one. Images and sums of polytopes are also here.
 
 References
 ----------
@@ -241,7 +240,9 @@ def unpacked(bits: Bits, count: int) -> Flags:
 
 
 @_kernels.compiled
-def insert_rows(rays: Floats, on: Flags, rows: Floats, numbers: Integers, least: int, affine: Any) -> Any:
+def insert_rows(
+    rays: Floats, on: Flags, rows: Floats, numbers: Integers, least: int, affine: Any
+) -> tuple[Floats, Flags]:
     """Return the rays with row . z >= 0 for rows with some `numbers`, and which ray is on which row; see `insert`."""
     bits = packed(on)
     for k in range(len(rows)):
@@ -279,7 +280,8 @@ def extreme_rays(rows: Floats, affine: bool, tolerance: float) -> tuple[Floats, 
     if len(chosen) < size:
         return np.empty((0, size)), np.empty((0, m), np.bool_), len(chosen)
     rays, on = np.array(np.linalg.inv(rows[chosen]).T, np.float64, order="C"), np.zeros((size, m), np.bool_)
-    rays[:, -1] = np.eye(size)[0] if affine else rays[:, -1]
+    if affine:
+        rays[:, -1] = np.eye(size)[0]
     rays[int(affine) :] = in_units(rays)[int(affine) :]
     on[:, chosen] = ~np.eye(size, dtype=np.bool_)  # a ray lies on all of these rows but one
     others = np.delete(np.arange(m), chosen)
@@ -407,9 +409,7 @@ def _cross_facets(facets: Floats, mine: Integers, needs: Floats, basis: Floats, 
 
 
 @_kernels.allocation_free
-def _move_out(
-    point: Floats, facets: Floats, mine: Integers, centre: Floats, flat: bool, most: float, work: Any
-) -> None:
+def _push(point: Floats, facets: Floats, mine: Integers, centre: Floats, flat: bool, most: float, work: Any) -> None:
     """Move a point, in place, to the outer sides of its facets, with the numbers `mine`; see `push_out`."""
     needs, step, basis = work
     inside, rounding = False, len(point) * EPS * (1.0 + _size(point))  # that of the new coordinates
@@ -452,7 +452,7 @@ def push_out(points: Floats, facets: Floats, on: Flags, old: Any, flat: bool, mo
             for k in range(f):
                 mine[count] = k
                 count += on[i, k] > whole[k]
-            _move_out(result[i], facets, mine[:count], centre, flat, most, work)
+            _push(result[i], facets, mine[:count], centre, flat, most, work)
     return result
 
 

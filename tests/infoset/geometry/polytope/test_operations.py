@@ -389,6 +389,28 @@ def test_other_published_cases() -> None:
     assert shade.equals(Polytope.from_vertices([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]), 1e-12)
 
 
+@pytest.mark.parametrize("space", [2, 3])
+def test_no_facet_of_an_image_excludes_an_exact_vertex(space: int) -> None:
+    """In rationals, in the coordinates of the image: formerly one of two such maps, by up to 1e-16."""
+    random, mapped, exact = np.random.default_rng(space), 0, np.vectorize(Fraction, otypes=[object])
+    for _ in range(100):
+        matrix = random.integers(-7, 8, (space, space)).astype(float)
+        if abs(np.linalg.det(matrix)) < 0.5:
+            continue
+        lower, upper = random.integers(-5, 0, space), random.integers(1, 6, space)
+        image, mapped = Polytope.from_box(lower, upper).linear_map(matrix), mapped + 1
+        facets, centre, scale = map(exact, (image.facets, image.centre, image.scale))
+        for corner in itertools.product(*zip(lower.tolist(), upper.tolist(), strict=True)):
+            point = (exact(matrix) @ np.array(corner) - centre) / scale
+            assert (facets[:, :-1] @ point <= facets[:, -1]).all()
+    assert mapped > 50
+
+
+def test_a_segment_that_underflows_is_none() -> None:
+    box = Polytope.from_box([-1e5] * 3, [1e5] * 3)
+    assert box.add_segment([1e-320, 0.0, 0.0]).equals(box)
+
+
 def test_cuts_that_leave_a_billionth_of_a_set() -> None:
     box = Polytope.from_box([0, 0, 0], [1e9, 1, 1])
     np.testing.assert_allclose(box.cut([1, 0, 0], upper=1.0).volume(), 1.0, rtol=1e-9)
