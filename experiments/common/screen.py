@@ -20,6 +20,8 @@ from experiments.common.units import duration_text
 from sim.statistics import level_name, shows
 
 BeginProgress = Callable[[str], Callable[[float], None]]
+Clock = Callable[[], float]
+"""The time, s, from any origin."""
 Part = str | Text | Table
 """A line or a table of a result on the screen."""
 LINE_EVERY_S = 30.0
@@ -73,11 +75,17 @@ def number_table(*titles: str, left: int = 1) -> Table:
     return table
 
 
+def progress_clock() -> float:
+    """Return the time by which progress is measured, s. Tests of commands replace this function."""
+    return time.monotonic()
+
+
 @contextlib.contextmanager
-def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
+def progress_bar(quiet: bool, clock: Clock | None = None) -> Iterator[BeginProgress]:
     """Show progress on stderr: bars on a terminal, otherwise a line every `LINE_EVERY_S`; and the estimated time.
 
-    The context is a function that starts a bar with a title, and returns a function that sets the fraction done.
+    The context is a function that starts a bar with a title, and returns a function that sets the fraction done. The
+    `clock` is `progress_clock` unless another is given.
     """
     if quiet:
         yield lambda _name: lambda _done: None
@@ -85,7 +93,7 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     bars = Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
     with contextlib.nullcontext() if bars.disable else bars:
-        yield _Report(bars).begin
+        yield _Report(bars, clock or progress_clock).begin
 
 
 class _Report:
@@ -94,8 +102,10 @@ class _Report:
     The time is that of the rate after the first report: kernels are loaded or compiled before it.
     """
 
-    def __init__(self, bars: Progress) -> None:
-        self._bars, self._written_s = bars, time.monotonic()
+    def __init__(self, bars: Progress, clock: Clock) -> None:
+        self._bars = bars
+        self._clock = clock
+        self._written_s = clock()
         self._lock = threading.Lock()  # the parts of a command run in threads
         self._done: dict[TaskID, float] = {}
         self._first: tuple[float, float] | None = None
@@ -116,7 +126,8 @@ class _Report:
 
     def _report(self, bar: TaskID, name: str, done: float) -> None:
         self._bars.update(bar, completed=done)
-        now_s, self._done[bar] = time.monotonic(), done
+        self._done[bar] = done
+        now_s = self._clock()
         share = sum(self._done.values()) / len(self._done)
         first_s, first_share = self._first = self._first or (now_s, share)
         left = ""

@@ -15,11 +15,8 @@ from tests.space import in_space
 
 @pytest.fixture
 def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Command:
-    """Run a command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-    return Command(capsys)
+    """Run a command in this process, in an empty folder: exit code, stdout and stderr."""
+    return Command.in_folder(tmp_path, capsys, monkeypatch)
 
 
 @pytest.fixture

@@ -274,19 +274,19 @@ def test_a_message_keeps_its_lines_and_its_letters() -> None:
     assert on_a_screen("läuft:\n  Ü – 標\x1b[31m\r\u202e") == "läuft:\n  Ü – 標?[31m??"
 
 
-def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(screen, "LINE_EVERY_S", 0.0)
-    with screen.progress_bar(quiet=False) as begin:
-        begin("patient")(0.5)
-    assert capsys.readouterr().err == "patient: 50 %\n"
-
-
-def test_a_long_command_says_its_time_once_and_the_time_left(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str]) -> None:
     now_s = 0.0
-    monkeypatch.setattr("time.monotonic", lambda: now_s)
-    with screen.progress_bar(quiet=False) as begin:
+    with screen.progress_bar(quiet=False, clock=lambda: now_s) as begin:
+        report = begin("patient")
+        report(0.25)
+        now_s = screen.LINE_EVERY_S
+        report(0.5)
+    assert capsys.readouterr().err == "patient: estimated time 90 s\npatient: 50 %, 1 min left\n"
+
+
+def test_a_long_command_says_its_time_once_and_the_time_left(capsys: pytest.CaptureFixture[str]) -> None:
+    now_s = 0.0
+    with screen.progress_bar(quiet=False, clock=lambda: now_s) as begin:
         one, two = begin("one"), begin("two")
         now_s = 50.0  # kernels are compiled before the first report
         one(0.01)
@@ -301,10 +301,9 @@ def test_a_long_command_says_its_time_once_and_the_time_left(
     assert capsys.readouterr().err == "two: 40 %, 113 s left\n"
 
 
-def test_a_short_command_says_no_time(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_short_command_says_no_time(capsys: pytest.CaptureFixture[str]) -> None:
     now_s = 0.0
-    monkeypatch.setattr("time.monotonic", lambda: now_s)
-    with screen.progress_bar(quiet=False) as begin:
+    with screen.progress_bar(quiet=False, clock=lambda: now_s) as begin:
         report = begin("one")
         for second in range(10):
             now_s = float(second)

@@ -47,11 +47,8 @@ def file(brief: Scenario, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Command:
-    """Run the command in this process, in an empty folder."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-    return Command(capsys)
+    """Run a command in this process, in an empty folder: exit code, stdout and stderr."""
+    return Command.in_folder(tmp_path, capsys, monkeypatch)
 
 
 @pytest.fixture
