@@ -6,8 +6,12 @@ that nothing can depend on the checkout. Arguments after `--` go to pytest.
 
 from __future__ import annotations
 
+import itertools
 import re
 import shutil
+import subprocess
+import sys
+import tempfile
 import tomllib
 from pathlib import Path
 
@@ -20,6 +24,13 @@ TOOLS = ("mypy", "ruff", "import-linter", "pytest-cov")
 """Packages of the extra `test` that check the source code; the tests do not import them."""
 TOO_NEW = ("heyoka",)
 """Packages of the extra `test` whose oldest wheels need numpy 2."""
+
+KERNELS = ("Prescott", "Haswell", "SkylakeX")
+"""Kernels of OpenBLAS that differ in the order of their operations: SSE3, AVX2 with FMA, AVX-512."""
+PROCESSORS = ("generic", "x86-64-v3", "")
+"""Processors for which Numba compiles: without and with FMA, and the machine's own."""
+BUSY_LOOPS = 4
+"""Processes that only compute, beside the tests: as slow as a shared machine."""
 
 nox.options.sessions = ["wheel"]
 nox.options.error_on_missing_interpreters = False
@@ -57,6 +68,29 @@ def oldest(session: nox.Session) -> None:
     session.install("--no-deps", str(built(session)[0]))
     # Old libraries emit deprecation warnings; they are not errors here.
     run_tests(session, "-W", "default")
+
+
+@nox.session(python="3.11")
+def portable(session: nox.Session) -> None:
+    """Run every test with each order of floating-point operations, hash seed and order of tests, on a busy machine.
+
+    The machine must have AVX-512 for the kernel SkylakeX. Each of the nine combinations compiles all kernels, and takes
+    three times as long as the tests alone.
+    """
+    session.install("-c", str(ROOT / "constraints.txt"), f"{built(session)[0]}[test]", "pytest-randomly")
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY_LOOPS)]
+    try:
+        for kernel, processor in itertools.product(KERNELS, PROCESSORS):
+            session.log(f"OPENBLAS_CORETYPE={kernel} NUMBA_CPU_NAME={processor or '(this machine)'}")
+            session.env["OPENBLAS_CORETYPE"] = kernel
+            session.env["NUMBA_CPU_NAME"] = processor or None
+            session.env["PYTHONHASHSEED"] = "random"
+            with tempfile.TemporaryDirectory() as cache:
+                session.env["NUMBA_CACHE_DIR"] = cache
+                run_tests(session)
+    finally:
+        for process in busy:
+            process.kill()
 
 
 @nox.session

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import is_hypothesis_test, settings
+from hypothesis import HealthCheck, is_hypothesis_test, settings
 
 from sim.scenario import of_model
 
@@ -30,8 +30,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 PROFILE = os.environ.get("INFOSET_HYPOTHESIS_PROFILE", "default")
 TIMES = 32
 
-settings.register_profile("default", derandomize=True)
-settings.register_profile("thorough", derandomize=False, max_examples=TIMES * settings().max_examples, deadline=None)
+# No property depends on the speed of the machine.
+settings.register_profile("default", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "thorough", settings.get_profile("default"), derandomize=False, max_examples=TIMES * settings().max_examples
+)
 settings.load_profile(PROFILE)
 
 
