@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -16,6 +17,8 @@ Constraints = tuple[Floats, Floats, Places, Places]
 
 _BROKEN = 3e-10
 _STILL = 1e-9
+"""A thrust, as a part of its bound, that moves by less than this in a direction counts as constant there: a change of
+this size is the maximum violation of a constraint (`MAX_VIOLATION`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,19 +181,63 @@ def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, to
     )
 
 
+class _ThrustInAxes(NamedTuple):
+    """The thrust of a period, along the directions in which it depends on v and across them.
+
+    Along them it is `free` + `response` v, of shapes (k,) and (k, p); across them it is constant, of length `constant`.
+    """
+
+    free: Floats
+    response: Floats
+    constant: float
+
+
+def _in_own_axes(fixed: Floats, turned: Floats, unit: float = 1.0) -> _ThrustInAxes:
+    """Return the thrust fixed + turned v, of shapes (m,) and (m, p), along and across the directions in which it moves.
+
+    Its bound is `unit`. A cone that also has the directions in which the thrust is constant is the same set, but the
+    interior-point method loses digits in it: gaps were 1e-7 in place of 1e-9, and rounding decided what was refused.
+    """
+    axes, movements, _ = np.linalg.svd(turned, full_matrices=False)
+    moving = movements > _STILL * unit
+    if moving.sum() == len(fixed):
+        return _ThrustInAxes(fixed, turned, 0.0)
+    along = axes[:, moving].T
+    free = along @ fixed
+    return _ThrustInAxes(free, along @ turned, float(np.linalg.norm(fixed - along.T @ free)))
+
+
 def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> ConeProgram:
     """Add |u(t)| <= 1 to a program whose first variables are those of the set; for thrust in a box add nothing.
 
     If `deep`, the last variable of the program is the radius of a ball that must also be inside.
     """
-    if lifted.ball and lifted.size:
-        free = lifted.control_free.reshape(-1, lifted.ball)
-        for fixed, turned in zip(free, lifted.control_response.reshape(-1, lifted.ball, lifted.size), strict=True):
-            if np.linalg.norm(turned) > _STILL:  # a thrust that does not depend on v is within its bound already
-                top = np.zeros(len(program.cost))
-                top[-1] = -np.linalg.norm(turned, ord=2) if deep else 0.0
-                program.bound(turned, fixed, top, 1.0)
+    if not (lifted.ball and lifted.size):
+        return program
+    frees = lifted.control_free.reshape(-1, lifted.ball)
+    responses = lifted.control_response.reshape(-1, lifted.ball, lifted.size)
+    for fixed, turned in zip(frees, responses, strict=True):
+        if np.linalg.norm(turned) <= _STILL:
+            # A thrust that does not depend on v is within its bound already.
+            continue
+        thrust = _in_own_axes(fixed, turned)
+        if deep:
+            top = np.zeros(len(program.cost))
+            top[-1] = -np.linalg.norm(turned, ord=2)
+            _bound_norm(program, thrust, top, 1.0)
+        else:
+            room = np.sqrt(max((1.0 - thrust.constant) * (1.0 + thrust.constant), 0.0))
+            program.bound(thrust.response, thrust.free, np.zeros(len(program.cost)), float(room))
     return program
+
+
+def _bound_norm(program: ConeProgram, thrust: _ThrustInAxes, top: Floats, height: float = 0.0) -> None:
+    """Add |thrust| <= top . v + height to a program."""
+    free, response = thrust.free, thrust.response
+    if thrust.constant > 0.0:
+        free = np.append(free, thrust.constant)
+        response = np.vstack([response, np.zeros(response.shape[1])])
+    program.bound(response, free, top, height)
 
 
 def min_relaxation(lifted: Lifted) -> tuple[float, Floats]:
@@ -289,15 +336,17 @@ def _with_norms_below(program: ConeProgram, lifted: Lifted, scale: Floats, tops:
     group = len(scale) // len(tops)
     for t, top in enumerate(tops):
         mine = slice(t * group, (t + 1) * group)
-        program.bound(scale[mine, None] * lifted.control_response[mine], scale[mine] * lifted.control_free[mine], top)
+        fixed = scale[mine] * lifted.control_free[mine]
+        turned = scale[mine, None] * lifted.control_response[mine]
+        _bound_norm(program, _in_own_axes(fixed, turned, float(scale[mine].max())), top)
     return program
 
 
 class Maximiser:
     """Maximise many linear functions over one set of controls, which is not empty.
 
-    An interior-point method (Clarabel) reuses the factors that depend on the constraints only; the simplex method
-    (HiGHS) solves the linear programs on which it fails.
+    An interior-point method (Clarabel) reuses the factors that depend on the constraints only. Programs on which it
+    fails are solved by the simplex method (HiGHS), or, for thrust in a ball, as programs of their own.
     """
 
     def __init__(self, lifted: Lifted) -> None:
@@ -346,5 +395,5 @@ class Maximiser:
             return self._program.checked(np.array(solution.x), np.array(solution.z), down, max_gap)
         except NoSolutionError:
             if self._lifted.ball:
-                raise
+                return self._with_cost(down).solve()
             return Optimum(self._with_cost(down).vertex(), np.zeros(len(self._lifted.rows)))

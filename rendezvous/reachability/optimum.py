@@ -9,7 +9,14 @@ import numpy as np
 
 from rendezvous._arrays import Flags, Floats, Places
 from rendezvous.reachability.admissible import Lifted, deep_point, lift, min_relaxation
-from rendezvous.reachability.conic import MAX_GAP, MAX_VIOLATION, ConeProgram, NoSolutionError
+from rendezvous.reachability.conic import (
+    ATTEMPTS,
+    MAX_GAP,
+    MAX_VIOLATION,
+    ConeProgram,
+    NoSolutionError,
+    SolverSettings,
+)
 from rendezvous.reachability.problem import Block
 from rendezvous.reachability.relative_interior import null_space_basis, relative_interior
 
@@ -23,7 +30,8 @@ _ZERO, _ABSOLUTE = 1e-11, 1e-12
 second is the maximum gap where it is more than the relative one."""
 _ULP = float(np.finfo(float).eps)
 _RANK = 1e-13
-_ROUNDS = 5
+_ROUNDS = (*ATTEMPTS, *ATTEMPTS[:2])
+"""Settings of the solver in the rounds of the search; most searches end after the first."""
 _REACH = 1e4
 
 
@@ -220,8 +228,8 @@ class _Search:
             self._offer_bound(self._free, self._multipliers)
             return
         scale = 1.0
-        for _ in range(_ROUNDS):
-            self._improve(scale)
+        for settings in _ROUNDS:
+            self._improve(scale, settings)
             if self._gap <= _CLOSE * self.value:
                 return
             scale = min(scale, self.value)
@@ -245,10 +253,10 @@ class _Search:
             multipliers[hard] = np.maximum(-self._lifted.rows[hard] @ residual, 0.0)
         return MinimumNorm(self._point, self.at_zero, multipliers, residual)
 
-    def _improve(self, scale: float) -> None:
+    def _improve(self, scale: float, settings: SolverSettings) -> None:
         """Solve the cone program about the point, in units of `scale`, and offer its point and multipliers."""
         program, kept = self._program(self._point, scale)
-        inner, dual = program.answer()
+        inner, dual = program.answer(settings)
         if not (np.isfinite(inner).all() and np.isfinite(dual).all()):
             return
         parts = list(program.parts(dual))
@@ -259,9 +267,16 @@ class _Search:
         self._offer_point(point)
         self._offer_bound(direction, multipliers)
         # A bound is active where its multiplier is above its slack, both in the units of the program.
-        active = self._soft & (multipliers > (self._lifted.limits - self._lifted.rows @ point) / scale)
+        active = np.flatnonzero(self._soft & (multipliers > (self._lifted.limits - self._lifted.rows @ point) / scale))
         held = self._norms(self._residual(direction, multipliers * self._soft)) > (1.0 - self._norms(point)) / scale
-        self._offer_bound(*self._sharpened(direction, multipliers, np.flatnonzero(active), held))
+        self._offer_bound(*self._sharpened(direction, multipliers, active, held))
+        # The solution itself, to rounding, if these bounds are those that are active.
+        polished = self._polished(point, active, held)
+        self._offer_point(polished)
+        state = self._free + self._response @ polished
+        norm = float(np.linalg.norm(state))
+        if norm > 0.0:
+            self._offer_bound(*self._sharpened(state / norm, multipliers, active, held))
 
     def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, Places]:
         """The cone program in v = start + scale z, without the constraints that z cannot reach."""
@@ -334,6 +349,23 @@ class _Search:
         sharp = np.zeros(len(multipliers))
         sharp[active] = both[len(direction) :]
         return both[: len(direction)], sharp
+
+    def _polished(self, point: Floats, active: Places, held: Flags) -> Floats:
+        """Return the controls of minimum norm on the active rows, with those at their bounds fixed there."""
+        lifted = self._lifted
+        moving = np.repeat(~held, lifted.ball or 1)
+        polished = point.copy()
+        if not lifted.ball:
+            polished[~moving] = np.sign(point[~moving])
+
+        rows = lifted.rows[np.ix_(active, moving)]
+        missing = lifted.limits[active] - lifted.rows[active] @ polished
+        polished[moving] += np.linalg.lstsq(rows, missing, rcond=_RANK)[0]
+
+        along = null_space_basis(rows)
+        state = self._free + self._response @ polished
+        polished[moving] -= along @ np.linalg.lstsq(self._response[:, moving] @ along, state, rcond=_RANK)[0]
+        return polished
 
     def _norms(self, controls: Floats) -> Floats:
         return np.asarray(np.linalg.norm(controls.reshape(-1, self._lifted.ball or 1), axis=1))

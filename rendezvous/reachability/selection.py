@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, min_l1, min_peak, min_sum_of_norms, quadratic
@@ -18,7 +20,6 @@ _NEWTON_STEPS = 200
 _STILL = 1e-9
 _STEPS_A_DIMENSION = 20
 _INSIDE = 1.0 - 1e-12
-_FLATTEST = 1e-15
 
 
 @dataclass(frozen=True)
@@ -106,55 +107,83 @@ def analytic_centre(optimal: OptimalControls) -> Floats:
 
 
 def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
-    """Return the analytic centre, shape (d,), of a set without equations, and the Hessian of its barrier there.
+    """Return the analytic centre, shape (d,), of a set without equations, and a root of its barrier's Hessian there.
 
-    `start`, shape (d,), is inside. Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which
-    is self-concordant. Raise `NoSolutionError` if Newton's method does not converge.
+    `start`, shape (d,), is inside. The root R, shape (d, d), is upper triangular with a positive diagonal; the Hessian
+    is R' R. Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which is self-concordant.
+    Raise `NoSolutionError` if Newton's method does not converge.
     """
     point = start.copy()
     if not space.size:
         return point, np.zeros((0, 0))
-    value, gradient, hessian = _barrier(space, point)
+    barrier = _barrier(space, point)
     for _ in range(_NEWTON_STEPS):
-        step = np.linalg.solve(hessian, -gradient)
-        decrement = float(-gradient @ step)
+        # The Hessian is factor' factor and the gradient factor' ones: R comes from the factor itself, whose condition
+        # is the root of the Hessian's, so that a set 1e-10 thick has a Newton step.
+        orthogonal, root = np.linalg.qr(barrier.factor)
+        descent = orthogonal.T @ barrier.ones
+        step = solve_triangular(root, -descent)
+        decrement = float(descent @ descent)
         if decrement < 1e-22:
-            return point, hessian
+            break
         length = 1.0
         while True:
             after = _barrier(space, point + length * step)
-            if after[0] <= value - 1e-4 * length * decrement or length * decrement < 1e-15 * max(1.0, abs(value)):
+            is_lower = after.value <= barrier.value - 1e-4 * length * decrement
+            if is_lower or length * decrement < 1e-15 * max(1.0, abs(barrier.value)):
                 break
             length *= 0.5
         point = point + length * step
-        value, gradient, hessian = after
-        if length * decrement < 1e-15 * max(1.0, abs(value)):
-            return point, hessian
-    raise NoSolutionError("Newton's method did not reach the analytic centre")
+        is_last = length * decrement < 1e-15 * max(1.0, abs(barrier.value))
+        barrier = after
+        if is_last:
+            _, root = np.linalg.qr(barrier.factor)
+            break
+    else:
+        raise NoSolutionError("Newton's method did not reach the analytic centre")
+    signs = np.where(np.diag(root) < 0.0, -1.0, 1.0)
+    return point, signs[:, None] * root
 
 
-def _barrier(space: Lifted, point: Floats) -> tuple[float, Floats, Floats]:
-    """Value, gradient and Hessian; infinite outside."""
+class _Barrier(NamedTuple):
+    """The value of the barrier, infinite outside, and its derivatives.
+
+    The gradient is factor' ones and the Hessian factor' factor, of shapes (d,) and (d, d).
+    """
+
+    value: float
+    factor: Floats
+    ones: Floats
+
+
+def _barrier(space: Lifted, point: Floats) -> _Barrier:
+    """Return the barrier - sum log(slack) - sum log(1 - |u(t)|^2) at a point."""
     size = space.size
+    outside = _Barrier(np.inf, np.eye(size), np.zeros(size))
     slack = space.limits - space.rows @ point
-    nothing = np.zeros(size), np.eye(size)
     if float(slack.min(initial=np.inf)) <= 0.0:
-        return np.inf, *nothing
-    weighed = space.rows / slack[:, None]
-    value, gradient, hessian = -float(np.log(slack).sum()), weighed.sum(axis=0), weighed.T @ weighed
-    if space.ball:
-        turned = space.control_response.reshape(-1, space.ball, size)
-        thrust = space.controls(point).reshape(-1, space.ball)
-        moving = np.linalg.norm(turned, axis=(1, 2)) > _STILL
-        turned, thrust = turned[moving], thrust[moving]
-        left = 1.0 - (thrust**2).sum(axis=1)
-        if float(left.min(initial=np.inf)) <= 0.0:
-            return np.inf, *nothing
-        pull = 2.0 * np.einsum("tmd,tm->td", turned, thrust) / left[:, None]
-        value -= float(np.log(left).sum())
-        gradient = gradient + pull.sum(axis=0)
-        hessian = hessian + pull.T @ pull + 2.0 * np.einsum("tmd,tme,t->de", turned, turned, 1.0 / left)
-    return value, gradient, hessian
+        return outside
+    value = -float(np.log(slack).sum())
+    rows = space.rows / slack[:, None]
+    if not space.ball:
+        return _Barrier(value, rows, np.ones(len(rows)))
+
+    turned = space.control_response.reshape(-1, space.ball, size)
+    thrust = space.controls(point).reshape(-1, space.ball)
+    moving = np.linalg.norm(turned, axis=(1, 2)) > _STILL
+    turned = turned[moving]
+    thrust = thrust[moving]
+    left = 1.0 - (thrust**2).sum(axis=1)
+    if float(left.min(initial=np.inf)) <= 0.0:
+        return outside
+    value -= float(np.log(left).sum())
+    pull = 2.0 * np.einsum("tmd,tm->td", turned, thrust) / left[:, None]
+    # The second derivative of |u(t)|^2 enters the Hessian only.
+    curved = np.sqrt(2.0 / left)[:, None, None] * turned
+    curved = curved.reshape(-1, size)
+    ones = np.ones(len(rows) + len(pull) + len(curved))
+    ones[len(rows) + len(pull) :] = 0.0
+    return _Barrier(value, np.vstack([rows, pull, curved]), ones)
 
 
 def vertices(optimal: OptimalControls, most: int = MAX_VERTICES) -> Floats:
@@ -181,15 +210,11 @@ def samples(optimal: OptimalControls, count: int, generator: np.random.Generator
     are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
     """
     space = optimal.space
-    start, hessian = analytic_point(space, optimal.centre)
+    start, root = analytic_point(space, optimal.centre)
     points = np.repeat(start[None, :], count, axis=0)
     if not space.size:
         return optimal.at(points)
-    try:
-        rounding = np.linalg.inv(np.linalg.cholesky(hessian)).T
-    except np.linalg.LinAlgError:  # the set is so thin that the Hessian is singular to rounding
-        steep, ways = np.linalg.eigh(hessian)
-        rounding = ways / np.sqrt(np.maximum(steep, _FLATTEST * steep[-1]))
+    rounding = solve_triangular(root, np.eye(space.size))
     for _ in range(_STEPS_A_DIMENSION * space.size):
         directions = generator.standard_normal(points.shape) @ rounding.T
         directions /= np.linalg.norm(directions, axis=1)[:, None]

@@ -12,7 +12,16 @@ from rendezvous.relative_motion import EllipticOrbit
 
 Paper = Callable[..., ReachabilityProblem]
 
+SOLVED = 1e-10
+"""The relative tolerance at which the convex programs' solver stops, whatever the order of its operations."""
 ORBIT = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
+
+
+def printed(number: str) -> object:
+    """A solution that was printed: it is compared within half a unit of its last digit and the solver's tolerance."""
+    value = float(number)
+    last_digit = 10.0 ** -len(number.partition(".")[2])
+    return pytest.approx(value, abs=0.5 * last_digit + SOLVED * abs(value))
 
 
 @pytest.fixture(scope="session")

@@ -16,6 +16,8 @@ from rendezvous.reachability import ReachabilityProblem, ThrustShape
 Numbers = NDArray[Any]
 
 DIGITS = 40
+GAP = 1e-15
+"""Duality gap of a precise norm, relative to it: less than the rounding of the data in doubles."""
 _decimals = np.vectorize(lambda value: Decimal(float(value)), otypes=[object])
 
 
@@ -109,12 +111,12 @@ def cone_program(given: Dense, kind: str) -> tuple[float, Floats]:
     return np.nan, best[1]
 
 
-def precise_min_norm(problem: ReachabilityProblem, digits: float = 1e-8) -> tuple[float, float] | None:
+def precise_min_norm(problem: ReachabilityProblem) -> tuple[float, float] | None:
     """Return the minimum terminal norm and its rounding in doubles; None where no control is well inside.
 
     Notes
     -----
-    A logarithmic barrier followed to a duality gap of `digits` of the norm, in float while that does, then in Decimal.
+    A logarithmic barrier followed to a duality gap of `GAP`, in float while that does, then in Decimal.
     """
     radius, start = cone_program(Dense(problem), "deep")
     if not radius > 1e-6:
@@ -131,7 +133,7 @@ def precise_min_norm(problem: ReachabilityProblem, digits: float = 1e-8) -> tupl
             point = _centred(rough, point, weight)
             weight *= 0.2
         numbers = _decimals(point)
-        while count * weight > digits * float(numbers[-1]) and float(numbers[-1]) > smallest:
+        while count * weight > GAP * float(numbers[-1]) and float(numbers[-1]) > smallest:
             numbers = _centred(exact, numbers, Decimal(weight))
             weight *= 0.2
         value = float(numbers[-1])

@@ -26,7 +26,7 @@ from rendezvous.reachability import (
     samples,
     solve,
 )
-from rendezvous.reachability.conic import CONE_TOLERANCE, NoSolutionError
+from rendezvous.reachability.conic import CONE_TOLERANCE, MAX_GAP, NoSolutionError
 from tests.rendezvous.reachability.conftest import Paper
 
 from .high_precision import Dense, cone_program, precise_min_norm
@@ -54,7 +54,7 @@ def assert_precise(problem: ReachabilityProblem, miss: float) -> bool:
     if miss == 0.0:
         assert expected <= ZERO * size_of(problem)
         return True
-    assert abs(miss - expected) <= max(RELATIVE * expected, ABSOLUTE * size_of(problem)) + rounding
+    assert abs(miss - expected) <= max(MAX_GAP * expected, ABSOLUTE * size_of(problem)) + rounding
     return True
 
 
@@ -168,12 +168,13 @@ def check(seed: int, *, precise_to: int = 0, members: bool = True) -> str:
     if problem.periods <= precise_to and assert_precise(problem, miss):
         told += ", to forty digits"
     if members:
+        accuracy = CONE_TOLERANCE if problem.thrust is ThrustShape.BALL else 1e-8
         for select in SELECTIONS:
             try:
                 controls = select(optimal)
             except NoSolutionError:
                 return "refused"
-            assert float(optimal.excess(controls)) < 1e-8
+            assert float(optimal.excess(controls)) < accuracy
         assert float(optimal.excess(samples(optimal, 2, np.random.default_rng(seed))).max()) < 1e-8
         optimal.ranges()
         minimum = min_periods(problem)
@@ -190,12 +191,16 @@ def test_a_model_that_amplifies_rounding_is_refused(paper: Paper) -> None:
 
 
 def test_random_problems() -> None:
-    # In problem 11, with thrust in a ball, the set is so thin that rounding decides whether the solver reaches a gap of
-    # 1e-7 for the sum of the norms, or one of 2.6e-7, which is refused.
     told = Counter(check(seed) for seed in range(24))
-    assert told["refused"] <= 1
+    assert told["refused"] == 0
     assert told["reached"] > 0
     assert told["missed"] > 3
+
+
+@pytest.mark.parametrize("seed", [11, 78, 196, 274])
+def test_programs_with_thrust_in_a_ball_are_solved_whatever_the_rounding(seed: int) -> None:
+    # With each of three kernels of a BLAS some of these were refused, and others with each.
+    assert check(seed) in {"missed", "reached"}
 
 
 @pytest.mark.thorough
