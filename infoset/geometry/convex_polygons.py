@@ -118,18 +118,33 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         """Return {p: matrix p + offset in the set}; a matrix of shape (2, m), m not 2, gives a `Polytope` in R^m.
 
         O(n). The vertices are mapped by the inverse matrix, whose entries are within a few ulp of themselves. If the
-        matrix is singular, the preimage is unbounded or empty; a ValueError is raised if it is unbounded.
+        matrix is singular, the preimage is unbounded or empty, which is decided exactly.
+
+        Raises
+        ------
+        ValueError
+            If the preimage is unbounded.
         """
         rows = real_values("matrix", matrix)
         if rows.shape[-1:] != (2,):
             return self.polytope().preimage(rows, offset)
-        matrices, moved = self._each("matrix", rows, 2, 2), self.translate(-offset_values(offset, "...", 2))
+        matrices = self._each("matrix", rows, 2, 2)
+        start = offset_values(offset, "...", 2)
         inverse = np.zeros(matrices.shape)
         kernels.invert(matrices, inverse)
-        if inverse.any(axis=(1, 2)).all():
-            return moved.linear_map(inverse.reshape(*self.shape, 2, 2))
-        normals, limits = moved.constraints()
-        return ConvexPolygons.from_constraints(normals @ matrices.reshape(*self.shape, 2, 2), limits)
+        mapped = self.translate(-start).linear_map(inverse.reshape(*self.shape, 2, 2))
+        is_regular = inverse.any(axis=(1, 2))
+        if is_regular.all():
+            return mapped
+
+        singular = ~is_regular.reshape(self.shape)
+        meets = self._measure(kernels.range_meets, matrices, self._each("offset", start, 2))[..., 0] > 0.0
+        unbounded = singular & meets
+        if unbounded.any():
+            index = np.argwhere(unbounded)[0].tolist()
+            of_member = f" of polygon {index}" if index else ""
+            raise ValueError(f"the preimage{of_member} is unbounded: its matrix is singular")
+        return ConvexPolygons.unchecked(mapped.vertices, np.where(singular, 0, mapped.counts))
 
     def add_segment(self, half: ArrayLike) -> ConvexPolygons:
         """Return the Minkowski sum with the segment from -half to +half, shape (2,) or (..., 2).

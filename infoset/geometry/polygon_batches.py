@@ -78,6 +78,27 @@ def invert(matrix: Floats, out: Floats) -> None:
 
 
 @compiled
+def range_meets(vertices: Floats, counts: Integers, out: Floats, matrix: Floats, offset: Floats) -> None:
+    """Whether {m p + o}, with singular matrices m and offsets o, meets the polygons, exactly decided: 1 or 0.
+
+    The range is the line through o along the longer column of m, or o itself if m is zero.
+    """
+    for i in range(counts.size):
+        first, second = matrix[i, :, 0], matrix[i, :, 1]
+        along = first if np.abs(first).max() >= np.abs(second).max() else second
+        if along[0] == 0.0 and along[1] == 0.0:
+            points, n = polygon_exact.tidy(vertices[i], counts[i])
+            out[i, 0] = polygon_exact.holds(points, n, offset[i, 0], offset[i, 1])
+            continue
+        left, right = False, False
+        for k in range(counts[i]):
+            height = polygon_lines.height_over_line(along, offset[i], vertices[i, k])
+            left |= height >= 0.0
+            right |= height <= 0.0
+        out[i, 0] = left and right
+
+
+@compiled
 def add_segments(vertices: Floats, counts: Integers, out: Floats, made: Integers, halves: Floats) -> None:
     """Minkowski sums with segments from -half to +half, any number for each polygon: `halves` has shape (B, g, 2)."""
     for i in range(counts.size):

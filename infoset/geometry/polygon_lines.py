@@ -42,6 +42,17 @@ def minor_terms(one: Floats, two: Floats, i: int, j: int) -> Floats:
 
 
 @compiled
+def height_over_line(along: Floats, start: Floats, point: Floats) -> float:
+    """Return the cross product of `along` and point - start, all of shape (2,); its sign is exact."""
+    sums = np.empty(8)
+    made = add_products(along[:1], point[1:], 1.0, sums, 0)
+    made = add_products(along[:1], start[1:], -1.0, sums, made)
+    made = add_products(along[1:], point[:1], -1.0, sums, made)
+    made = add_products(along[1:], start[:1], 1.0, sums, made)
+    return exact_sum(sums[:made])
+
+
+@compiled
 def beyond(values: Floats, lines: Floats, i: int, j: int, k: int) -> float:
     """Return a number that is positive if the point where the lines i and j meet violates line k; its sign is exact.
 
