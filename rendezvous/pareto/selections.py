@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import minimize
 
-from infoset.geometry.polytope import nearest_difference
+from infoset.geometry.polytope import nearest_pair
 from rendezvous._arrays import Floats
 from rendezvous.pareto.solution import EncounterSolution
 
@@ -110,7 +110,7 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
         raise ValueError("the meeting nearest to a preferred one is known only for craft that start at the same time")
     root, ideals = solution.costs[0].root, solution.ideals
     known, target = (ideals - ideals[0]) @ root.T, root @ (preferred - ideals[0])
-    nearest = target + nearest_difference(known, target[None]) if known.any() else known[0]
+    nearest = nearest_pair(known, target[None]).point
     return np.asarray(ideals[0] + np.linalg.solve(root, nearest))
 
 

@@ -1,7 +1,8 @@
 """Convex polytopes in R^n with both representations, flat ones included."""
 
-from infoset.geometry.polytope._measures import HIGHS, largest_ball, nearest_difference
+from infoset.geometry.polytope._measures import HIGHS, largest_ball
 from infoset.geometry.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+from infoset.geometry.polytope.nearest import nearest_pair
 from infoset.geometry.polytope.operations import polytope_from_support, product
 from infoset.geometry.polytope.polytope import Polytope
 
@@ -12,7 +13,7 @@ __all__ = [
     "UnboundedPolytopeError",
     "UncertainHullError",
     "largest_ball",
-    "nearest_difference",
+    "nearest_pair",
     "polytope_from_support",
     "product",
 ]

@@ -1,4 +1,4 @@
-"""Division into simplices, largest ball, orthonormal bases, and the shortest difference between two hulls."""
+"""Division into simplices, largest ball, and orthonormal bases."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from infoset.geometry.polytope.errors import UncertainHullError
 
 HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 """Options of HiGHS for linear programs on the scale of a polytope: feasibility tolerances of 1e-10."""
-_MAX_STEPS = 1000
-_PRECISION = 1e-14
 
 
 def simplices_of(sides: Flags, dimension: int) -> Integers:
@@ -94,43 +92,3 @@ def orthonormal(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
             triangle, pivots = triangle_of(columns)
             columns, rows = (solve_triangular(triangle.T, part[:, pivots].T, lower=True).T for part in (columns, rows))
     return columns, rows
-
-
-def nearest_difference(one: Floats, two: Floats) -> Floats:
-    """Return the shortest vector p - q from the hull of the points `two`, shape (m, n), to that of `one`, shape (k, n).
-
-    References
-    ----------
-    P. Wolfe, Finding the nearest point in a polytope, Mathematical Programming 11 (1976).
-    """
-    size = max(float(np.abs(one - two[0]).max()), float(np.abs(two - two[0]).max()), 1e-300)
-    corral = (one[:1] - two[:1]) / size
-    shares = np.ones(1)
-    for _ in range(_MAX_STEPS):
-        x = shares @ corral
-        p = one[int((one @ x).argmin())]
-        q = two[int((two @ x).argmax())]
-        point = (p - q) / size
-        if x @ x - x @ point <= _PRECISION * max(float(x @ x), _PRECISION) or (corral == point).all(axis=1).any():
-            break
-        corral, shares = np.vstack([corral, point]), np.append(shares, 0.0)
-        while True:
-            target = _affine_minimizer(corral)
-            if (target > 0.0).all():
-                shares = target
-                break
-            # Go toward the minimizer until a share is zero; drop that point.
-            below = target <= 0.0
-            part = float(np.min(shares[below] / np.maximum(shares[below] - target[below], 1e-300)))
-            shares = shares + min(1.0, part) * (target - shares)
-            shares[below & (shares <= shares[below].min())] = 0.0
-            kept = shares > 0.0
-            corral, shares = corral[kept], shares[kept] / shares[kept].sum()
-    return np.asarray(size * (shares @ corral))
-
-
-def _affine_minimizer(corral: Floats) -> Floats:
-    """Return the coefficients of the shortest point of the affine hull of points."""
-    edges = corral[1:] - corral[0]
-    weights = np.linalg.lstsq(edges.T, -corral[0], rcond=None)[0] if len(edges) else np.zeros(0)
-    return np.append(1.0 - weights.sum(), weights)

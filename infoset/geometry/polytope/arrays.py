@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
@@ -15,6 +16,7 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
 from infoset.geometry.double_words import EPS, affine_image, supports
 from infoset.geometry.polygon_arrays import PolygonArrays
+from infoset.geometry.polytope import cone
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import orthonormal
 from infoset.geometry.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
@@ -29,8 +31,12 @@ FLAT = 1e-11
 """Thickness below which points are flat, in coordinates in which they are one wide, and movement of their vertices."""
 _THIN = 1e-10
 """Width of a set, relative to the coordinates, below which rounding would fill it: the minimum of a scale."""
+_NOISE = 1e-15
+"""Length of a row, relative to the longest one, below which it is the rounding of a sum that is zero."""
 _FINE = 2.0**14
 """Ratio of widths from which a part is computed again in its own coordinates: it is known to 1e-12 of the whole."""
+_AGREEMENT = Fraction(1, 10**9)
+"""Distance between ends of a set and of the exact one, relative to its width: far above rounding in its coordinates."""
 _JOGGLES = (0.0, 3e-10, 1e-6)
 """Movements of points or half-spaces, one after the other, until vertices and facets agree."""
 
@@ -155,6 +161,8 @@ class PolytopeArrays:
             if joggle:  # points that have moved have simplices as facets; offsets follow from the points themselves
                 rows[:, :-1] = joggle * np.random.default_rng(0).uniform(-1.0, 1.0, inner.shape) - inner
             rays, on, _ = dd.extreme_rays(rows, False, 0.0)
+            # Rounding can divide a facet in two rays, each on some of its points: on all of them, they are one.
+            on |= dd.near(rays, rows, FLAT)
             with suppress(UncertainHullError):
                 used, sides, incidence = dd.lattice(on.T.copy(), dimension)
                 break
@@ -173,24 +181,25 @@ class PolytopeArrays:
     def _of_rows(cls, rows: Floats, limits: Floats, origin: Floats | float = 0.0, box: Box = ()) -> Self:
         """Return {x: rows (x - origin) <= limits}.
 
-        The coordinates in which the set is round are not known before the set, so it is computed again if others are
-        much better. If a `box` contains it, it is only computed in coordinates of the box; the result is empty also if
-        rounding decides about it there.
+        If a `box` contains it, it is only computed in coordinates of the box; the result is empty also if rounding
+        decides about it there. Otherwise the coordinates in which the set is round are not known before the set: see
+        `_guessed` and `_judged`.
         """
         if np.isneginf(limits).any():
             return cls.empty(rows.shape[1])
         rows, limits = rows[limits < np.inf], limits[limits < np.inf]
-        found = cls.empty(rows.shape[1])
-        if not box:
-            # In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
-            centre = np.zeros(rows.shape[1])
-            with suppress(UnboundedPolytopeError, UncertainHullError):
-                found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 0.25))
-            if found.is_empty:
-                found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, 1.0))
-            if found._is_round:
-                return found
-            box = found.bounding_box()
+        if box:
+            return cls._in_box(rows, limits, origin, box, cls.empty(rows.shape[1]))
+        found, unbounded = cls._guessed(rows, limits, origin)
+        if found._is_certain(rows, limits):
+            return found
+        if unbounded is not None and _is_proved(unbounded, rows, limits, origin):
+            raise unbounded
+        return cls._judged(rows, limits, origin, found)
+
+    @classmethod
+    def _in_box(cls, rows: Floats, limits: Floats, origin: Floats | float, box: Box, found: Self) -> Self:
+        """Return {x: rows (x - origin) <= limits}, computed in coordinates of a box around it; `found` if not there."""
         with suppress(EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError):
             for _ in range(3):
                 around = dd.coordinates(box[0], box[1], np.zeros(rows.shape[1]), _THIN)
@@ -200,6 +209,73 @@ class PolytopeArrays:
                     break
         return found
 
+    @classmethod
+    def _guessed(
+        cls, rows: Floats, limits: Floats, origin: Floats | float
+    ) -> tuple[Self, UnboundedPolytopeError | None]:
+        """Return {x: rows (x - origin) <= limits}, or the empty set, computed in guessed coordinates, then in its own.
+
+        In too small a scale a set seems to be empty or unbounded, in too large a one it has no width. The other value
+        is an error if the set seems to be unbounded.
+        """
+        found, centre, unbounded = cls.empty(rows.shape[1]), np.zeros(rows.shape[1]), None
+        for share in (0.25, 1.0):
+            try:
+                found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, share))
+            except UnboundedPolytopeError as error:
+                unbounded = error
+            except UncertainHullError:
+                continue
+            if not found.is_empty:
+                break
+        if found._is_round:
+            return found, unbounded
+        return cls._in_box(rows, limits, origin, found.bounding_box(), found), unbounded
+
+    def _is_certain(self, rows: Floats, limits: Floats) -> bool:
+        """Whether the set of these half-spaces needs no judge: it has points, and no width is near its rounding.
+
+        No row was taken for rounding, and pairs of opposite half-spaces hold a flat set in its affine hull.
+        """
+        if self.is_empty or (_shorter(rows * self.scale, _NOISE) & rows.any(axis=1)).any():
+            return False
+        widths = np.ptp(self.points, axis=0)
+        if ((widths > 0.0) & (widths < 1.0 / 64.0)).any():
+            return False
+        return self.dimension == self.space or len(_equations(rows, limits)) == self.space - self.dimension
+
+    @classmethod
+    def _judged(cls, rows: Floats, limits: Floats, origin: Floats | float, found: Self) -> Self:
+        """Return {x: rows (x - origin) <= limits}; exact vertices decide whether it is the `found` one.
+
+        If it is not, it is computed in the coordinates of the exact vertices.
+
+        Raises
+        ------
+        UnboundedPolytopeError
+            If the set is unbounded.
+        """
+        is_noise, exact = _noise(rows, limits, np.broadcast_to(origin, rows.shape[1]))
+        if not exact.points or not _holds_without_direction(limits, is_noise):
+            return cls.empty(rows.shape[1])
+        if not exact.is_bounded:
+            raise UnboundedPolytopeError(cone.rounded([*exact.lines, *exact.directions][0]))
+        if not found.is_empty and found._agrees(exact.box()):
+            return found
+        around = cone.coordinates(exact.box(), _THIN)
+        return cls._intersect(rows[~is_noise], limits[~is_noise], origin, *around, noise=0.0)
+
+    def _agrees(self, box: cone.Box) -> bool:
+        """Whether the ends of the set along each axis are those of an exact `box`, within 1e-9 of its width."""
+        lower, upper = self.points.min(axis=0), self.points.max(axis=0)
+        ends = zip(self.centre.tolist(), self.scale.tolist(), lower.tolist(), upper.tolist(), *box, strict=True)
+        for centre, scale, low, high, least, most in ends:
+            allowed = _AGREEMENT * (most - least) or EPS * abs(most)
+            for end, exact in ((low, least), (high, most)):
+                if abs(Fraction(centre) + Fraction(scale) * Fraction(end) - exact) > allowed:
+                    return False
+        return True
+
     @property
     def _is_round(self) -> bool:
         """Whether no other coordinates are much better, by a factor of 64; in none the empty set has points."""
@@ -207,10 +283,21 @@ class PolytopeArrays:
         return self.is_empty or bool(np.abs(points).max() <= 64.0 and np.ptp(points, axis=0).min() >= 1.0 / 64.0)
 
     @classmethod
-    def _intersect(cls, rows: Floats, limits: Floats, origin: Floats | float, centre: Floats, scale: Floats) -> Self:
-        """Return {x: rows (x - origin) <= limits}, computed in coordinates with a centre and scales."""
+    def _intersect(
+        cls,
+        rows: Floats,
+        limits: Floats,
+        origin: Floats | float,
+        centre: Floats,
+        scale: Floats,
+        noise: float = _NOISE,
+    ) -> Self:
+        """Return {x: rows (x - origin) <= limits}, computed in coordinates with a centre and scales.
+
+        Rows that are shorter than the longest one by the factor `noise` are rounding.
+        """
         space = len(scale)
-        scaled, possible = _scaled_rows(rows, _moved(rows, limits, centre - origin), scale)
+        scaled, possible = _scaled_rows(rows, _moved(rows, limits, centre - origin), scale, noise)
         if not possible:
             return cls.empty(space)
         table = np.vstack([np.eye(space + 1)[-1:], scaled * ([-1.0] * space + [1.0])])  # the first row is t >= 0
@@ -226,7 +313,10 @@ class PolytopeArrays:
                 return cls.empty(space)
             free = np.linalg.svd(table)[2][-1:] if rank <= space else rays[~ends]
             if len(free):
-                raise UnboundedPolytopeError(free[0, :-1] * scale)
+                inside = None
+                if rank > space:
+                    inside = centre + scale * rays[ends, :-1].mean(axis=0), scale * free[:, :-1].sum(axis=0)
+                raise UnboundedPolytopeError(free[0, :-1] * scale, inside)
             start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), on[:, 1:].copy(), centre, scale)
             with suppress(UncertainHullError):
                 return start._reduced(0)
@@ -390,6 +480,15 @@ class PolytopeArrays:
         return f"<{kind} in R^{self.space}: {len(self.points)} vertices, {len(self.facets)} facets>"
 
 
+def _equations(rows: Floats, limits: Floats) -> Floats:
+    """Return a basis of the rows whose opposite is also there, with the opposite limit, shape (k, n)."""
+    table = np.column_stack([rows, limits]) + 0.0
+    known = set(map(tuple, table.tolist()))
+    pairs = np.array([tuple((0.0 - row).tolist()) in known for row in table], np.bool_)
+    units = dd.in_units(rows[pairs])
+    return units[dd.pivots(units, dd.ON, -1)[0]]
+
+
 def _guess(rows: Floats, limits: Floats, share: float) -> Floats:
     """Return sizes of coordinates, powers of two, shape (n,): those at which a `share` of the rows is tight."""
     large = np.abs(rows) > 1e-14 * np.abs(rows).max(axis=1, initial=0.0, keepdims=True)  # others may be rounding
@@ -409,10 +508,65 @@ def _moved(rows: Floats, limits: Floats, shift: Floats) -> Floats:
     return affine_image(shift[None], -rows, limits.copy())[0][0] if shift.any() else limits
 
 
-def _scaled_rows(rows: Floats, limits: Floats, scale: Floats) -> tuple[Floats, bool]:
+def _scaled_rows(rows: Floats, limits: Floats, scale: Floats, noise: float = _NOISE) -> tuple[Floats, bool]:
     """Return rows (a, b), a . y <= b with x = scale y, and whether rows without a direction hold, to rounding."""
     table = np.column_stack([rows * scale, limits])
-    sizes = np.abs(table[:, :-1]).max(axis=1)
-    directed = sizes > 1e-15 * sizes.max(initial=0.0)  # a length below is rounding
-    possible = bool((limits[~directed] >= -1e-13 * np.abs(limits).max(initial=1e-300)).all())
-    return dd.in_units(table[directed]), possible
+    is_noise = _shorter(table[:, :-1], noise)
+    return dd.in_units(table[~is_noise]), _holds_without_direction(limits, is_noise)
+
+
+def _shorter(rows: Floats, factor: float) -> Flags:
+    """Return which rows are shorter than the longest one by a factor, or zero."""
+    sizes = np.abs(rows).max(axis=1)
+    return np.asarray(sizes <= factor * sizes.max(initial=0.0))
+
+
+def _holds_without_direction(limits: Floats, which: Flags) -> bool:
+    """Whether 0 x <= limit holds, to rounding, for some of the rows."""
+    return bool((limits[which] >= -1e-13 * np.abs(limits).max(initial=1e-300)).all())
+
+
+def _noise(rows: Floats, limits: Floats, origin: Floats) -> tuple[Flags, cone.Vertices]:
+    """Return which rows are rounding, and the exact vertices of the others.
+
+    A row is rounding if it is far shorter than the longest one, also in units of the box of the rows that are not: a
+    set that needs it to be bounded has no such box.
+    """
+    is_short = _shorter(rows, _NOISE)
+    exact = _exact_vertices(rows[~is_short], limits[~is_short], origin)
+    if not is_short.any():
+        return is_short, exact
+    is_noise = np.asarray(~rows.any(axis=1))
+    if exact.points and exact.is_bounded:
+        is_noise = is_noise | is_short & _shorter(rows * cone.coordinates(exact.box(), _THIN)[1], _NOISE)
+    if (is_short == is_noise).all():
+        return is_noise, exact
+    return is_noise, _exact_vertices(rows[~is_noise], limits[~is_noise], origin)
+
+
+def _is_proved(unbounded: UnboundedPolytopeError, rows: Floats, limits: Floats, origin: Floats | float) -> bool:
+    """Whether {x: rows (x - origin) <= limits} has the point and the direction that an error holds, for certain.
+
+    Products have doubled digits: a sum that is not positive has the right sign, or is exactly zero.
+    """
+    if unbounded.inside is None or np.any(origin):
+        return False
+    point, direction = unbounded.inside
+    missing, falls = rows @ point - limits, -(rows @ direction)
+
+    # Rows that the point violates to rounding hold farther along the direction.
+    violated = (missing > 0.0) & (falls > 0.0)
+    point = point + 2.0 * float((missing[violated] / falls[violated]).max(initial=1.0)) * direction
+    slopes, _ = affine_image(direction[None], rows, np.zeros(len(rows)))
+    heights, _ = affine_image(point[None], rows, -limits)
+    return bool((slopes <= 0.0).all() and (heights <= 0.0).all())
+
+
+def _exact_vertices(rows: Floats, limits: Floats, origin: Floats) -> cone.Vertices:
+    """Return the exact vertices of {x: rows (x - origin) <= limits}; without rows, those of the whole space."""
+    if not len(rows):
+        rows, limits = np.zeros((1, rows.shape[1])), np.zeros(1)
+    normals = cone.rationals(rows)
+    shifts = cone.product(normals, cone.rationals(origin[:, None]))
+    ends = [Fraction(limit) + shift for limit, (shift,) in zip(limits.tolist(), shifts, strict=True)]
+    return cone.vertices_of(normals, ends)

@@ -43,7 +43,7 @@ def _ones(word: Any) -> int:
 
 
 @_kernels.allocation_free
-def _common(one: Bits, others: Bits, counts: Integers) -> None:
+def common(one: Bits, others: Bits, counts: Integers) -> None:
     """Write the numbers of common bits of a set, shape (words,), and of others, shape (words, k)."""
     counts[:] = 0
     for word in range(len(one)):
@@ -146,7 +146,7 @@ def _cross(one: Any, rays: Floats, bits: Bits, heights: Floats, least: int, affi
     """Write the rays, and their bits, in which edges of one ray cross the row, see `crossings`; return their number."""
     columns, shared, near, result, marks = work
     found, count = 0, 0
-    _common(bits[one], columns, shared)
+    common(bits[one], columns, shared)
     for third in range(len(rays)):  # only rays with enough common rows can be the other end, or forbid an edge
         near[found] = third
         found += shared[third] >= least
@@ -297,7 +297,7 @@ def maximal(bits: Bits, least: int) -> tuple[Flags, bool]:
     columns, shared, k = np.ascontiguousarray(bits.T), np.empty(len(bits), np.int64), len(bits)
     kept, near, counts = np.ones(k, np.bool_), np.zeros(k, np.int64), np.empty(k, np.int64)
     for i in range(k):
-        _common(bits[i], columns, shared[: i + 1])
+        common(bits[i], columns, shared[: i + 1])
         counts[i] = shared[i]
         for j in range(i):
             if shared[j] >= least - 1:
@@ -453,6 +453,17 @@ def push_out(points: Floats, facets: Floats, on: Flags, old: Any, flat: bool, mo
                 mine[count] = k
                 count += on[i, k] > whole[k]
             _push(result[i], facets, mine[:count], centre, flat, most, work)
+    return result
+
+
+@_kernels.compiled
+def near(rays: Floats, rows: Floats, distance: float) -> Flags:
+    """Return which ray is within a relative `distance` of which row, shape (k, m): |row . ray| <= distance |ray|."""
+    result = np.empty((len(rays), len(rows)), np.bool_)
+    for i in range(len(rays)):
+        limit = distance * _size(rays[i])
+        for j in range(len(rows)):
+            result[i, j] = abs(_dot(rows[j], rays[i])) <= limit
     return result
 
 

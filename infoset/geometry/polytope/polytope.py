@@ -23,12 +23,17 @@ from infoset.geometry._set_arguments import (
 )
 from infoset.geometry.convex_set import ConvexSet
 from infoset.geometry.double_words import EPS, affine_image, supports
+from infoset.geometry.polytope import cone
 from infoset.geometry.polytope import double_description as dd
-from infoset.geometry.polytope._measures import largest_ball, nearest_difference, simplices_of, triangle_of
+from infoset.geometry.polytope._measures import largest_ball, simplices_of, triangle_of
 from infoset.geometry.polytope.arrays import PolytopeArrays
-from infoset.geometry.polytope.errors import UncertainHullError
+from infoset.geometry.polytope.errors import UnboundedPolytopeError, UncertainHullError
+from infoset.geometry.polytope.nearest import nearest_pair
 from infoset.geometry.polytope.reduction import reduced_outward
 from infoset.limits import Limits, real_values
+
+_CLEAR_PIVOT = 1e-6
+"""Pivot of a matrix with columns of size one that is certainly not zero: 1e9 times its rounding."""
 
 
 class Polytope(PolytopeArrays, ConvexSet):
@@ -75,18 +80,38 @@ class Polytope(PolytopeArrays, ConvexSet):
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m).
 
-        A step of the double description for each facet. An UnboundedPolytopeError is raised if the preimage is
-        unbounded: the matrix has a null space.
+        A step of the double description for each facet. If the matrix has a null space, the preimage is unbounded or
+        empty, which is decided in exact numbers for the facets of the set, relaxed by their rounding.
+
+        Raises
+        ------
+        UnboundedPolytopeError
+            If the preimage is unbounded.
         """
         factor, moved = finite_values("matrix", matrix, self.space, "m"), offset_values(offset, self.space)
         if self.is_empty:
             return self.empty(factor.shape[1])
         rows, limits = self._rows(moved)
+        lines = _null_space(factor)
+        if lines and self._misses_range(rows, limits, factor, moved):
+            return self.empty(factor.shape[1])
+        if lines:
+            raise UnboundedPolytopeError(cone.rounded(lines[0]))
         mapped, rounded = affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
         found = self._of_rows(mapped, limits)
         if found.dimension < found.space or not (rounded.any() or moved.any()):
             return found
         return found.enlarged(2.0 * EPS * np.abs(found.vertices).max(axis=0))
+
+    def _misses_range(self, rows: Floats, limits: Floats, matrix: Floats, offset: Floats) -> bool:
+        """Whether no x satisfies rows matrix x <= limits, the half-spaces around an `offset`, exactly decided.
+
+        The limits are relaxed by the rounding of the rows and of the limits themselves: by that of n + 2 operations.
+        """
+        terms = np.abs(rows) @ (np.abs(self.vertices).max(axis=0) + np.abs(offset) + np.abs(self.centre))
+        relaxed = limits + 4.0 * (self.space + 2) * EPS * terms
+        composed = cone.product(cone.rationals(rows), cone.rationals(matrix))
+        return not cone.vertices_of(composed, cone.rationals(relaxed[None])[0]).points
 
     def minkowski_sum(self, other: Polytope) -> Polytope:
         """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two vertices."""
@@ -163,9 +188,12 @@ class Polytope(PolytopeArrays, ConvexSet):
         if other.is_empty:
             raise ValueError("the difference with an empty set is unbounded")
         rows, limits = self._rows(self.centre)
-        widths = supports(other.vertices, rows)
-        less = limits - widths
-        less = np.where((less + widths == limits) & (limits - less == widths), less, np.nextafter(less, np.inf))
+        if self.dimension < self.space:
+            # The difference plus a point of the other set is a part of this one: it cannot leave the affine hull.
+            start = other.vertices[0]
+            part = self._with_rows(rows, _less(limits, supports(other.vertices - start, rows)), self.centre)
+            return part.translate(-start)
+        less = _less(limits, supports(other.vertices, rows))
         lower, upper = np.array(self.bounding_box()) - other.bounding_box()
         found = self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
         return self._of_rows(rows, less, self.centre) if found.is_empty else found
@@ -336,10 +364,13 @@ class Polytope(PolytopeArrays, ConvexSet):
     def closest_point(self, point: ArrayLike) -> Floats:
         """Return the point of the set nearest to a `point`, both of shape (n,), within 1e-12 of the size of the set.
 
-        Wolfe's algorithm: a least-squares problem of at most n + 1 points in each of a few steps.
+        Wolfe's algorithm: a least-squares problem of at most n + 1 points in each of a few steps. The point may be far
+        away: rounding is relative to the set and its coordinates.
         """
         x = finite_values("point", point, self.space)
-        return np.asarray(x + nearest_difference(self.needed().vertices, x[None, :])) if x not in self else x
+        if x in self:
+            return x
+        return nearest_pair(self.needed().vertices, x[None]).point
 
     def distance(self, other: Polytope | ArrayLike) -> float:
         """Return the distance from a polytope or point `other`, shape (n,); inf if one is empty. As `closest_point`."""
@@ -347,7 +378,7 @@ class Polytope(PolytopeArrays, ConvexSet):
             other = self.from_vertices(finite_values("other", other, self.space)[None])
         if self._need_other(other).is_empty or self.is_empty:
             return float("inf")
-        return float(np.linalg.norm(nearest_difference(self.vertices, other.vertices)))
+        return float(np.linalg.norm(nearest_pair(self.vertices, other.vertices).difference))
 
     def isdisjoint(self, other: Polytope) -> bool:
         """Return whether no point is in both sets, to rounding; see `separating_direction`."""
@@ -360,7 +391,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         """
         if self.is_empty or self._need_other(other).is_empty:
             return None
-        between = nearest_difference(other.vertices, self.vertices)
+        between = nearest_pair(other.vertices, self.vertices).difference
         length = float(np.linalg.norm(between))
         direction = np.asarray(between / (length or 1.0))
         return direction if self.support_function(direction) < -other.support_function(-direction) else None
@@ -373,3 +404,18 @@ class Polytope(PolytopeArrays, ConvexSet):
     def plot(self, axes: Any = None, **style: Any) -> None:
         """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""
         present_axes(axes).fill(*self._polygon().polygon().T, **style)
+
+
+def _less(limits: Floats, widths: Floats) -> Floats:
+    """Return limits - widths, rounded up where they are rounded."""
+    less = limits - widths
+    is_exact = (less + widths == limits) & (limits - less == widths)
+    return np.where(is_exact, less, np.nextafter(less, np.inf))
+
+
+def _null_space(matrix: Floats) -> list[cone.Row]:
+    """Return an exact basis of the null space of a matrix, shape (n, m)."""
+    units = dd.in_units(np.ascontiguousarray(matrix.T))
+    if len(dd.pivots(units, _CLEAR_PIVOT, -1)[0]) == matrix.shape[1]:
+        return []
+    return cone.null_space(cone.rationals(matrix))

@@ -1,0 +1,181 @@
+"""The nearest points of two convex hulls, also of hulls that are far from each other."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from infoset.arrays import Floats, Integers
+from infoset.geometry.double_words import two_product, two_sum
+from infoset.kernels import Kernels
+
+_kernels = Kernels()  # without fast-math: reordered sums would lose the errors
+
+_MAX_STEPS = 1000
+"""Number of vertices that Wolfe's algorithm may add: it ends after a few of each hull."""
+_PRECISION = 1e-14
+"""Decrease of x . d, relative to the sizes of x and of the hulls, that a step must offer: a hundred roundings."""
+_REFINEMENTS = 3
+"""Corrections of the shares, each of which divides their error by 1e16 over the squared condition of the edges."""
+_SMALL_STEP = 1e-16
+"""Change of the shares that is their rounding."""
+_DEPENDENT = 1e-12
+"""Part of an edge, relative to it, that is orthogonal to others, below which it is rounding."""
+_SMALLEST = 1e-90
+"""Size of the hulls, relative to the coordinates, below which they count as points: squares do not overflow."""
+
+
+class NearestPair(NamedTuple):
+    """Nearest points of two hulls, each of shape (n,), and their `difference`, point - other."""
+
+    point: Floats
+    other: Floats
+    difference: Floats
+
+
+def nearest_pair(one: Floats, two: Floats) -> NearestPair:
+    """Return the nearest points of the hulls of two sets of points, shapes (k, n) and (m, n).
+
+    The points are convex combinations of the given ones. Which vertices they combine, and with which shares, follows
+    from differences of vertices of one hull and from products with doubled digits. The rounding is therefore relative
+    to the size of the hulls, not to their distance.
+
+    References
+    ----------
+    P. Wolfe, Finding the nearest point in a polytope, Mathematical Programming 11 (1976).
+    """
+    extent = max(float(np.abs(one - one[0]).max()), float(np.abs(two - two[0]).max()))
+    largest = max(float(np.abs(one).max()), float(np.abs(two).max()))
+    if extent <= _SMALLEST * largest:
+        return NearestPair(one[0], two[0], one[0] - two[0])
+    unit = np.ldexp(1.0, np.frexp(extent)[1])
+    i, j, shares = _shares_of_nearest(np.ascontiguousarray(one / unit), np.ascontiguousarray(two / unit))
+    difference, _ = _combination(shares, one[i], two[j])
+    return NearestPair(shares @ one[i], shares @ two[j], difference)
+
+
+def _shares_of_nearest(one: Floats, two: Floats) -> tuple[Integers, Integers, Floats]:
+    """Return pairs of vertices, as their numbers, and shares of them, of the nearest points of hulls of size one."""
+    i = j = np.zeros(1, np.int64)
+    shares = np.ones(1)
+    for _ in range(_MAX_STEPS):
+        p, q, gap, is_known = _next_pair(one, two, i, j, shares)
+        if is_known or gap <= 0.0:
+            break
+
+        i = np.append(i, p)
+        j = np.append(j, q)
+        shares = np.append(shares, 0.0)
+        while True:
+            target = _affine_minimizer(one[i], two[j], shares)
+            if (target > 0.0).all():
+                shares = target
+                break
+            # Go toward the minimizer until a share is zero; drop that pair.
+            below = target <= 0.0
+            part = float(np.min(shares[below] / np.maximum(shares[below] - target[below], 1e-300)))
+            shares = shares + min(1.0, part) * (target - shares)
+            shares[below & (shares <= shares[below].min())] = 0.0
+            kept = shares > 0.0
+            i, j, shares = i[kept], j[kept], shares[kept] / shares[kept].sum()
+    return i, j, shares
+
+
+@_kernels.compiled
+def _next_pair(one: Floats, two: Floats, i: Integers, j: Integers, shares: Floats) -> tuple[int, int, float, bool]:
+    """Return the pair of vertices whose difference is lowest along the present one, x, and what it offers.
+
+    The third value is how much lower it is than x, less the minimum for a step; the last one is whether the present
+    pairs have this difference.
+    """
+    x, low = _combination(shares, one[i], two[j])
+    heights = _heights(one, one[i[0]], x, low)
+    other_heights = _heights(two, two[j[0]], x, low)
+    p, q = int(np.argmin(heights)), int(np.argmax(other_heights))
+
+    gap, is_known = other_heights[q] - heights[p], False
+    for k in range(len(shares)):
+        gap += shares[k] * (heights[i[k]] - other_heights[j[k]])
+        is_same = True
+        for axis in range(len(x)):
+            is_same &= one[i[k], axis] - one[p, axis] == two[j[k], axis] - two[q, axis]
+        is_known |= is_same
+    length = 0.0
+    for value in x:
+        length += value * value
+    return p, q, gap - _PRECISION * min(1.0, max(length, _PRECISION)), is_known
+
+
+@_kernels.compiled
+def _affine_minimizer(one: Floats, two: Floats, shares: Floats) -> Floats:
+    """Return the coefficients, sum 1, of the shortest combination x of the differences one - two, shape (k, n).
+
+    Newton steps from `shares`: the derivatives e . x along the edges e are precise, also if x is much longer than they.
+    The edges of length one have a triangular factor; edges that depend on earlier ones keep their shares.
+    """
+    count, result = len(shares) - 1, shares.copy()
+    if count == 0:
+        return result
+    lengths, basis = np.empty(count), (one[1:] - one[0]) - (two[1:] - two[0])
+    triangle = np.zeros((count, count))
+    for k in range(count):
+        lengths[k] = math.sqrt(np.square(basis[k]).sum())
+        basis[k] /= lengths[k]
+        for m in range(2 * k):  # twice, for rounding
+            along = (basis[m % k] * basis[k]).sum()
+            triangle[m % k, k] += along
+            basis[k] -= along * basis[m % k]
+        triangle[k, k] = math.sqrt(np.square(basis[k]).sum())
+        if triangle[k, k] > _DEPENDENT:
+            basis[k] /= triangle[k, k]
+        else:
+            triangle[k, k], basis[k] = 0.0, 0.0
+    for _ in range(_REFINEMENTS):
+        x, low = _combination(result, one, two)
+        step = (_heights(two, two[0], x, low) - _heights(one, one[0], x, low))[1:] / lengths
+        for k in range(count):
+            for m in range(k):
+                step[k] -= triangle[m, k] * step[m]
+            step[k] = step[k] / triangle[k, k] if triangle[k, k] > 0.0 else 0.0
+        for k in range(count - 1, -1, -1):
+            for m in range(k + 1, count):
+                step[k] -= triangle[k, m] * step[m]
+            step[k] = step[k] / triangle[k, k] if triangle[k, k] > 0.0 else 0.0
+        step /= lengths
+        result[1:] += step
+        result[0] -= step.sum()
+        if np.abs(step).max() <= _SMALL_STEP:
+            break
+    return result
+
+
+@_kernels.compiled
+def _combination(shares: Floats, one: Floats, two: Floats) -> tuple[Floats, Floats]:
+    """Return the sum of shares times differences of points, shapes (k,) and (k, n), as a sum of two numbers each."""
+    size = one.shape[1]
+    high, low = np.zeros(size), np.zeros(size)
+    for axis in range(size):
+        for k in range(len(shares)):
+            for sign, value in ((1.0, one[k, axis]), (-1.0, two[k, axis])):
+                product, rounded = two_product(sign * shares[k], value)
+                high[axis], lost = two_sum(high[axis], product)
+                low[axis] += lost + rounded
+        high[axis], low[axis] = two_sum(high[axis], low[axis])
+    return high, low
+
+
+@_kernels.compiled
+def _heights(points: Floats, base: Floats, high: Floats, low: Floats) -> Floats:
+    """Return (point - base) . (high + low) of points, shape (k, n), each rounded once: differences are exact."""
+    heights = np.empty(len(points))
+    for k in range(len(points)):
+        total, rest = 0.0, 0.0
+        for axis in range(len(base)):
+            step, step_low = two_sum(points[k, axis], -base[axis])
+            product, rounded = two_product(step, high[axis])
+            total, lost = two_sum(total, product)
+            rest += lost + rounded + (step * low[axis] + step_low * high[axis])
+        heights[k] = total + rest
+    return heights
