@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from rendezvous._arrays import Floats
 from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, state_scales
 
 OfTime = Callable[[Floats], Floats]
+WeightsAt = Callable[[Floats], tuple[Floats, Floats]]
 
 NODES = 8
 AGREEMENT = 2e-13
@@ -28,6 +30,15 @@ class HeldSegment(Segment):
     held: Floats
 
 
+class LinearSystem(NamedTuple):
+    """dx/ds = A(s) x + c(s) B u, for any independent variable s that increases with time."""
+
+    matrix_at: OfTime
+    """A of s of any shape: shape (..., 6, 6)."""
+    weights_at: WeightsAt
+    """c of s, the weight of the held control, and c^2 / t', the weight of the Gramian, of the shape of s."""
+
+
 class CollocatedMotion(LinearMotion):
     """A linear motion whose A(t) is known.
 
@@ -36,18 +47,26 @@ class CollocatedMotion(LinearMotion):
     two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
     """
 
-    def _clock(self, start_s: Floats, end_s: Floats, position: Floats) -> tuple[Floats, Floats]:
-        """Return times from the end (position 0) to the start (1) of n intervals, and by how much time falls with it.
-
-        `start_s` and `end_s` have shape (n, 1, 1); the results have that of the `position` after it, (n, p, k).
-        """
-        return end_s - (end_s - start_s) * position, (end_s - start_s) * np.ones_like(position)
-
     def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> HeldSegment:
         """Transition, Gramian and the effect of a held control together; end >= start, except for the transition."""
-        starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
-        solution, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
-        return HeldSegment(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
+        return collocate(LinearSystem(self.dynamics, _unit_weights), start_s, end_s)
+
+
+def collocate(motion: LinearSystem, start: ArrayLike, end: ArrayLike) -> HeldSegment:
+    """Solve a `motion` between values of its independent variable, see `CollocatedMotion`.
+
+    Raises
+    ------
+    ValueError
+        If two solutions do not agree.
+    """
+    starts, ends = np.broadcast_arrays(np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64))
+    solution, shape = _refined(motion, starts.ravel(), ends.ravel()), starts.shape
+    return HeldSegment(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
+
+
+def _unit_weights(time_s: Floats) -> tuple[Floats, Floats]:
+    return np.ones_like(time_s), np.ones_like(time_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +104,7 @@ class TimeVaryingMotion(CollocatedMotion):
         return np.unique(np.concatenate(settled))
 
 
-def _refined(motion: CollocatedMotion, starts: Floats, ends: Floats) -> HeldSegment:
+def _refined(motion: LinearSystem, starts: Floats, ends: Floats) -> HeldSegment:
     """Double the panels until two solutions agree, or differ by rounding only; many intervals in parts."""
     panels = _first_panels(motion, starts, ends)
     if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
@@ -105,12 +124,13 @@ def _refined(motion: CollocatedMotion, starts: Floats, ends: Floats) -> HeldSegm
     raise ValueError(f"A(t) changes too fast: {MAX_PANELS} panels an interval do not agree to {AGREEMENT:g}")
 
 
-def _first_panels(motion: CollocatedMotion, starts: Floats, ends: Floats) -> int:
+def _first_panels(motion: LinearSystem, starts: Floats, ends: Floats) -> int:
     """One panel for each radian of the fastest motion at the ends and the middle."""
     if not len(starts):
         return 1
-    times, speeds = motion._clock(starts[:, None, None], ends[:, None, None], np.array([[0.0, 0.5, 1.0]]))
-    radians = float((_rates(motion.dynamics(times)) * np.abs(speeds)).max())
+    durations = (ends - starts)[:, None]
+    places = ends[:, None] - durations * np.array([0.0, 0.5, 1.0])
+    radians = float((_rates(motion.matrix_at(places)) * np.abs(durations)).max())
     return int(np.clip(np.ceil(radians), 1, MAX_PANELS // 4))
 
 
@@ -118,7 +138,8 @@ def _rates(matrices: Floats) -> Floats:
     """Rates, rad/s, shape (...), at which motions of matrices A, shape (..., 6, 6), turn."""
     if not np.isfinite(matrices).all():
         raise ValueError("A(t) is not finite")
-    gravity = np.sqrt(np.abs(matrices[..., 3:, :3]).sum(axis=-1).max(axis=-1))
+    velocity = np.abs(matrices[..., :3, 3:]).sum(axis=-1).max(axis=-1)
+    gravity = np.sqrt(velocity * np.abs(matrices[..., 3:, :3]).sum(axis=-1).max(axis=-1))
     turning = np.abs(matrices[..., 3:, 3:]).sum(axis=-1).max(axis=-1)
     return np.asarray(np.maximum(gravity, turning))
 
@@ -132,17 +153,20 @@ def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
     return 0.5 * (nodes + 1.0), 0.5 * weights, 0.5 * integrals @ np.linalg.inv(values)
 
 
-def _collocated(motion: CollocatedMotion, starts: Floats, ends: Floats, panels: int) -> HeldSegment:
-    """Solve on equal panels of the clock, which runs backwards; states are divided by (T, T, T, 1, 1, 1)."""
+def _collocated(motion: LinearSystem, starts: Floats, ends: Floats, panels: int) -> HeldSegment:
+    """Solve on equal panels, from the end to the start; states are divided by (T, T, T, 1, 1, 1)."""
     nodes, weights, integrals = _gauss_collocation()
     durations = ends - starts
     positions = (np.arange(panels)[:, None] + nodes) / panels
-    times, speeds = motion._clock(starts[:, None, None], ends[:, None, None], positions)
-    steps = speeds / panels
+    places = ends[:, None, None] - durations[:, None, None] * positions
+    steps = durations[:, None, None] * np.ones_like(positions) / panels
+    held_weights, gramian_weights = motion.weights_at(places)
     spans = weights * steps
+    held_spans = spans * held_weights
+    gramian_spans = spans * gramian_weights
     scale = state_scales(durations)
     ratio = (scale[:, None, :] / scale[:, :, None])[:, None, None]
-    adjoint = np.swapaxes(motion.dynamics(times) * ratio, -1, -2) * steps[..., None, None]
+    adjoint = np.swapaxes(motion.matrix_at(places) * ratio, -1, -2) * steps[..., None, None]
     # (1 - h a_jk A_k') Psi_k = 1, for the 8 nodes of each panel at once.
     system = -np.einsum("jk,npkab->npjakb", integrals, adjoint).reshape(len(durations), panels, 6 * NODES, 6 * NODES)
     system[..., np.arange(6 * NODES), np.arange(6 * NODES)] += 1.0
@@ -154,8 +178,8 @@ def _collocated(motion: CollocatedMotion, starts: Floats, ends: Floats, panels: 
     gramian, held = np.zeros((len(durations), 6, 6)), np.zeros((len(durations), 6, 3))
     for panel in range(panels):
         turned = power[:, None] @ effect[:, panel]
-        gramian = gramian + np.einsum("nk,nkai,nkbi->nab", spans[:, panel], turned, turned)
-        held = held + np.einsum("nk,nkai->nai", spans[:, panel], turned)
+        gramian = gramian + np.einsum("nk,nkai,nkbi->nab", gramian_spans[:, panel], turned, turned)
+        held = held + np.einsum("nk,nkai->nai", held_spans[:, panel], turned)
         power = power @ np.swapaxes(last[:, panel], -1, -2)
     outer = scale[:, :, None] * scale[:, None, :]
     return HeldSegment(
