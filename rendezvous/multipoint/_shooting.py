@@ -14,7 +14,11 @@ from rendezvous.multipoint.segments import Nodes, Path, time_gradient
 from rendezvous.relative_motion.linear_motion import even_breaks
 from rendezvous.two_body import coast
 
+R, V, L_R, L_V = 0, 3, 6, 9
+"""First rows of the position, the velocity and their costates."""
 STEP_RAD = 0.1
+SMALLEST_COSTATE = 1e-300
+"""A smaller costate limits no step: it stands for zero in a division."""
 MAX_STEPS = 50_000
 MIN_RADIUS = 0.02
 """A trajectory nearer to the centre, relative to its initial distance, counts as falling into it."""
@@ -65,23 +69,41 @@ def _rates(_time: float, _y: Floats, z: Floats, _parameters: tuple[()], _dy: Flo
 _step = step_of(_rates)
 
 
+@allocation_free
+def column_size(z: Floats, first: int) -> float:
+    """Size of the vector in rows `first` to `first` + 2 of column 0 of z."""
+    return float(np.sqrt(z[first, 0] ** 2 + z[first + 1, 0] ** 2 + z[first + 2, 0] ** 2))
+
+
+@allocation_free
+def longest_step(z: Floats) -> float:
+    """Longest step from the state and costate in column 0 of z.
+
+    In one step the circular orbit at the present distance turns by 0.1 radians at most; and neither the speed, nor the
+    control lambda_v at its present size, nor its rate lambda_r moves the craft by more than about 0.1, 0.1^2 / 2 and
+    0.1^3 / 6 of this distance. Relative errors are about 1e-12 a revolution.
+    """
+    radius = column_size(z, R)
+    by_turn_or_speed = radius / max(1.0 / np.sqrt(radius), column_size(z, V))
+    by_control = np.sqrt(radius / max(column_size(z, L_V), SMALLEST_COSTATE))
+    by_control_rate = np.cbrt(radius / max(column_size(z, L_R), SMALLEST_COSTATE))
+    return float(STEP_RAD * min(by_turn_or_speed, by_control, by_control_rate))
+
+
 @compiled
 def propagate(z: Floats, duration: float) -> bool:
     """Propagate (r, v, lambda_r, lambda_v, energy), in column 0 of z, and its variations in place; z is (13, 1 + m).
 
     Lengths and times are such that the gravitational parameter is one. Returns whether the trajectory neither falls
-    into the centre nor takes too many steps. The energy is not varied. Steps of 0.1 radians of the circular orbit at
-    the present distance, or of 0.1 of this distance at a high speed, have relative errors of about 1e-12 a revolution.
+    into the centre nor takes too many steps. The energy is not varied. Steps are those of `longest_step`.
     """
     slopes, z_next = np.zeros((STAGES, *z.shape)), np.zeros(z.shape)
     no_y, no_slopes = np.zeros(0), np.zeros((STAGES, 0))
     left = duration
     for _ in range(MAX_STEPS):
-        radius = np.sqrt(z[0, 0] ** 2 + z[1, 0] ** 2 + z[2, 0] ** 2)
-        if not radius > MIN_RADIUS:
+        if not column_size(z, R) > MIN_RADIUS:
             return False
-        speed = np.sqrt(z[3, 0] ** 2 + z[4, 0] ** 2 + z[5, 0] ** 2)
-        step = min(left, STEP_RAD * radius / max(1.0 / np.sqrt(radius), speed))
+        step = min(left, longest_step(z))
         if left - step < 1e-3 * step:
             step = left
         _step(0.0, step, 0, no_y, z, (), no_slopes, slopes, no_y, z_next)
