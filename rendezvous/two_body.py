@@ -1,22 +1,36 @@
-"""Motion under the gravity of one point: osculating elements, and coasting along an ellipse for many states at once."""
+"""Motion under the gravity of one point: osculating elements, and coasting along any conic for many states at once."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Floats
-from rendezvous.relative_motion.elliptic_orbit import eccentric_of_mean
+
+_STRAIGHT = 1e-15
+"""A motion is straight if the square of its transverse speed is below this share of that of its speed: rounding."""
+_NEARLY_PARABOLIC = 1e-5
+"""Conics whose binding is smaller have the time of a parabola to the perigee, to this relative error."""
+_STUMPFF_SERIES = np.array([[(-1) ** k / math.factorial(order + 2 * k) for order in (2, 3)] for k in range(10)])
+"""Coefficients of Stumpff's c_2 and c_3 up to the power 9: the next term is below 1 / 22! for arguments up to 1."""
+_MAX_ROUNDS = 200
+"""Newton's method needs about 10 rounds, and bisection 60 for 60 bits."""
 
 
 @dataclass(frozen=True)
 class OrbitalElements:
-    """Elements of an ellipse and the true anomaly; `raan` is the right ascension of the ascending node.
+    """Elements of an ellipse or a hyperbola, and the true anomaly; `raan` is the right ascension of the ascending node.
 
-    The constructor raises `ValueError` if the semi-major axis is not positive, or the eccentricity outside [0, 1).
+    The semi-major axis of a hyperbola is negative.
+
+    Raises
+    ------
+    ValueError
+        If the semi-major axis and the eccentricity belong to neither, or the true anomaly is beyond the asymptotes.
     """
 
     semi_major_axis_m: float
@@ -27,10 +41,19 @@ class OrbitalElements:
     true_anomaly_rad: float
 
     def __post_init__(self) -> None:
-        if not (self.semi_major_axis_m > 0.0 and 0.0 <= self.eccentricity < 1.0):
+        is_ellipse = self.semi_major_axis_m > 0.0 and 0.0 <= self.eccentricity < 1.0
+        is_hyperbola = self.semi_major_axis_m < 0.0 and self.eccentricity > 1.0
+        if not (is_ellipse or is_hyperbola):
             raise ValueError(
-                f"an ellipse has a semi-major axis above 0 and an eccentricity from 0 to below 1, not "
-                f"{self.semi_major_axis_m:g} m and {self.eccentricity:g}"
+                "an ellipse has a semi-major axis above 0 and an eccentricity from 0 to below 1, a hyperbola a "
+                "semi-major axis below 0 and an eccentricity above 1, not "
+                f"{self.semi_major_axis_m:g} m and {self.eccentricity:g}; give a parabola by position and velocity"
+            )
+        if not 1.0 + self.eccentricity * math.cos(self.true_anomaly_rad) > 0.0:
+            raise ValueError(
+                f"a hyperbola of eccentricity {self.eccentricity:g} has true anomalies up to "
+                f"{math.degrees(math.acos(-1.0 / self.eccentricity)):.6g} deg, not "
+                f"{math.degrees(self.true_anomaly_rad):g} deg"
             )
 
     def state(self, gravitational_parameter_m3_s2: float) -> tuple[Floats, Floats]:
@@ -83,32 +106,83 @@ def orbit_fault(position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, plane
     return None
 
 
+class _Start(NamedTuple):
+    """States in units in which their distance and the gravitational parameter are one."""
+
+    unit_s: Floats
+    binding: Floats
+    """Distance over semi-major axis: positive on an ellipse, zero on a parabola, negative on a hyperbola."""
+    outward: Floats
+    """Radial speed."""
+    transverse_squared: Floats
+
+
+def closest_approach_m(
+    position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float, duration_s: float
+) -> float:
+    """Return the minimum distance from the planet's centre, m, while a craft coasts.
+
+    `duration_s` is not negative, and may be infinite.
+    """
+    start = _scaled_start(position_m, velocity_m_s, gravitational_parameter_m3_s2)
+    if _to_perigee(start) * start.unit_s < duration_s:
+        return perigee_m(position_m, velocity_m_s, gravitational_parameter_m3_s2)
+    # Between two perigees the distance has no minimum but the ends.
+    end = position_m
+    if math.isfinite(duration_s):
+        end = coast(np.concatenate([position_m, velocity_m_s]), duration_s, gravitational_parameter_m3_s2)[:3]
+    return float(min(np.linalg.norm(position_m), np.linalg.norm(end)))
+
+
+def flight_fault(
+    position_m: Floats, velocity_m_s: Floats, mu_m3_s2: float, planet_radius_m: float, duration_s: float
+) -> str | None:
+    """Return why a craft cannot coast for a duration, along any conic: it meets the planet; None if it can."""
+    if not position_m.any():
+        return "the position is the centre of the planet"
+    distance_m = closest_approach_m(position_m, velocity_m_s, mu_m3_s2, duration_s)
+    if not distance_m > planet_radius_m:
+        return (
+            f"the orbit meets the planet during the flight: its distance from the centre falls to "
+            f"{distance_m / 1e3:.6g} km, and the planet's radius is {planet_radius_m / 1e3:.6g} km"
+        )
+    return None
+
+
 def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: float) -> Floats:
     """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting; `duration_s` may be negative.
 
-    Lagrange's f and g functions of the change of the eccentric anomaly. Raise `ValueError` if a state is not on an
-    ellipse.
+    Lagrange's f and g functions of the universal anomaly, which are the same for ellipses, parabolas and hyperbolas.
+
+    Raises
+    ------
+    ValueError
+        If a state is at the attracting point or not finite, or falls straight through the point in the duration.
+
+    References
+    ----------
+    Battin, An Introduction to the Mathematics and Methods of Astrodynamics, AIAA 1999, section 4.5.
     """
-    mu = gravitational_parameter_m3_s2
     position, velocity = states[..., :3], states[..., 3:]
-    radius = np.linalg.norm(position, axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = 2.0 / radius - (velocity**2).sum(axis=-1) / mu
-    if not (np.isfinite(inverse).all() and (inverse > 0.0).all()):
-        raise ValueError("a state is not on an ellipse about the attracting point: it escapes, or falls into it")
-    axis = 1.0 / inverse
-    cosine, sine = 1.0 - radius / axis, (position * velocity).sum(axis=-1) / np.sqrt(mu * axis)
-    eccentricity, first = np.hypot(cosine, sine), np.arctan2(sine, cosine)
-    if (eccentricity >= 1.0).any():
+    start = _scaled_start(position, velocity, gravitational_parameter_m3_s2)
+    duration = np.asarray(duration_s, dtype=np.float64) / start.unit_s
+    direction = np.where(duration < 0.0, -1.0, 1.0)
+    ahead = start._replace(outward=direction * start.outward)
+
+    is_straight = start.transverse_squared <= _STRAIGHT * (2.0 - start.binding)
+    if (is_straight & (_to_perigee(ahead) <= np.abs(duration))).any():
         raise ValueError("a state falls straight into the attracting point; give it a transverse velocity")
-    rate = np.sqrt(mu / axis**3)
-    passed = eccentric_of_mean(first - sine + rate * np.asarray(duration_s, dtype=np.float64), eccentricity) - first
-    later = axis * (1.0 - cosine * np.cos(passed) + sine * np.sin(passed))
-    half = 2.0 * np.sin(0.5 * passed) ** 2
-    f = 1.0 - axis / radius * half
-    g = (radius / axis * np.sin(passed) + sine * half) / rate
-    f_rate = -np.sqrt(mu * axis) / (later * radius) * np.sin(passed)
-    g_rate = 1.0 - axis / later * half
+
+    anomaly = direction * _universal_anomaly(start.binding, ahead.outward, np.abs(duration))
+    first, second, _ = _stumpff(start.binding * anomaly**2)
+    advance = anomaly * first
+    turn = anomaly**2 * second
+    later = 1.0 + start.outward * advance + (1.0 - start.binding) * turn
+
+    f = 1.0 - turn
+    g = (advance + start.outward * turn) * start.unit_s
+    f_rate = -advance / later / start.unit_s
+    g_rate = 1.0 - turn / later
     return np.concatenate(
         [
             f[..., None] * position + g[..., None] * velocity,
@@ -116,3 +190,95 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
         ],
         axis=-1,
     )
+
+
+def _scaled_start(position: Floats, velocity: Floats, gravitational_parameter_m3_s2: float) -> _Start:
+    radius = np.linalg.norm(position, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        unit_s = np.sqrt(radius**3 / gravitational_parameter_m3_s2)
+        speed = velocity * (unit_s / radius)[..., None]
+        direction = position / radius[..., None]
+    outward = (direction * speed).sum(axis=-1)
+    transverse = speed - outward[..., None] * direction
+    binding = 2.0 - (speed**2).sum(axis=-1)
+    if not (np.isfinite(binding).all() and (unit_s > 0.0).all()):
+        raise ValueError("a state is at the attracting point, or its numbers are too large")
+    return _Start(unit_s, binding, outward, (transverse**2).sum(axis=-1))
+
+
+def _to_perigee(start: _Start) -> Floats:
+    """Time to the next perigee; infinite after the only one of a parabola or a hyperbola."""
+    binding, outward, transverse_squared = start.binding, start.outward, start.transverse_squared
+    size = np.abs(binding)
+    rate = np.maximum(size, _NEARLY_PARABOLIC) ** 1.5
+    eccentricity = np.sqrt(np.maximum(1.0 - binding * transverse_squared, 0.0))
+    # e sin E on an ellipse, e sinh H on a hyperbola.
+    sine = outward * np.sqrt(size)
+
+    on_ellipse = (np.arctan2(sine, 1.0 - binding) - sine) / rate
+    on_hyperbola = (sine - np.arcsinh(sine / np.maximum(eccentricity, 1.0))) / rate
+    on_parabola = 0.5 * outward * (transverse_squared + outward**2 / 3.0)
+    since = np.where(binding > 0.0, on_ellipse, on_hyperbola)
+    since = np.where(size < _NEARLY_PARABOLIC, on_parabola, since)
+    return np.asarray(np.where(since <= 0.0, -since, _period(binding) - since))
+
+
+def _period(binding: Floats) -> Floats:
+    """Period of an ellipse; infinite on a parabola or a hyperbola."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(2.0 * np.pi / np.maximum(binding, 0.0) ** 1.5)
+
+
+def _universal_anomaly(binding: Floats, outward: Floats, duration: Floats) -> Floats:
+    """Solve Kepler's equation for the universal anomaly, without whole revolutions; `duration` is not negative.
+
+    Newton's method in a bracket, which is halved where a step leaves it: time increases with the anomaly.
+    """
+    period = _period(binding)
+    rest = np.mod(duration, period)
+    with np.errstate(divide="ignore"):
+        revolution = 2.0 * np.pi / np.sqrt(np.maximum(binding, 0.0))
+    low = np.zeros_like(rest)
+    high = np.where(np.isfinite(revolution), revolution, 1.0)
+    while (is_short := (binding <= 0.0) & (_time_of(high, binding, outward)[0] < rest)).any():
+        high = np.where(is_short, 2.0 * high, high)
+
+    anomaly = np.minimum(rest, high)
+    for _ in range(_MAX_ROUNDS):
+        time, radius = _time_of(anomaly, binding, outward)
+        low = np.where(time <= rest, anomaly, low)
+        high = np.where(time >= rest, anomaly, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ahead = anomaly - (time - rest) / radius
+        is_inside = (ahead >= low) & (ahead <= high)
+        ahead = np.where(is_inside, ahead, 0.5 * (low + high))
+        is_settled = np.abs(ahead - anomaly) <= 4e-16 * anomaly
+        anomaly = ahead
+        if is_settled.all():
+            break
+    return np.asarray(anomaly)
+
+
+def _time_of(anomaly: Floats, binding: Floats, outward: Floats) -> tuple[Floats, Floats]:
+    """Time at a universal anomaly, and the distance there, which is its derivative."""
+    first, second, third = _stumpff(binding * anomaly**2)
+    advance = anomaly * first
+    turn = anomaly**2 * second
+    return advance + outward * turn + anomaly**3 * third, 1.0 + outward * advance + (1.0 - binding) * turn
+
+
+def _stumpff(square: Floats) -> tuple[Floats, Floats, Floats]:
+    """Stumpff's functions c_1, c_2 and c_3: c_k(x) = 1 / k! - x / (k + 2)! + x^2 / (k + 4)! ..."""
+    is_near = np.abs(square) < 1.0
+    near = np.where(is_near, square, 0.0)
+    second_near, third_near = np.polynomial.polynomial.polyval(near, _STUMPFF_SERIES)
+
+    far = np.where(is_near, 1.0, np.abs(square))
+    root = np.sqrt(far)
+    on_ellipse = square > 0.0
+    sine = np.where(on_ellipse, np.sin(root), np.sinh(root))
+    half_sine = np.where(on_ellipse, np.sin(0.5 * root), np.sinh(0.5 * root))
+    first = np.where(is_near, 1.0 - near * third_near, sine / root)
+    second = np.where(is_near, second_near, 2.0 * half_sine**2 / far)
+    third = np.where(is_near, third_near, np.abs(root - sine) / (far * root))
+    return first, second, third

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous.two_body import OrbitalElements, orbit_fault
+from infoset.arrays import Floats
+from rendezvous.two_body import OrbitalElements, flight_fault, orbit_fault
 
 MAX_RADIANS, MIN_RADIANS = 1000.0, 1e-9
 """Angles of the orbit during a problem, within which linear motion is meaningful."""
@@ -25,13 +26,33 @@ def check_angle(key: str, duration_s: float, rate_rad_s: float) -> None:
 def check_orbit(key: str, state: tuple[ArrayLike, ArrayLike], mu_m3_s2: float) -> None:
     """Raise ValueError, which begins with `key`, if the orbit of a state (position and velocity, SI) meets its planet.
 
-    The planet has the density of the Earth. No planet or moon is denser, so that the radius of theirs is greater.
+    The orbit is an ellipse; the planet is that of `densest_m`.
     """
     position, velocity = (np.asarray(vector, dtype=float) for vector in state)
-    densest_m = EARTH_RADIUS_M * (mu_m3_s2 / EARTH_M3_S2) ** (1.0 / 3.0)
-    fault = orbit_fault(position, velocity, mu_m3_s2, densest_m)
+    fault = orbit_fault(position, velocity, mu_m3_s2, densest_m(mu_m3_s2))
     if fault is not None:
         raise ValueError(f"{key}: {fault}")
+
+
+def check_flight(key: str, state: Floats, mu_m3_s2: float, before_s: float, after_s: float) -> None:
+    """Raise ValueError, which begins with `key`, if a body that coasts through a state, SI, meets its planet.
+
+    It coasts along any conic, from `before_s` before the `state`, shape (6,), to `after_s` after it; the planet is that
+    of `densest_m`.
+    """
+    position, velocity = state[:3], state[3:]
+    for direction, duration_s in ((-1.0, before_s), (1.0, after_s)):
+        try:
+            fault = flight_fault(position, direction * velocity, mu_m3_s2, densest_m(mu_m3_s2), duration_s)
+        except ValueError as error:
+            raise ValueError(f"{key}: {error}") from None
+        if fault is not None:
+            raise ValueError(f"{key}: {fault}")
+
+
+def densest_m(mu_m3_s2: float) -> float:
+    """Return the radius of a planet with the density of the Earth; no planet or moon is denser, or smaller."""
+    return float(EARTH_RADIUS_M * (mu_m3_s2 / EARTH_M3_S2) ** (1.0 / 3.0))
 
 
 def check_rate(rate_rad_s: float, eccentricity: float = 0.0) -> None:

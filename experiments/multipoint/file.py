@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from experiments.common.orbit_checks import check_angle, check_orbit, check_rate
+from experiments.common.orbit_checks import check_angle, check_flight, check_rate
 from infoset.arrays import Floats
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
 from rendezvous.multipoint import KeplerTour, Meet, Target, TimeLimits, Tour
@@ -104,8 +104,9 @@ class MultipointProblem:
         for key, body in bodies.items():
             if mu is not None:
                 with np.errstate(all="ignore"):  # elements of any size are refused here
-                    state = body.state(mu)
-                    check_orbit(key, (state[:3], state[3:]), mu)
+                    before_s = max(body.epoch_s, 0.0)
+                    after_s = max(self.last_s - body.epoch_s, 0.0)
+                    check_flight(key, body.state(mu), mu, before_s, after_s)
             elif body.elements is not None or body.epoch_s != 0.0:
                 raise ValueError(f"{key}: elements and epoch_s belong to inertial axes, not to those of Hill")
         _ = self.tour  # raises ValueError if a target is wrong
@@ -120,6 +121,16 @@ class MultipointProblem:
     def latest_s(self) -> float | None:
         """The latest time of the last visit."""
         return None if self.times is None else self.times.latest_s
+
+    @property
+    def last_s(self) -> float:
+        """The last time that a visit may have; infinite if nothing limits it."""
+        times = [target.time_s for target in self.target if target.time_s is not None]
+        if self.latest_s is not None:
+            times.append(self.latest_s)
+        elif self.times is not None or len(times) < len(self.target):
+            return np.inf
+        return max(times, default=np.inf)
 
     def limits(self) -> TimeLimits:
         """Return the limits of the times; ValueError if the last time has neither a limit nor a price."""

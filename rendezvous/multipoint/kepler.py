@@ -20,13 +20,13 @@ MAX_KNOWN = 64
 class KeplerTour(Visits):
     """A chaser and the targets it visits, all under the gravity of one point.
 
-    `initial`, shape (n, 6), are the inertial states of the targets, on ellipses, m and m/s, at their epochs, `epoch_s`,
-    shape (n,). `start_state`, shape (6,), is the chaser's at t = 0; epochs refer to the same time.
+    `initial`, shape (n, 6), are the inertial states of the targets, m and m/s, at their epochs, `epoch_s`, shape (n,).
+    `start_state`, shape (6,), is the chaser's at t = 0; epochs refer to the same time. All may be on any conic.
 
     Raises
     ------
     ValueError
-        If the start is not on an ellipse, or two targets have the same name.
+        If the start is at the attracting point or not finite, or two targets have the same name.
 
     Notes
     -----

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.common.input_file import load_problem
+from rendezvous.multipoint import KeplerTour, Meet, Target
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 
@@ -108,6 +109,54 @@ def test_five_targets_as_listed(infoset: Command) -> None:
     assert (np.array(results["times_s"]) - np.array([0.0, *leave[:-1]]) >= 600.0 * (1.0 - 1e-9)).all()
     gradient = results["time_gradient_m2_s4"]
     assert max(abs(each) for each in gradient[:-1]) < 1e-6 * abs(gradient[-1])
+
+
+CHASER = "[chaser]\nposition_km = [12000.0, 2000.0, 0.0]\nvelocity_km_s = [{0}, {1}, 0.0]\n"
+CIRCLE_KM_S = 6.3134811459289
+"""Speed on a circle of 10 000 km about the Earth."""
+
+
+def published(chaser: str) -> str:
+    """A rendezvous with a station on a circle of 10 000 km after a radian, the gravity that of the Earth."""
+    station = f"position_km = [10000.0, 0.0, 0.0]\nvelocity_km_s = [0.0, {CIRCLE_KM_S}, 0.0]\n"
+    return (
+        'kind = "multipoint"\nname = "published"\ngravitational_parameter_km3_s2 = 398600.4418\n'
+        f'{chaser}[[target]]\nname = "station"\nmeet = "rendezvous"\ntime_s = 1583.912229856\n{station}'
+    )
+
+
+def test_a_chaser_on_a_hyperbola(infoset: Command, mine: Callable[[str], Path]) -> None:
+    # The published relative state 0.2, 0.2, 0.1, 0.1 was refused as no ellipse; its cost, with mu = 1, is that of
+    # tests/rendezvous/multipoint/test_kepler.py.
+    hyperbola = CHASER.format(-0.1 * CIRCLE_KM_S, 1.3 * CIRCLE_KM_S)
+    unit_m2_s3 = (CIRCLE_KM_S * 1e3) ** 2 / (1e7 / (CIRCLE_KM_S * 1e3))
+    start = np.array([1.2, 0.2, 0.0, -0.1, 1.3, 0.0])
+    station = np.array([[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
+    tour = KeplerTour((Target("station", Meet.RENDEZVOUS),), station, np.zeros(1), 1.0, start)
+
+    found_cost = found(infoset, mine(published(hyperbola)))["cost_m2_s3"]
+
+    # The numbers of the file have 13 digits, and both paths 9.
+    assert found_cost == pytest.approx(tour.fly((0,), [1.0]).cost * unit_m2_s3, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("chaser", "message"),
+    [
+        (CHASER.format(-7.0, 0.0), "chaser: the orbit meets the planet during the flight"),
+        (CHASER.format(7.0, 0.0) + "epoch_s = 4000.0\n", "chaser: the orbit meets the planet during the flight"),
+        ("[chaser]\nposition_km = [0, 0, 0]\nvelocity_km_s = [1, 0, 0]\n", "chaser: the position is the centre"),
+    ],
+)
+def test_a_body_that_meets_the_planet_is_refused(
+    chaser: str, message: str, infoset: Command, mine: Callable[[str], Path]
+) -> None:
+    assert message in infoset.refused("multipoint", mine(published(chaser)))
+
+
+def test_a_planet_that_is_met_after_the_flight_does_not_matter(infoset: Command, mine: Callable[[str], Path]) -> None:
+    # Falls on the planet after 45 minutes.
+    assert found(infoset, mine(published(CHASER.format(0.0, 2.0))))["cost_m2_s3"] > 0.0
 
 
 @pytest.mark.parametrize(

@@ -129,7 +129,7 @@ def random_visits(seed: int) -> tuple[KeplerTour, Floats]:
             for _ in range(count)
         ]
     )
-    targets = tuple(Target(str(at), random.choice(list(Meet), p=[0.6, 0.4])) for at in range(count))
+    targets = tuple(Target(str(at), Meet.FLYBY if random.random() < 0.6 else Meet.RENDEZVOUS) for at in range(count))
     times = random.uniform(0.02, 0.3) + gap * np.arange(count)
     return KeplerTour(targets, states, np.zeros(count), 1.0, START), times
 
@@ -162,6 +162,52 @@ def test_a_flyer_goes_on_from_the_last_path() -> None:
     near = fly(np.array([2.01, 5.0]))
     assert near.cost == pytest.approx(path.cost + 0.01 * path.time_gradient[0], rel=2e-2)
     assert missed(near) < 1e-7
+
+
+def relative_to_a_circle(x: float, y: float, x_rate: float, y_rate: float) -> Floats:
+    """Inertial state of a craft near one at (1, 0, 0) on a circular orbit, from its state in Hill's axes."""
+    return np.array([1.0 + x, y, 0.0, x_rate - y, 1.0 + x + y_rate, 0.0])
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        relative_to_a_circle(0.2, 0.2, 0.1, 0.1),  # a published rendezvous: a hyperbola, refused as no ellipse
+        np.array([1.0, 0.0, 0.0, 0.0, np.sqrt(2.0), 0.0]),  # a parabola
+        np.array([1.2, 0.1, 0.1, -2.0, 0.5, 0.0]),  # a hyperbola, inward
+        np.array([1.1, 0.0, 0.0, -0.1, 0.0, 0.0]),  # straight down, to the centre after the flight
+    ],
+)
+def test_a_chaser_may_start_on_any_conic(start: Floats) -> None:
+    target = np.array([[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
+    case = KeplerTour((Target("station", Meet.RENDEZVOUS),), target, np.zeros(1), 1.0, start)
+
+    path = case.fly((0,), [1.0])
+
+    assert missed(path) < ALLOWED
+    begin = np.concatenate([start, path.costate_start, [0.0]])
+    flown = solve_ivp(with_energy, (0.0, 1.0), begin, method="DOP853", rtol=1e-12, atol=1e-14)
+    assert path.cost == pytest.approx(flown.y[-1, -1], rel=1e-9)
+
+
+def with_energy(time: float, values: Floats) -> Floats:
+    return np.append(rates(time, values[:12]), 0.5 * values[9:12] @ values[9:12])
+
+
+def test_targets_may_be_on_any_conic() -> None:
+    # An escaping target, whose state is known at an epoch after the visit.
+    state = np.array([0.9, -1.3, 0.1, 1.5, 0.4, -0.2])
+    case = KeplerTour((Target("comet"),), coast(state, 3.0, 1.0)[None], np.array([3.5]), 1.0, START)
+
+    path = case.fly((0,), [0.5])
+
+    np.testing.assert_allclose(path.nodes.arrive[0], state, atol=1e-13)
+    assert missed(path) < ALLOWED
+
+
+def test_a_start_at_the_centre_is_refused() -> None:
+    with pytest.raises(ValueError, match="at the attracting point"):
+        KeplerTour((Target("a"),), START[None], np.zeros(1), 1.0, np.zeros(6))
 
 
 def test_what_cannot_be_reached_is_told() -> None:
