@@ -24,11 +24,11 @@ class Multipoint(FileOptions):
     problem: ProblemName = "service-3"
     settings: Settings = None
     order: Annotated[
-        Literal["given", "best"], typer.Option(help="Order of the targets: that of the file, or the best one.")
+        Literal["given", "best"], typer.Option(help="Order of the targets: that of the file, or the best one found.")
     ] = "given"
     times: Annotated[
         Literal["given", "best"] | None,
-        typer.Option(help="Times of the visits: those of the file, or the best ones. Default: as in the file."),
+        typer.Option(help="Times of the visits: those of the file, or the best ones found. Default: as in the file."),
     ] = None
     csv: Csv = None
     html: Html = None

@@ -45,5 +45,5 @@ def multipoint_page(report: Report) -> str:
     visits = ", ".join(
         f"{target} at {time * per_s:.6g} {clock}" for target, time in zip(report.names, nodes.arrive_s, strict=True)
     )
-    about = [f"cost I = {path.cost:.8g} m²/s³", f"order: {visits}", f"axes: {report.axes_text}"]
+    about = [f"cost I = {path.cost:.8g} m²/s³", f"order: {visits}", f"axes: {report.axes_text}", *report.notes]
     return motion_page(f"Visits {report.problem.name}", about, time_s, views, graphs)

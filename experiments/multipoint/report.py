@@ -86,7 +86,30 @@ class Report:
             linear = isinstance(self.problem.tour, Tour)
             proved = linear and self.times_chosen == "given" and not self.best.lost
             notes.append("no order that fits the times costs less" if proved else "the order is the best one found")
-        return [*notes, "the times are a local minimum"] if self.times_chosen == "best" else notes
+        search = self.best.time_search
+        if search is not None:
+            notes.append(
+                f"the times are a local minimum, the lowest one found by {search.followed} descents from the best of "
+                f"{search.starts} starting points"
+            )
+            if self.revolutions > 1.0:
+                notes.append(
+                    f"over {self.revolutions:.2g} revolutions there are many local minima, and others are often "
+                    "lower: compare the costs from different time_s"
+                )
+        return notes
+
+    @property
+    def revolutions(self) -> float:
+        """Return the revolutions until the latest time: of the reference orbit, or of a circle through the start."""
+        problem = self.problem
+        rate_rad_s = problem.orbit_rate_rad_s
+        if rate_rad_s is None:
+            assert problem.gravitational_parameter_m3_s2 is not None
+            radius_m = float(np.linalg.norm(problem.tour.start_state[:3]))
+            rate_rad_s = float(np.sqrt(problem.gravitational_parameter_m3_s2 / radius_m**3))
+        latest_s = self.end_s if problem.latest_s is None else problem.latest_s
+        return rate_rad_s * (latest_s - problem.tour.start_s) / (2.0 * np.pi)
 
 
 def report_json(report: Report) -> dict[str, object]:
@@ -107,8 +130,16 @@ def report_json(report: Report) -> dict[str, object]:
         "evaluations": report.best.evaluations,
         "orders_begun": report.best.nodes,
         "orders_left_out": len(report.best.lost),
+        "time_search": _time_search_json(report),
         "notes": report.notes,
     }
+
+
+def _time_search_json(report: Report) -> dict[str, object] | None:
+    search = report.best.time_search
+    if search is None:
+        return None
+    return {"starts": search.starts, "followed": search.followed, "revolutions": report.revolutions}
 
 
 def _node_json(report: Report, index: int) -> dict[str, object]:

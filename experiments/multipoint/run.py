@@ -48,7 +48,7 @@ def _best(
         return best_order_of_slots(tour, guesses[0], progress=progress)
     if times_are_free:
         timed = best_times(tour, order, problem.limits(), guesses, progress=progress)
-        return BestOrder(order, timed.path, timed.objective, 1, timed.evaluations)
+        return BestOrder(order, timed.path, timed.objective, 1, timed.evaluations, time_search=timed.search)
     assert problem.times_s is not None
     path = tour.fly(order, problem.times_s)
     price_per_s = 0.0 if problem.times is None else problem.times.price_per_s

@@ -3,7 +3,7 @@
 from rendezvous.multipoint.kepler import KeplerTour
 from rendezvous.multipoint.order import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
 from rendezvous.multipoint.segments import Nodes, NotSettledError, Path, solve_segments
-from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times
+from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, TimeSearch, optimise_times
 from rendezvous.multipoint.tour import Meet, Target, Tour, Visits
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Path",
     "Target",
     "TimeLimits",
+    "TimeSearch",
     "Tour",
     "Visits",
     "best_order",

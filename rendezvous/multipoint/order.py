@@ -12,7 +12,14 @@ from numpy.typing import ArrayLike
 
 from rendezvous._arrays import Flags, Floats
 from rendezvous.multipoint.segments import NotSettledError, Path, check_times
-from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times
+from rendezvous.multipoint.times import (
+    BestTimes,
+    Effort,
+    NoRoomError,
+    TimeLimits,
+    TimeSearch,
+    optimise_times,
+)
 from rendezvous.multipoint.tour import SMOOTH, Visits
 
 Report = Callable[[float], None]
@@ -26,7 +33,8 @@ class BestOrder:
     """Targets visited in their best `order`, first to last.
 
     `objective` is the energy plus the price of the time, m^2/s^3. The search examined `nodes` partial orders and
-    computed `evaluations` paths; partial orders in `lost` were skipped because no path was found.
+    computed `evaluations` paths; partial orders in `lost` were skipped because no path was found. `time_search` is the
+    last search for the times of the `order`; None if they were given.
     """
 
     order: tuple[int, ...]
@@ -35,6 +43,7 @@ class BestOrder:
     nodes: int
     evaluations: int
     lost: tuple[tuple[int, ...], ...] = ()
+    time_search: TimeSearch | None = None
 
 
 def best_order(
@@ -85,7 +94,8 @@ def best_order(
     best = search.run()
     final = best_times(tour, search.best, limits, [best.nodes.arrive_s, *guesses])
     evaluations = search.evaluations + final.evaluations
-    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, tuple(search.lost))
+    lost = tuple(search.lost)
+    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, lost, final.search)
 
 
 def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
@@ -78,9 +79,18 @@ class TimeLimits:
             )
 
 
+class TimeSearch(NamedTuple):
+    """Extent of a search for best times."""
+
+    starts: int
+    """Starting points, the guesses included, whose cost was computed."""
+    followed: int
+    """Starting points that were followed to a local minimum, the cheapest of which is the result."""
+
+
 @dataclass(frozen=True, eq=False)
 class BestTimes:
-    """Visits at their best times.
+    """Visits at the best times that were found, which are a local minimum.
 
     `objective` is the energy plus the price of the time, m^2/s^3; `evaluations` is the number of paths computed.
     """
@@ -88,6 +98,7 @@ class BestTimes:
     path: Path
     objective: float
     evaluations: int
+    search: TimeSearch
 
     @property
     def time_s(self) -> Floats:
@@ -194,9 +205,9 @@ def optimise_times(
     Notes
     -----
     The problem is not convex. Many starts are evaluated, and the search begins with those that cost no more than their
-    neighbours; a lower minimum elsewhere is not excluded. The descent is sequential quadratic programming in the gaps,
-    on the logarithm of the objective, with the exact gradient dI/dt; then Newton's method, with differences of the
-    gradient, on the gaps that are not at a limit. Each step computes one path.
+    neighbours; a lower minimum elsewhere is not excluded, and over several revolutions it is frequent. The descent is
+    sequential quadratic programming in the gaps, on the logarithm of the objective, with the exact gradient dI/dt; then
+    Newton's method, with differences of the gradient, on the gaps that are not at a limit. Each step computes one path.
     """
     count = len(dwell_s)
     shifts = start_s + np.concatenate([[0.0], np.cumsum(dwell_s[:-1])])
@@ -237,7 +248,7 @@ def optimise_times(
                 f"the best times found cost {best.objective:.6g} m^2/s^3 and are no minimum: another gap lowers the "
                 "cost; start from other times, or give visits more time"
             )
-    return BestTimes(best.path, best.objective, trials.evaluations)
+    return BestTimes(best.path, best.objective, trials.evaluations, TimeSearch(len(starts), len(ends)))
 
 
 def _unsettled(trials: _Trials, best: _Trial) -> float:
