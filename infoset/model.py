@@ -41,7 +41,8 @@ class Model(Enum):
 class InitialSet(Enum):
     """Shape of a section at the start.
 
-    RECTANGLE is a rectangle in (omega, alpha), as in the paper; BOX is a rectangle in (z, V).
+    RECTANGLE is a rectangle in (omega, alpha), as in the paper, and belongs to the paper's model; BOX is a rectangle in
+    (z, V).
     """
 
     RECTANGLE = "rectangle"
@@ -133,7 +134,8 @@ class SetSettings:
     model : Model
         What the set allows for.
     initial_set : InitialSet or None
-        Shape of a section at the start; None is RECTANGLE in the paper's model and BOX in the guaranteed one.
+        Shape of a section at the start; None is RECTANGLE in the paper's model and BOX in the guaranteed one, whose
+        only shape it is.
     sections : int
         Number of x-sections at the start, on a uniform grid over the possible ranges, ends included.
     fewest_sections : int
@@ -151,7 +153,8 @@ class SetSettings:
     Raises
     ------
     TypeError, ValueError
-            If a value is not within its limits, or `sections` is less than `fewest_sections`.
+            If a value is not within its limits, `sections` is less than `fewest_sections`, or a set of the guaranteed
+            model starts in the paper's rectangle.
     """
 
     model: Model = Model.GUARANTEED
@@ -167,6 +170,13 @@ class SetSettings:
         check_fields(self)
         if self.sections < self.fewest_sections:
             raise ValueError(f"sections must be at least fewest_sections, {self.fewest_sections}: got {self.sections}")
+        if self.is_guaranteed and self.initial_set is InitialSet.RECTANGLE:
+            # The rectangle takes angles for their tangents: x arctan(z/x) is less than z, and a corner of the box of
+            # the starts is outside.
+            raise ValueError(
+                'initial_set = "rectangle" belongs to model = "paper": the rectangle does not contain all possible '
+                'starts, as model = "guaranteed" must; leave initial_set out, or write model = "paper"'
+            )
 
     @property
     def is_guaranteed(self) -> bool:
@@ -176,7 +186,7 @@ class SetSettings:
     @property
     def starts_as_box(self) -> bool:
         """Whether a section at the start is a rectangle in (z, V), and not in (omega, alpha)."""
-        return self.is_guaranteed if self.initial_set is None else self.initial_set is InitialSet.BOX
+        return self.is_guaranteed or self.initial_set is InitialSet.BOX
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class Outcome(Enum):
 
 _PHI = (
     "Bound Phi of the miss (in the paper's model the published Phi, which is not a bound); unknown where no label "
-    "left, the set did not start as a box, or the data exceeded their error bounds"
+    "left, or the data exceeded their error bounds"
 )
 _MARGIN = (
     "Smallest distance from the true state to the boundary of its section, negative outside; unknown where nothing was "

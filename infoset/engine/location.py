@@ -1,7 +1,7 @@
 """Search for the living labels: those whose section is not empty. Each probe of a label replays the history.
 
-If the set is convex in (z, V, label), the living labels form one interval. This holds for the guaranteed model with a
-box as initial set and without rates. With rates the search finds one interval and does not narrow the limits of the
+If the set is convex in (z, V, label), the living labels form one interval. This holds for the guaranteed model without
+rates. With rates the search finds one interval and does not narrow the limits of the
 labels to it; before it reports that no label lives, it searches windows of labels with bands that are convex there.
 See docs/guarantee.md for the other cases.
 """
@@ -296,7 +296,7 @@ def is_convex(laws: Laws) -> bool:
     """Whether sets without rates are convex along all axes, so that the living labels form one interval."""
     for channel in range(laws.shape[0]):
         law = law_of(laws, channel)
-        if law.rectangle if law.exact_angles else law.error_slope > 0.0:
+        if not law.exact_angles and law.error_slope > 0.0:
             return False
     return True
 
@@ -307,8 +307,7 @@ def refine_all(wanted: Flags, number: int, limits: tuple[Floats, Floats], past: 
 
     Return the number of vertices that every new section may gain. If no label lives, the engagement has no living
     section afterwards. The limits of the labels, each of shape (B,), are narrowed to dead labels, except where other
-    labels may live beyond them: with rates, with the rectangle as initial set of the guaranteed model, and with an
-    error bound that rises with range in the paper's model.
+    labels may live beyond them: with rates, and with an error bound that rises with range in the paper's model.
     """
     spare = CAPACITY
     slots, used, laws = sections.slots, sections.used, past.laws

@@ -76,7 +76,7 @@ class SetState:
         self.status = np.full(batch, SetStatus.TRACKING.value, dtype=np.int64)
         self.some_left = np.zeros(batch, dtype=bool)
         self.lost_step, self.lost_label = np.full(batch, -1, dtype=np.int64), np.zeros(batch)
-        has_phi = guarantee and model.is_guaranteed and model.starts_as_box
+        has_phi = guarantee and model.is_guaranteed
         self.phi = GuaranteedMiss(self.laws[0], batch, model.speed_error) if has_phi else None
         self._none, self._no_angles = np.zeros(batch, dtype=bool), np.empty((len(self.laws), 0))
         # Vertices that every section may still gain.

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from guidance import LineOfSight, NoiseKind, RandomNoise
-from infoset import InformationSetView, InitialSet, Model, RateSensor, StateBox
+from infoset import InformationSet, InformationSetView, InitialSet, Model, RateSensor, StateBox
 from infoset.arrays import Floats
 from infoset.engine.section_law import section_laws
 from sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
@@ -276,9 +276,16 @@ def test_phi_follows_impulses_fired_after_labels_have_left(asteroid: Scenario) -
     assert sound(simulate(early, 100))
 
 
-def test_the_rectangle_has_no_phi(asteroid: Scenario) -> None:
-    """Its sections are not convex over labels, and the proof needs that: nothing is claimed."""
-    rectangle = replace(guaranteed(asteroid).set_model, initial_set=InitialSet.RECTANGLE)
-    results = simulate(replace(guaranteed(asteroid), **of_model(rectangle)), 20)
-    assert results.guaranteed_miss_m.count() == 0
-    assert results.truth_kept.all()
+def test_rectangle_is_refused_because_it_does_not_contain_the_starts(asteroid: Scenario) -> None:
+    """At range x the rectangle ends at x arctan(z/x), below z: the start with the maximum z is outside."""
+    settings = guaranteed(asteroid).information_set
+    with pytest.raises(ValueError, match=r'^initial_set = "rectangle" belongs to model = "paper"'):
+        replace(settings, initial_set=InitialSet.RECTANGLE)
+    with pytest.raises(ValueError, match=r'^initial_set = "rectangle" belongs to model = "paper"'):
+        replace(guaranteed(asteroid).set_model, initial_set=InitialSet.RECTANGLE)
+
+    published = replace(asteroid.set_model, model=Model.PAPER, initial_set=InitialSet.RECTANGLE)
+    box = published.bounds
+    for section in InformationSet(published).sections():
+        heights_m = section.polygons[0].polygon()[:, 1]
+        assert heights_m.max() < box.z_m[1]

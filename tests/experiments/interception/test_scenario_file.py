@@ -118,6 +118,10 @@ def test_the_start_for_an_own_scenario_has_every_key() -> None:
             ["information_set.model=guaranteed", "information_set.initial_set=box", "uncertainty.vx_km_s=[-120, -57]"],
             "the guaranteed model needs a closing speed known to better than 100 %",
         ),
+        (
+            ["information_set.model=guaranteed", "information_set.initial_set=rectangle"],
+            'initial_set = "rectangle" belongs to model = "paper"',
+        ),
     ],
 )
 def test_values_that_contradict_each_other_are_refused(settings: list[str], problem: str) -> None:

@@ -78,12 +78,6 @@ def other_speed(scenario: Scenario) -> Scenario:
         ),
         (
             lambda scenario: replace(
-                scenario, **of_model(replace(scenario.set_model, initial_set=InitialSet.RECTANGLE))
-            ),
-            "starts in a rectangle of angle and rate",
-        ),
-        (
-            lambda scenario: replace(
                 scenario,
                 **of_model(
                     replace(
@@ -99,6 +93,12 @@ def other_speed(scenario: Scenario) -> Scenario:
 def test_each_assumption_has_its_reason(change: Callable[[Scenario], Scenario], reason: str) -> None:
     assert why_no_value(known()) == ()
     assert why_no_value(change(known())) == (reason,)
+
+
+def test_start_in_the_rectangle_is_a_second_reason_of_the_papers_model() -> None:
+    published = replace(known().set_model, model=Model.PAPER, initial_set=InitialSet.RECTANGLE)
+    reasons = why_no_value(replace(known(), **of_model(published)))
+    assert reasons == ("model paper", "starts in a rectangle of angle and rate")
 
 
 def test_reserve_of_a_weak_engine_by_hand() -> None:
