@@ -10,13 +10,19 @@ import numpy as np
 from guidance.estimate import MissEstimate
 from guidance.situation import Situation
 from infoset import BearingSensor, RangeSensor, SetModel
-from infoset.arrays import Floats
+from infoset.arrays import Flags, Floats
 from infoset.limits import Checked, NotNegative
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a state: lateral offset, its rate, range, closing speed and lateral acceleration."""
 MEMBERS = 9
 """Number M of filters."""
+ROUNDING = 64.0 * 2.0**-52
+"""Rounding error of the variance of a component, relative to it: since the last measurement each element has gone
+through three products of matrices of up to 5 x 5, some 50 roundings."""
+PRECISE = 2.0**-36
+"""Variance of a precise measurement, relative to the maximum variance of its expected value. A less precise measurement
+leaves at least 16 of the 52 bits of the covariance."""
 
 
 class KalmanBank:
@@ -55,6 +61,13 @@ class KalmanBank:
     the variance c^2/3 of the centroid part is added to that of the miss. Errors of the engine add the variance
     (delta k)^2/3 to that of V_z after an impulse k.
 
+    A measurement is *precise* if its variance R is nearly below the rounding of the variance of the expected value; R
+    is negligible for an angle that is measured without error. It is used as a linear equation of the state s, h s = c
+    with c of variance R: z = x tan(alpha) for an angle, which has no error of linearisation. Joseph's form would lose
+    the covariance P to rounding, and the filter updates a root S of it, P = S S' (Potter's form): with f = S'h the gain
+    is K = S f / (f'f + R), and S becomes S - K f' / (1 + (R / (f'f + R))^(1/2)). Where f'f + R is rounding, the filter
+    knows h s already, and the measurement does not change its state.
+
     References
     ----------
     Kalman (1960); Peach (1995), Bearings-only tracking using a set of range-parameterised extended Kalman filters;
@@ -86,8 +99,17 @@ class KalmanBank:
             gradient = np.zeros_like(self.mean)
             square = z * z + x * x
             gradient[..., Z], gradient[..., X] = x / square, -z / square
+            expected = np.arctan2(z, x)
             variance = _independent_error_rad(situation.information.model, x) ** 2 / 3.0
-            self._measure(situation, "angle", np.arctan2(z, x), gradient, variance)
+            precise = self._is_precise(gradient, variance)
+            if precise.any():
+                alpha = np.where(situation.is_new("angle"), situation.measured["angle"], 0.0)[..., None]
+                # The equation z = x tan(alpha), times cos^2(alpha) / x, for an innovation in radians.
+                cosine, sine = np.cos(alpha), np.sin(alpha)
+                expected = np.where(precise, alpha - cosine * (sine - z / x * cosine), expected)
+                gradient[..., Z] = np.where(precise, cosine * cosine / x, gradient[..., Z])
+                gradient[..., X] = np.where(precise, -sine * cosine / x, gradient[..., X])
+            self._measure(situation, "angle", expected, gradient, variance)
 
     def estimate(self, situation: Situation) -> MissEstimate:
         """Return the estimated miss over the bank."""
@@ -161,6 +183,11 @@ class KalmanBank:
         new = situation.is_new(sensor)
         innovation = np.where(new, situation.measured[sensor], 0.0)[..., None] - expected
         new = new[:, None]
+        precise = self._is_precise(gradient, variance)
+        if precise.any():
+            self._measure_precisely(new & precise, innovation, expected, gradient, variance)
+            new = new & ~precise
+            variance = np.where(precise, 1.0, variance)
         spread = np.einsum("...ij,...j->...i", self.covariance, gradient)
         # Rounding may leave a negative value where angles have reduced a variance by twenty decades.
         total = np.maximum(np.einsum("...i,...i->...", gradient, spread), 0.0) + variance
@@ -171,6 +198,45 @@ class KalmanBank:
         self.covariance += variance[..., None, None] * gain[..., :, None] * gain[..., None, :]
         likelihood = 0.5 * (innovation**2 / total + np.log(total))
         self.log_weight = self.log_weight - np.where(new, likelihood, 0.0)
+
+    def _measure_precisely(
+        self, where: Flags, innovation: Floats, expected: Floats, gradient: Floats, variance: Floats
+    ) -> None:
+        """Update the filters of `where` with one scalar measurement, in Potter's form, and their weights."""
+        row, residual = gradient[where], innovation[where]
+        root = _square_root(self.covariance[where])
+        across = np.einsum("nij,ni->nj", root, row)
+        square = (across * across).sum(axis=-1) + variance[where]
+
+        rounding = ROUNDING * self._largest_variance(gradient)[where] + (ROUNDING * expected[where]) ** 2
+        total = np.maximum(square, rounding)
+        across = np.where((square > rounding)[:, None], across, 0.0)
+        gain = np.einsum("nij,nj->ni", root, across) / total[:, None]
+        share = 1.0 / (1.0 + np.sqrt(variance[where] / total))
+
+        self.mean[where] += gain * residual[:, None]
+        root = root - (share[:, None] * gain)[:, :, None] * across[:, None, :]
+        self.covariance[where] = root @ np.swapaxes(root, -1, -2)
+        self.log_weight[where] -= 0.5 * (residual**2 / total + np.log(total))
+
+    def _is_precise(self, gradient: Floats, variance: Floats) -> Flags:
+        """Return whether a measurement is too precise for Joseph's form, shape (C, B, M)."""
+        return np.asarray(variance < PRECISE * self._largest_variance(gradient))
+
+    def _largest_variance(self, gradient: Floats) -> Floats:
+        """Return the maximum variance h'Ph of an expected value, (sum |h_i| s_i)^2 with the deviations s_i of P."""
+        deviations = np.sqrt(np.maximum(np.einsum("...ii->...i", self.covariance), 0.0))
+        return np.asarray((np.abs(gradient) * deviations).sum(axis=-1) ** 2)
+
+
+def _square_root(covariance: Floats) -> Floats:
+    """Return a matrix S with S S' = P for each covariance P, shape (n, size, size); rounding may leave P indefinite."""
+    deviations = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
+    scale = np.where(deviations > 0.0, deviations, 1.0)
+    # The components have different units, and the rounding errors of their correlations have none.
+    correlations = np.clip(covariance / scale[:, :, None] / scale[:, None, :], -1.0, 1.0)
+    values, vectors = np.linalg.eigh(correlations)
+    return np.asarray(deviations[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :])
 
 
 def _independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
