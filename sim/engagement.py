@@ -181,12 +181,15 @@ class Engagements:
         self._information.predict()
         self._truth_section.predict()
         passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
-        passing = self._flying & passage.passed
+        # A target that accelerates can return before x = 0, and Phi bounds the minimum distance until then.
+        passed = passage.passed & ~self._arrived
+        if some(passed):
+            self._miss = np.where(passed, passage.min_distance_m, self._miss)
+            self._lateral_miss = np.where(passed, passage.lateral_m, self._lateral_miss)
+        passing = self._flying & passed
         if some(passing):
-            self._miss = np.where(passing, passage.min_distance_m, self._miss)
-            self._lateral_miss = np.where(passing, passage.lateral_m, self._lateral_miss)
             self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
-            self._flying &= ~passage.passed
+            self._flying &= ~passing
         self.step += 1
         if not self._flying.all():
             # The label leaves at x = 0, which may come after the closest approach.
