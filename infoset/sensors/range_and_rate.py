@@ -50,6 +50,9 @@ class RangeSensor(Checked, Sensor):
         """Cut by the range; an angle measured in the same step sharpens the cut."""
         sets.measure_range(measured[self.name], self.relative_error, where, alpha_rad=measured.get(BearingSensor.name))
 
+    def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> None:
+        """Return None: a range selects labels, and to first order the distance does not depend on z and V."""
+
     def share(self, apart: Apart) -> Floats:
         """Return half of the maximum difference of the distances, in units of the bound, shape (n,)."""
         difference_m = apart.slope * np.hypot.reduce(apart.offset_m) + apart.shift_m

@@ -123,14 +123,13 @@ class Sensor(ABC):
             Engagements that have measured.
         """
 
-    def measures_at(self, before_arrival_s: float) -> bool:
-        """Return whether the sensor measures at a time before the nominal arrival, s."""
-        return True
-
+    @abstractmethod
     def band(
         self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0
     ) -> tuple[bool, Floats] | None:
         """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
+
+        The search for two motions uses it. It may neglect terms of second order, because `share` checks what is found.
 
         Parameters
         ----------
@@ -147,19 +146,18 @@ class Sensor(ABC):
             Whether it is a band of the predicted miss z + V x/e (otherwise of z), and its half-width, m. None if a
             measurement leaves V and z as they are.
         """
-        return None
 
+    @abstractmethod
     def share(self, apart: Apart) -> Floats:
         """Return half of the maximum difference of the measured values of two motions, in units of the bound.
 
-        Shape (n,). Both can have the same measured value where it is at most 1. This default is that of `band`, which
-        neglects the square of the slope.
+        Shape (n,). Both can have the same measured value where it is at most 1. The lower bound of the miss is a
+        theorem only if no difference of two motions within `apart` is greater: see Lemma 20 of docs/guarantee.md.
         """
-        band = self.band(apart.range_m, apart.closing_speed_m_s, 2.0)
-        if band is None:
-            return np.zeros(len(apart.range_m))
-        size = apart.predicted_miss_m if band[0] else apart.offset_m
-        return np.asarray(np.abs(size).max(axis=0) / band[1])
+
+    def measures_at(self, before_arrival_s: float) -> bool:
+        """Return whether the sensor measures at a time before the nominal arrival, s."""
+        return True
 
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
         """Return the measured value for an error in units of the bound, from -1 to 1."""

@@ -41,7 +41,7 @@ CONTRACTS = {
     "start": "guidance.Strategy",
     "decide": "guidance.Strategy",
     "measure": "guidance.MeasurementNoise",
-    **dict.fromkeys(("true_value", "bound", "band", "cut", "measured", "error"), "infoset.Sensor"),
+    **dict.fromkeys(("true_value", "bound", "band", "share", "cut", "measured", "error"), "infoset.Sensor"),
 }
 """Methods of a contract that many classes implement; the contract describes their parameters."""
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from guidance import LineOfSight, NoiseKind
-from infoset import InformationSetView, RangeSensor, Recovery, Sensor
+from infoset import InformationSetView, RangeSensor, RateSensor, Recovery, Sensor
 from infoset.arrays import Flags, Floats
-from infoset.sensors import Cuttable, Geometry, Measurements
+from infoset.sensors import Apart, Cuttable, Geometry, Measurements
 from sim import Outcome, Scenario, fly_one, lower_bound, simulate
 from sim.scenario import of_model
 from tests.guaranteed import guaranteed
@@ -71,6 +71,9 @@ class StreakSensor(Sensor):
 
     def band(self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0) -> tuple[bool, Floats]:
         return True, errors * 0.5 * self.pixel_rad / self.exposure_s * range_m**2 / closing_speed_m_s
+
+    def share(self, apart: Apart) -> Floats:
+        return RateSensor(self.period_s, 0.5 * self.pixel_rad / self.exposure_s).share(apart)
 
 
 class WithStreaks(Scenario):
