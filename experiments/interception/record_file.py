@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from experiments.common.errors import InputError, on_a_screen
+from experiments.common.errors import InputError, input_errors, on_a_screen
 from experiments.common.input_file import read_input
 from experiments.common.output import write_file
 from infoset import InformationSet
@@ -30,10 +30,14 @@ from infoset.sensors import SENSORS, Measurements
 from sim import Inconsistency, MissCause, Outcome, Record, Results, Scenario
 from sim.columns import columns_of
 from sim.gravity import on_board_model
+from sim.scenario import MAX_STEPS
 from sim.storage.codec import from_json, to_json
 
 MAX_FILE_BYTES, MAX_HEADER_BYTES, MAX_ARRAY_HEADER_BYTES = 1 << 28, 1 << 20, 1 << 8
 LONGEST_REASON = 300
+MAX_SECTION_STEPS = 5 * MAX_STEPS
+"""Maximum number of sections times steps: the longest flight with the five sections of the built-in missions. A section
+takes about 1.4 kB a step when a record is read, so this is 0.7 GB."""
 REMEDY = "make a record with `infoset engage --record FILE.npz`"
 
 Arrays = dict[str, NDArray[Any]]
@@ -92,7 +96,9 @@ class Header:
 
 
 def record_bytes(record: Record) -> bytes:
-    """Return the content of the `.npz` file of a record."""
+    """Return the content of the `.npz` file of a record; `InputError` if the record is too large to be read again."""
+    with input_errors("record"):
+        _check_size(record.scenario, record.steps)
     header = Header(
         **{name: getattr(record, name) for name in _OF_HEADER},
         outcome=record.result.outcomes[0],
@@ -121,6 +127,7 @@ def load_record(path: str | os.PathLike[str]) -> Record:
         arrays = _read_arrays(content)
         header = from_json(Header, json.loads(arrays["header"].tobytes()))
         _check(arrays, len(header.scenario.set_model.axes))
+        _check_size(header.scenario, len(arrays["time_s"]))
         return _to_record(header, arrays)
     except (ValueError, ArithmeticError, RecursionError) as error:
         reason = on_a_screen(str(error)[:LONGEST_REASON])
@@ -180,6 +187,17 @@ def _check(arrays: Arrays, axes: int) -> None:
         raise ValueError("time_s does not increase")
     if arrays["result_velocity_m_s"][0, -1] >= 0.0:
         raise ValueError("result_velocity_m_s does not approach")
+
+
+def _check_size(scenario: Scenario, steps: int) -> None:
+    """Raise ValueError if the sets of a record take too much memory."""
+    settings = scenario.information_set
+    sections = max(settings.sections, 2 * settings.fewest_sections + 1)
+    if sections * steps > MAX_SECTION_STEPS:
+        raise ValueError(
+            f"it has {sections} sections in {steps} steps, and their product may be at most {MAX_SECTION_STEPS}: "
+            "reduce information_set.sections or increase step_s"
+        )
 
 
 def replayed(scenario: Scenario, measured: Measurements, impulse_m_s: Floats) -> Iterator[InformationSet]:

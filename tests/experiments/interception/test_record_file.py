@@ -285,3 +285,39 @@ def test_compressed_or_double_members_are_refused(content: bytes, tmp_path: Path
     with zipfile.ZipFile(out, "a") as twice, pytest.warns(UserWarning, match="Duplicate name"):
         twice.writestr("time_s.npy", twice.read("time_s.npy"))
     assert "its members are not those of a record" in refused(out.getvalue(), tmp_path)
+
+
+STEPS_OF_TEN_THOUSAND_SECTIONS = 51
+"""Number of steps with 10 000 sections that is just above the limit of half a million."""
+
+
+def test_record_of_too_many_sections_and_steps_is_refused(content: bytes, tmp_path: Path) -> None:
+    """The sections are computed again and take memory, whatever the size of the file is."""
+    with np.load(io.BytesIO(content)) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    header = json.loads(arrays["header"].tobytes())
+    header["scenario"]["information_set"]["sections"] = 10_000
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    steps = len(arrays["time_s"])
+    for name, values in arrays.items():
+        if len(values) == steps and name != "header":
+            arrays[name] = np.resize(values, (STEPS_OF_TEN_THOUSAND_SECTIONS, *values.shape[1:]))
+    arrays["time_s"] = np.arange(STEPS_OF_TEN_THOUSAND_SECTIONS, dtype=np.float64)
+    out = io.BytesIO()
+    np.savez(out, **arrays)
+
+    message = refused(out.getvalue(), tmp_path)
+
+    assert "it has 10000 sections in 51 steps, and their product may be at most 500000" in message
+
+
+def test_record_that_could_not_be_read_again_is_not_written(record: Record, tmp_path: Path) -> None:
+    settings = dataclasses.replace(record.scenario.information_set, sections=10_000)
+    large = dataclasses.replace(
+        record,
+        scenario=dataclasses.replace(record.scenario, information_set=settings),
+        time_s=np.arange(STEPS_OF_TEN_THOUSAND_SECTIONS, dtype=np.float64),
+    )
+    with pytest.raises(InputError, match=r"^record: it has 10000 sections in 51 steps"):
+        write_record(large, tmp_path / "x.npz")
+    assert not any(tmp_path.iterdir())
