@@ -139,10 +139,27 @@ def check_fields(owner: object) -> None:
     Numbers are annotated with `Limits`, intervals are pairs (minimum, maximum) of such numbers, ``tuple[float, ...]``
     is any number of them; enumerations, other dataclasses and text are checked by type. The message has the name of the
     field, the value, and what is allowed.
+
+    NumPy's numbers are replaced by Python's, so that equal dataclasses are written to files as equal text.
     """
     kind: Any = type(owner)
     for field, hint in _hints(kind).items():
-        _check(f"{kind.__name__}: {field}", getattr(owner, field), hint)
+        value = getattr(owner, field)
+        _check(f"{kind.__name__}: {field}", value, hint)
+        plain = plain_number(value)
+        if plain is not value:
+            object.__setattr__(owner, field, plain)
+
+
+def plain_number(value: Any) -> Any:
+    """Return a number of NumPy, or a tuple with such numbers, as Python's numbers; other values as they are."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, tuple):
+        plain = tuple(map(plain_number, value))
+        if any(after is not before for after, before in zip(plain, value, strict=True)):
+            return plain
+    return value
 
 
 class Checked:

@@ -26,7 +26,7 @@ from pydantic import ValidationError
 from experiments.common.built_in_files import PROBLEMS, SCENARIO, built_in, built_in_names, kind_of, taken_by
 from experiments.common.errors import InputError, nearest, shown
 from experiments.common.units import quantity_and_unit, si_factor
-from infoset.limits import LONGEST_DESCRIPTION
+from infoset.limits import LONGEST_DESCRIPTION, plain_number
 from sim.storage.codec import adapter
 
 ENDS = ("min", "max")
@@ -360,7 +360,7 @@ def to_toml(value: Any) -> str:
 def _lines(value: Any, prefix: str) -> Iterator[str]:
     tables = []
     for name, field in fields_of(value.__class__).items():
-        inner = getattr(value, name)
+        inner = plain_number(getattr(value, name))
         if inner is None or inner == ():
             continue
         if field.table is None:
@@ -384,4 +384,6 @@ def _literal(value: Any) -> str:
 
 def changed(value: Kind, changes: Mapping[str, float | int], source: str) -> Kind:
     """Return a dataclass with other values by key, checked as a file with these values is."""
-    return read_text(type(value), to_toml(value), source, [f"{key}={number!r}" for key, number in changes.items()])
+    return read_text(
+        type(value), to_toml(value), source, [f"{key}={plain_number(number)!r}" for key, number in changes.items()]
+    )

@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from experiments.common.built_in_files import SCENARIO, built_in_files
 from experiments.common.errors import InputError
-from experiments.common.input_file import changed, load_problem, read_file, read_text
+from experiments.common.input_file import changed, load_problem, read_file, read_text, to_toml
 from experiments.interception.scenario_file import load_scenario
 from sim import Scenario
 from tests.built_in import problem_text, scenario_text
@@ -194,3 +198,42 @@ def test_a_name_wins_over_a_file_and_a_path_over_a_name(tmp_path: Path, monkeypa
         load_scenario("commet-fast")
     with pytest.raises(InputError, match=r"mine\.toml: cannot be read: No such file"):
         load_scenario("mine.toml")
+
+
+def with_numpy_numbers(value: Any) -> Any:
+    """Return a dataclass, or a tuple of values, with all numbers as NumPy's."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        names = [field.name for field in dataclasses.fields(value)]
+        return dataclasses.replace(value, **{name: with_numpy_numbers(getattr(value, name)) for name in names})
+    if isinstance(value, tuple):
+        return tuple(map(with_numpy_numbers, value))
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, float):
+        return np.float64(value)
+    return np.int64(value) if isinstance(value, int) else value
+
+
+@pytest.mark.parametrize("name", built_in_files())
+def test_numbers_of_numpy_are_written_as_numbers(name: str) -> None:
+    file = built_in_files()[name]
+    value: Any = load_scenario(name) if file.kind == SCENARIO else load_problem(name)
+    same = with_numpy_numbers(value)
+
+    assert same == value
+    assert to_toml(same) == to_toml(value)
+    assert read_text(type(value), to_toml(same), name) == value
+
+
+def test_numbers_of_numpy_become_those_of_python_in_a_scenario() -> None:
+    scenario = with_numpy_numbers(load_scenario("dart-2022"))
+
+    assert type(scenario.step_s) is float
+    assert type(scenario.information_set.sections) is int
+    assert {type(number) for number in scenario.dispersion.x_m} == {float}
+    assert repr(scenario) == repr(load_scenario("dart-2022"))
+
+
+def test_changed_number_of_numpy_is_written_as_a_number() -> None:
+    scenario = changed(load_scenario("dart-2022"), {"step_s": np.float64(120.0), "camera.period_s": 120.0}, "test")
+    assert scenario.step_s == 120.0
