@@ -173,8 +173,11 @@ def saddle_point(certificate: Certificate | None) -> str:
     """Return what a certificate says of the saddle point; nothing without a certificate."""
     if certificate is None:
         return ""
-    if certificate.failures:
-        return f"saddle point: not claimed: {'; '.join(certificate.failures)}"
+    if not certificate.claims_saddle_point:
+        reasons = certificate.failures
+        if certificate.is_mostly_undecided:
+            reasons = (*reasons, *certificate.undecided)
+        return f"saddle point: not claimed: {'; '.join(reasons)}"
     if certificate.undecided:
         why = (
             "no farthest extremal was found for one craft or both" if certificate.directions_tried else "add --certify"

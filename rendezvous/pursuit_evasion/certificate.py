@@ -27,6 +27,9 @@ MAX_INTEGRATOR_GAP = 1e-7
 MAX_GAIN_S = 1e-2
 MAX_EXCESS = 1e-6
 """In units of length: the scan is less accurate than the solution of the game."""
+MAX_UNDECIDED = 0.5
+"""Share of the directions that may be undecided in a claim: a scan that compares less than half of them has not looked
+at most of the alternatives. Captures of the first revolutions leave a third to two fifths of them undecided."""
 
 _PANELS, _POINTS, _MAX_CHANGES = 32, 8, 3
 _BEYOND = 1.0 + 1e-6
@@ -136,9 +139,18 @@ class Certificate:
         return (f"{undecided} of {self.directions_tried} directions were not decided",) if undecided else ()
 
     @property
+    def is_mostly_undecided(self) -> bool:
+        """Whether the directions were scanned, and more than half of them were not decided."""
+        undecided = self.directions_tried - self.directions_found
+        return undecided > MAX_UNDECIDED * self.directions_tried
+
+    @property
     def claims_saddle_point(self) -> bool:
-        """Whether no check failed; `undecided` lists what the checks leave open."""
-        return not self.failures
+        """Whether no check failed, and a scan decided at least half of the directions.
+
+        `undecided` lists what the checks leave open.
+        """
+        return not self.failures and not self.is_mostly_undecided
 
 
 def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:

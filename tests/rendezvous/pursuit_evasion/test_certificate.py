@@ -60,6 +60,15 @@ def test_all_directions_are_looked_in(solved: Solution) -> None:
     assert certificate.max_excess_m < 1.0
 
 
+@pytest.mark.parametrize(("found", "is_claimed"), [(120, True), (73, True), (60, True), (59, False), (1, False)])
+def test_saddle_point_is_not_claimed_if_more_than_half_of_the_directions_are_undecided(
+    found: int, is_claimed: bool, solved: Solution
+) -> None:
+    certificate = replace(certify(solved), directions_tried=120, directions_found=found)
+    assert certificate.failures == ()
+    assert certificate.claims_saddle_point == is_claimed
+
+
 def test_a_pursuer_that_does_better_alone_is_told(slides: MakeGame) -> None:
     # Close to equal thrusts l(T) stays above zero long after the planned path of the evader can be met.
     certificate = certify(solve(slides(18.0, anomaly_deg=324.0)))
