@@ -59,7 +59,7 @@ def after(box: StateBox, angles_rad: Floats) -> tuple[KalmanBank, Situation]:
 def line(z_m: float, v_m_s: float, range_m: float, steps: int) -> Floats:
     """Angles of a motion along a straight line."""
     to_go_s = range_m / CLOSING_SPEED - STEP_S * np.arange(steps)
-    return np.arctan2(z_m + v_m_s * STEP_S * np.arange(steps), CLOSING_SPEED * to_go_s)
+    return np.asarray(np.arctan2(z_m + v_m_s * STEP_S * np.arange(steps), CLOSING_SPEED * to_go_s))
 
 
 def test_two_exact_angles_give_the_motion_at_a_known_range() -> None:
