@@ -112,7 +112,19 @@ def test_a_mutated_file_is_refused_with_exit_code_2(kind: str, infoset: Infoset,
 
 
 LONG: dict[str, tuple[str, Callable[[str], str]]] = {
-    "dotted": ("scenario", lambda _: "".join(f"a{place}.{'b.' * 490}c = 1\n" for place in range(100))),
+    "dotted": ("scenario", lambda _: "".join(f"a{place}.{'b.' * 18}c = 1\n" for place in range(2000))),
+    "a dotted key": ("scenario", lambda _: f"{'b.' * 45_000}c = 1\n"),
+    "a dotted header": ("scenario", lambda _: f"[{'b.' * 45_000}c]\n"),
+    "a dotted key in a table": ("scenario", lambda _: f"x = {{{'b.' * 45_000}c = 1}}\n"),
+    "keys below a dotted header": (
+        "scenario",
+        lambda _: f"[{'b.' * 19}c]\n" + "".join(f"k{place}.{'d.' * 18}e = 1\n" for place in range(2000)),
+    ),
+    "a line of numbers": ("scenario", lambda _: f"x = [{'1.5, ' * 19_000}]\n"),
+    "a line of tables": ("scenario", lambda _: f"x = [{'{a = 1}, ' * 10_000}]\n"),
+    "quotes": ("scenario", lambda _: '"' * 95_000),
+    "escapes": ("scenario", lambda _: 'x = "' + "\\" * 95_000),
+    "triple quotes": ("scenario", lambda _: 'x = """' + '""\\' * 30_000),
     "tables": ("scenario", lambda _: "".join(f"[a{place}]\n" for place in range(12_000))),
     "arrays": ("scenario", lambda _: "x = [\n" + "[],\n" * 24_000 + "]"),
     "keys": ("scenario", lambda text: text + "".join(f"k{place} = 1\n" for place in range(8_000))),

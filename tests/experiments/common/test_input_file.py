@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import dataclasses
+import random
+import tomllib
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +12,7 @@ import pytest
 
 from experiments.common.built_in_files import SCENARIO, built_in_files
 from experiments.common.errors import InputError
-from experiments.common.input_file import changed, load_problem, read_file, read_text, to_toml
+from experiments.common.input_file import changed, load_problem, parse, read_file, read_text, to_toml
 from experiments.interception.scenario_file import load_scenario
 from sim import Scenario
 from tests.built_in import problem_text, scenario_text
@@ -115,7 +118,8 @@ def test_all_mistakes_of_a_file_are_listed_one_a_line() -> None:
     ("text", "message"),
     [
         ("a = " + "[\n" * 2000, "is not valid TOML: it is nested too deeply"),
-        ("a" * 2000, "line 1 is over 1000 characters"),
+        ("a" * 2000, "is not valid TOML: Expected '=' after a key"),
+        ("name = 1\n[" + "a." * 25_000 + "a]", "mine.toml: line 2: a key has more than 20 parts"),
         ("a = 1979-05-27", "a: is not a known key"),
         ('name = "\\u001b[31m"', "name: must be one line without control characters"),
         ('name = "../mine"', "name: must begin with a letter or a digit"),
@@ -237,3 +241,63 @@ def test_numbers_of_numpy_become_those_of_python_in_a_scenario() -> None:
 def test_changed_number_of_numpy_is_written_as_a_number() -> None:
     scenario = changed(load_scenario("dart-2022"), {"step_s": np.float64(120.0), "camera.period_s": 120.0}, "test")
     assert scenario.step_s == 120.0
+
+
+PARTS = ("a", "k-1", "'x.y'", '"p.q \\" # ="', '""')
+VALUES = (
+    "1.5",
+    "-2e-3",
+    "true",
+    "1979-05-27T07:32:00.5Z",
+    '"' + "a." * 30 + '"',
+    "'" + "a . " * 30 + "'",
+    '"""' + "a." * 30 + '\n"quoted" \\""" . ""\n"""',
+    "'''" + "a." * 30 + "\n# 'x'\n'''",
+    "[" + "1.25, " * 300 + "]",
+    "[ # " + "a." * 30 + "\n 1.0,\n 2.0 ]",
+    "{x = 1.0, 'y' = [2.0, 3.0]}",
+)
+"""Values that have many points and no long key."""
+
+
+def random_document(draw: random.Random, most_parts: int) -> tuple[str, int]:
+    """Return a TOML text, and the number of parts of its longest key."""
+    lines, longest = [], 1
+    for place in range(draw.randint(1, 8)):
+        count = draw.randint(1, most_parts)
+        longest = max(longest, count)
+        point = draw.choice((".", " . ", ".\t"))
+        # The first part is a name of its own, so that no key is written twice.
+        key = point.join([f"k{place}", *(draw.choice(PARTS) for _ in range(count - 1))])
+        value = draw.choice(VALUES)
+        lines.append(draw.choice((f"{key} = {value}", f"k{place} = {{{key} = 1.0}}", f"[{key}]")))
+        if lines[-1].startswith("k"):
+            lines.insert(0, lines.pop())
+    return "\n".join(lines), longest
+
+
+def test_only_keys_of_many_parts_are_refused_before_they_are_parsed() -> None:
+    draw, refused = random.Random(4), 0
+    for _ in range(1000):
+        text, longest = random_document(draw, draw.choice((3, 20, 24)))
+        if longest > 20:
+            refused += 1
+            with pytest.raises(InputError, match=r"line \d+: a key has more than 20 parts"):
+                parse(text, "mine.toml")
+        else:
+            assert parse(text, "mine.toml") == tomllib.loads(text, parse_float=Decimal)
+    assert 100 < refused < 500
+
+
+def test_a_long_array_on_one_line_is_read() -> None:
+    times_s = [round(99.5 - 0.5 * place, 1) for place in range(190)]
+    line = f"impulses_s = {times_s}"
+    assert len(line) > 1000
+    scenario = read_text(Scenario, TEXT.replace("[thruster]", f"[thruster]\n{line}"), "mine.toml")
+    assert scenario.thruster.impulses_s == tuple(times_s)
+
+
+def test_a_setting_with_a_key_of_many_parts_is_refused() -> None:
+    setting = "thruster.budget_m_s={" + "a." * 25 + "a = 1}"
+    with pytest.raises(InputError, match=r"thruster\.budget_m_s: must be a"):
+        load_scenario("asteroid-1997", [setting])
