@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from experiments.common.built_in_files import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files
-from experiments.common.options import AsJson, Overwrite, Quiet
+from experiments.common.options import AsJson, Overwrite, Quiet, Settings
 
 BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
 FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
@@ -65,8 +65,8 @@ def _commands(noun: str, of_what: str, example: str) -> typer.Typer:
         help=f"Check a {noun} file. The exit code is 2 if it has errors; all are listed.",
         epilog=f"Example: {name} check mine.toml",
     )
-    def check(file: FileName, json: AsJson = False, quiet: Quiet = False) -> None:
-        _print_check(file, kinds, json, quiet)
+    def check(file: FileName, settings: Settings = None, json: AsJson = False, quiet: Quiet = False) -> None:
+        _print_check(file, settings, kinds, json, quiet)
 
     return app
 
@@ -101,24 +101,34 @@ def _print_list(files: Sequence[BuiltIn]) -> None:
     show([table], quiet=False)
 
 
-def _print_check(file: str, kinds: Sequence[str], json: bool, quiet: bool) -> None:
-    """Check a file of one of these kinds; print its name, fingerprint and warnings."""
+def _print_check(file: str, settings: Sequence[str] | None, kinds: Sequence[str], json: bool, quiet: bool) -> None:
+    """Check a file of one of these kinds; print its name, fingerprint, schedule and warnings."""
     from experiments.common.input_file import load_problem
     from experiments.common.output import to_json
     from experiments.common.screen import say_warnings
-    from experiments.interception.scenario_file import all_warnings, flight_facts, load_scenario
+    from experiments.interception.scenario_file import (
+        all_warnings,
+        flight_facts,
+        load_scenario,
+        possible_miss_json,
+        schedule_json,
+    )
     from sim.storage.codec import fingerprint
     from sim.versions import versions
 
+    read: Any
     if SCENARIO in kinds:
-        read: Any = load_scenario(file)
-        head, warnings = {"scenario_hash": fingerprint(read)}, all_warnings(read)
-        facts = flight_facts(read)
+        read = load_scenario(file, settings)
+        head: dict[str, Any] = {"scenario_hash": fingerprint(read)}
+        found = {"schedule": schedule_json(read), "possible_miss": possible_miss_json(read)}
+        warnings, facts = all_warnings(read), flight_facts(read)
     else:
-        read = load_problem(file)
-        head, warnings, facts = {"kind": read.kind, "problem_hash": fingerprint(read)}, [], []
+        read = load_problem(file, settings)
+        head, found = {"kind": read.kind, "problem_hash": fingerprint(read)}, {}
+        warnings, facts = [], []
     if json:
-        typer.echo(to_json({"versions": versions(), "name": read.name, **head, "warnings": warnings}), nl=False)
+        contents = {"versions": versions(), "name": read.name, **head, **found, "warnings": warnings}
+        typer.echo(to_json(contents), nl=False)
     elif not quiet:
         typer.echo("\n".join([f"ok  {read.name}  {fingerprint(read)}", *facts]))
     say_warnings(warnings, quiet or json)

@@ -69,7 +69,7 @@ class Predictive(Checked):
             return np.zeros_like(state.due_s)
         estimate = state.estimator.estimate(situation)
         whole, next_s = estimate.correction_m_s(), situation.next_s
-        if situation.thruster.impulses_s or next_s is None:
+        if situation.thruster.is_scheduled or next_s is None:
             return whole
         state.due_s = np.where(np.isinf(state.due_s), estimate.to_go_s / self.spacing, state.due_s)
         is_due = (estimate.to_go_s <= state.due_s) | (estimate.to_go_s <= next_s)

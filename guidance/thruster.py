@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -12,12 +11,13 @@ from typing import Annotated
 import numpy as np
 
 from infoset.arrays import Floats, some
+from infoset.clock import ROUNDING, steps_between
 from infoset.limits import POSITIVE, Limits, NotNegative, Part, Positive, check_fields
 
-_DELAY = Limits(minimum=0, maximum=100_000, whole=True)  # a flight has no more steps
+MAX_IMPULSES = 100_000
+"""Maximum number of impulses that a period gives: a flight has no more steps."""
+_DELAY = Limits(minimum=0, maximum=MAX_IMPULSES, whole=True)
 MIN_FLOAT = float(np.finfo(np.float64).smallest_subnormal)
-STEP_TOLERANCE = 1e-9
-"""Part of a step by which a time may be after a step and still belong to it, for times that are rounded decimals."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +37,26 @@ class Thruster:
     last_impulse_s : float or None
         Time before the nominal arrival after which no impulse is given, s (cut-off); None is no cut-off.
     impulses_s : tuple of float
-        Times before the nominal arrival at which impulses can be given, s, decreasing; an impulse is given at the step
-        at that time or just before it. Without times, impulses can be given at every step.
+        Times before the nominal arrival at which impulses can be given, s, decreasing. Without times and period,
+        impulses can be given at every step.
+    impulse_period_s : float or None
+        Time between two impulses, s, counted back from `last_impulse_s`: the same as a list of these times in
+        `impulses_s`. At least a step.
+    first_impulse_s : float or None
+        Time before the nominal arrival from which impulses can be given, s; with a period, the impulse nearest to it
+        is the first one. None is the first possible step.
     delay_steps : int
         Number of steps from the decision to the impulse. The budget is reserved at the decision.
 
     Raises
     ------
     TypeError, ValueError
-        If a value is not a number within its limits, mu1 exceeds mu2, or the times do not decrease.
+        If a value is not a number within its limits, mu1 exceeds mu2, the times do not decrease, or two of the keys of
+        times contradict each other.
+
+    Notes
+    -----
+    A time before the nominal arrival means the nearest step (`infoset.clock.steps_between`).
 
     References
     ----------
@@ -59,6 +70,8 @@ class Thruster:
     pointing_error_rad: Part = 0.0
     last_impulse_s: NotNegative | None = None
     impulses_s: Annotated[tuple[float, ...], POSITIVE] = ()
+    impulse_period_s: Positive | None = None
+    first_impulse_s: Positive | None = None
     delay_steps: Annotated[int, _DELAY] = 0
 
     def __post_init__(self) -> None:
@@ -73,6 +86,31 @@ class Thruster:
                 raise ValueError(
                     f"Thruster: impulses_s, times before the arrival, must decrease: got {next_s!r} after {time_s!r}"
                 )
+        self._check_period()
+
+    def _check_period(self) -> None:
+        """Refuse a period or a first impulse that other times contradict."""
+        for name in ("impulse_period_s", "first_impulse_s"):
+            if self.impulses_s and getattr(self, name) is not None:
+                raise ValueError(
+                    f"Thruster: {name} and impulses_s exclude each other, because impulses_s has the times of all "
+                    f"impulses: leave one of them out: got {getattr(self, name)!r}"
+                )
+        if self.impulse_period_s is not None and self.last_impulse_s is None:
+            raise ValueError(
+                "Thruster: impulse_period_s is counted back from last_impulse_s: set last_impulse_s, the time of the "
+                f"last impulse before the arrival: got {self.impulse_period_s!r}"
+            )
+        if self.first_impulse_s is not None and self.first_impulse_s < (self.last_impulse_s or 0.0):
+            raise ValueError(
+                "Thruster: first_impulse_s must be at least last_impulse_s, because both are times before the arrival: "
+                f"got {self.first_impulse_s!r} and {self.last_impulse_s!r}"
+            )
+
+    @property
+    def is_scheduled(self) -> bool:
+        """Whether the times of single impulses are given, as a list or by a period."""
+        return bool(self.impulses_s) or self.impulse_period_s is not None
 
     def impulse_steps(self, arrival_s: float, step_s: float) -> Sequence[int] | None:
         """Return the steps in which impulses can be given, increasing; None is every step from `delay_steps`.
@@ -85,28 +123,75 @@ class Thruster:
         Raises
         ------
         ValueError
-            If there is no such step, or one of `impulses_s` is before the first step in which an impulse can be given,
-            or in the same step as the one before it. The message names the key to change.
+            If there is no such step, a time of `impulses_s` or `first_impulse_s` is before the first step in which an
+            impulse can be given, or two of `impulses_s` are in one step. The message names the key to change.
         """
-        if self.last_impulse_s is None and not self.impulses_s:
+        if self.last_impulse_s is None and self.first_impulse_s is None and not self.impulses_s:
             return None
-        times_s = (*self.impulses_s, self.last_impulse_s or 0.0)
-        *of_times, last = (math.floor((arrival_s - time_s) / step_s + STEP_TOLERANCE) for time_s in times_s)
-        first = f"the first impulse can be given {arrival_s - self.delay_steps * step_s:g} s before the nominal arrival"
-        for i, step in enumerate(of_times):
+        last = steps_between(arrival_s, self.last_impulse_s or 0.0, step_s)
+        if self.impulses_s:
+            steps: Sequence[int] = [step for step in self._listed_steps(arrival_s, step_s) if step <= last]
+        elif self.impulse_period_s is not None:
+            steps = self._periodic_steps(self.impulse_period_s, arrival_s, step_s)
+        else:
+            steps = range(self._first_step(arrival_s, step_s), last + 1)
+        if not steps:
+            raise ValueError(
+                f"thruster.last_impulse_s excludes all impulses: {self._first_text(arrival_s, step_s)}: "
+                f"got {self.last_impulse_s!r}"
+            )
+        return steps
+
+    def _listed_steps(self, arrival_s: float, step_s: float) -> list[int]:
+        """Return the steps of `impulses_s`, those after the cut-off included."""
+        steps = [steps_between(arrival_s, time_s, step_s) for time_s in self.impulses_s]
+        for i, step in enumerate(steps):
             if step < self.delay_steps:
                 raise ValueError(
-                    f"thruster.impulses_s: {first}; give later times or fewer delay_steps: got {self.impulses_s[i]!r}"
+                    f"thruster.impulses_s: {self._first_text(arrival_s, step_s)}; give later times or fewer "
+                    f"delay_steps: got {self.impulses_s[i]!r}"
                 )
-            if i > 0 and step == of_times[i - 1]:
+            if i > 0 and step == steps[i - 1]:
                 raise ValueError(
                     f"thruster.impulses_s: two impulses in one step of {step_s:g} s: got {self.impulses_s[i - 1]!r} "
                     f"and {self.impulses_s[i]!r}"
                 )
-        steps = [step for step in of_times if step <= last] if of_times else range(self.delay_steps, last + 1)
-        if not steps:
-            raise ValueError(f"thruster.last_impulse_s excludes all impulses: {first}: got {self.last_impulse_s!r}")
         return steps
+
+    def _periodic_steps(self, period_s: float, arrival_s: float, step_s: float) -> list[int]:
+        """Return the steps of impulses every period, counted back from the cut-off."""
+        if period_s < step_s * (1.0 - ROUNDING):
+            raise ValueError(f"thruster.impulse_period_s must be at least a step, {step_s:g} s: got {period_s!r}")
+        self._first_step(arrival_s, step_s)  # raises ValueError if it is before the first possible step
+        first_s = arrival_s if self.first_impulse_s is None else self.first_impulse_s
+        last_s = self.last_impulse_s or 0.0
+        # The first impulse is the one nearest to first_impulse_s.
+        number = 1 - steps_between(last_s, first_s, period_s)
+        if number > MAX_IMPULSES:
+            raise ValueError(
+                f"thruster.impulse_period_s gives {number} impulses, more than {MAX_IMPULSES}; write a longer period "
+                f"or a later first_impulse_s: got {period_s!r}"
+            )
+        times_s = (last_s + place * period_s for place in reversed(range(number)))
+        steps = (steps_between(arrival_s, time_s, step_s) for time_s in times_s)
+        # A period of one step may round two times to one step.
+        return [*dict.fromkeys(step for step in steps if step >= self.delay_steps)]
+
+    def _first_step(self, arrival_s: float, step_s: float) -> int:
+        """Return the step of `first_impulse_s`, or the first step in which an impulse can be given."""
+        if self.first_impulse_s is None:
+            return self.delay_steps
+        step = steps_between(arrival_s, self.first_impulse_s, step_s)
+        if step < self.delay_steps:
+            raise ValueError(
+                f"thruster.first_impulse_s: {self._first_text(arrival_s, step_s)}; give a later time or fewer "
+                f"delay_steps: got {self.first_impulse_s!r}"
+            )
+        return step
+
+    def _first_text(self, arrival_s: float, step_s: float) -> str:
+        """Return when the first impulse can be given, for messages."""
+        return f"the first impulse can be given {arrival_s - self.delay_steps * step_s:g} s before the nominal arrival"
 
     def give(self, wanted_m_s: Floats, budget_left_m_s: Floats) -> Floats:
         """Return the impulses that the engine gives, m/s.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from infoset import Camera, SetModel
 from infoset.arrays import Floats
 from sim.scenario import Scenario
+from sim.schedule import image_times_s
 
 FloatOrFloats = TypeVar("FloatOrFloats", float, Floats)
 
@@ -65,37 +67,52 @@ def possible_miss_m(
         4.0 * bound_m / arc_s + disturbance_m_s2 * arc_s,
     )
     constant_m = centroid_error_m if constant_bias else 0.0
-    miss_m: FloatOrFloats = constant_m + bound_m + 0.5 * last_image_s * (slope_m_s + disturbance_m_s2 * last_image_s)
+    miss_m: FloatOrFloats = _at_arrival_m(constant_m + bound_m, slope_m_s, last_image_s, disturbance_m_s2)
     return miss_m
 
 
-def image_times_s(scenario: Scenario) -> list[float]:
-    """Return the times before the nominal arrival of the images until the last decision of an impulse, s."""
-    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
-    steps = scenario.impulse_steps
-    end_s = arrival_s - model.min_range_m / model.closing_speed_m_s
-    last_step = int(end_s / model.step_s) if steps is None else int(max(steps))
-    camera = model.angle_sensor
-    before_s = (
-        arrival_s - step * model.step_s
-        for step in range(0, last_step - thruster.delay_steps + 1, model.steps_in(camera.period_s))
-    )
-    return [time_s for time_s in before_s if camera.measures_at(time_s)]
+def _at_arrival_m(bound_m: Any, speed_m_s: Any, last_s: Any, disturbance_m_s2: float) -> Any:
+    """Return M of equation (22), m, from b0 and s at the last image, `last_s` before the arrival."""
+    return bound_m + 0.5 * last_s * (speed_m_s + disturbance_m_s2 * last_s)
 
 
-def last_possible_miss_m(scenario: Scenario) -> float | None:
-    """Return half the maximum width of the interval of misses that all images leave possible at the last decision, m.
+@dataclass(frozen=True)
+class PossibleMiss:
+    """Half the maximum width of the interval of misses that is left at the last decision, m, by what is known.
 
-    It is the distance of the two motions of `worst_shift_m` at the arrival, for a known range and closing speed; in
-    space that of both axes at once. None with fewer than two images.
+    Both are for errors of images at their bounds, no lost image, and a known range and closing speed; in space they are
+    those of both axes at once.
+
+    Parameters
+    ----------
+    images_m : float or None
+        By the images alone, as if they were taken at all times from the first to the last one: the closed form of
+        `possible_miss_of`. None if the sensor of angles is not a camera or loses images.
+    images_and_speeds_m : float
+        By the images at their own times and the speeds across that the initial set allows.
     """
-    model, before_s = scenario.set_model, np.array(image_times_s(scenario))
+
+    images_m: float | None
+    images_and_speeds_m: float
+
+
+def possible_miss(scenario: Scenario) -> PossibleMiss | None:
+    """Return the misses that are possible at the last decision; None with fewer than two images before it."""
+    before_s = np.array(image_times_s(scenario))
     if before_s.size < 2:
         return None
-    misses_m = []
+    camera = scenario.bearing_sensor
+    has_closed_form = isinstance(camera, Camera) and camera.miss_probability == 0.0
+    images_m = possible_miss_of(scenario) if has_closed_form else None
+    return PossibleMiss(images_m, _images_and_speeds_m(scenario, before_s))
+
+
+def _images_and_speeds_m(scenario: Scenario, before_s: Floats) -> float:
+    """Return the distance of the two motions of `worst_shift_m` at the arrival, m, in space that of both axes."""
+    model, misses_m = scenario.set_model, []
     for axis in map(model.axis, model.axes):
         bound_m, speed_m_s = _worst_difference(axis, before_s, scenario.nominal_arrival_s)
-        misses_m.append(bound_m + 0.5 * before_s[-1] * (speed_m_s + axis.disturbance_m_s2 * before_s[-1]))
+        misses_m.append(_at_arrival_m(bound_m, speed_m_s, before_s[-1], axis.disturbance_m_s2))
     return math.hypot(*misses_m)
 
 
@@ -145,6 +162,9 @@ def _worst_shift_along_m(model: SetModel, before_s: Floats, arrival_s: float) ->
 
 def possible_miss_of(scenario: Scenario, *, constant_bias: bool = False) -> float:
     """Return `possible_miss_m` of the camera and the last impulse of a scenario, m: in space that of both axes at once.
+
+    It contains what the images show, and nothing about the start: the set on board knows more if the speeds across are
+    known well from the start (`PossibleMiss.images_and_speeds_m`, which ``infoset scenarios check`` prints too).
 
     The disturbance is `set_model.disturbance_m_s2` of each axis, and `constant_bias` that of `possible_miss_m`.
 

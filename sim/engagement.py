@@ -126,7 +126,7 @@ class Engagements:
         steps = scenario.impulse_steps
         self._impulse_times_s = None if steps is None else np.array(steps) * model.step_s
         self._last_impulse_step = None if steps is None else steps[-1]
-        self._number_of_burn = {step: i for i, step in enumerate(steps or ()) if scenario.thruster.impulses_s}
+        self._number_of_burn = {step: i for i, step in enumerate(steps or ()) if scenario.thruster.is_scheduled}
         self._burns_m_s = np.zeros((batch, len(self._number_of_burn)))
         # Impulses that are decided and not given yet, one for each of the next steps.
         self._queue = [self._impulse] * scenario.thruster.delay_steps

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from guidance.authority import max_correctable_m
-from sim.closed_form import image_times_s, last_possible_miss_m
+from sim.closed_form import PossibleMiss, possible_miss
 from sim.draws import draw_starts
 from sim.scenario import MAX_STEPS, Scenario
+from sim.schedule import image_times_s
 
 STARTS = 400
 """Number of starts: those of the first runs of seed 0."""
@@ -30,9 +31,8 @@ class Feasibility:
         What all impulses of the nominal flight can correct: with any budget, and with that of the engine, m.
     beyond_engine, beyond_budget : float
         Shares of the starts that no impulses can bring to a hit: with any budget, and with that of the engine.
-    last_possible_miss_m : float or None
-        Half-width of the misses that the images leave possible at the last decision, with errors at their bounds, m
-        (`sim.closed_form.last_possible_miss_m`); None with fewer than two images.
+    possible_miss : PossibleMiss or None
+        The misses that are possible at the last decision; None with fewer than two images.
     """
 
     steps: int
@@ -43,7 +43,7 @@ class Feasibility:
     budget_corrects_m: float
     beyond_engine: float
     beyond_budget: float
-    last_possible_miss_m: float | None
+    possible_miss: PossibleMiss | None
 
 
 def feasibility(scenario: Scenario) -> Feasibility | None:
@@ -72,5 +72,5 @@ def feasibility(scenario: Scenario) -> Feasibility | None:
         budget_corrects_m=float(by_budget[-1]),
         beyond_engine=float((unguided_m - by_engine[:-1] > radius_m).mean()),
         beyond_budget=float((unguided_m - by_budget[:-1] > radius_m).mean()),
-        last_possible_miss_m=last_possible_miss_m(scenario),
+        possible_miss=possible_miss(scenario),
     )

@@ -146,7 +146,7 @@ class Courses:
         if len(every) > MAX_STEPS:
             places = -np.log(len(every) - every)
             fired = scenario.impulse_steps or ()
-            scheduled = fired if scenario.thruster.impulses_s else ()
+            scheduled = fired if scenario.thruster.is_scheduled else ()
             half = MAX_STEPS // 2
             self.steps = np.unique([*evenly(places, half), *evenly(every, half), *scheduled]).astype(np.int64)
         self.possible_m = np.full((min(runs, MAX_COURSES), len(self.steps)), np.nan)

@@ -15,14 +15,18 @@ from experiments.interception.strategies import is_own
 from experiments.interception.study import percent
 from guidance import strategy_names
 from infoset.model import Model, SetModel
+from sim.closed_form import PossibleMiss
 from sim.feasibility import feasibility
 from sim.gravity import on_board_model
-from sim.scenario import Scenario, Target
+from sim.scenario import MAX_STEPS, Scenario, Target
+from sim.schedule import images_until, schedule
 
 FAR = 10.0
 """Ratio of the nominal range to the possible ranges from which `scenario_warnings` reports it."""
 FEW_STEPS, MANY_STEPS, MANY_SECTIONS = 20, 20_000, 100
 """Numbers of decisions, steps and sections that are reported as probably not intended."""
+FEW_TIMES = 3
+"""Number of times of a key that a line lists; JSON has all of them."""
 STEP_COST_S = 1e-5
 """Typical time of a step of a run along one axis, s."""
 SMALL_ANGLE_RAD = 0.01
@@ -145,20 +149,79 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
 
 
 def flight_facts(scenario: Scenario) -> list[str]:
-    """Return lines about the flight, what its impulses correct, and what its images leave open."""
+    """Return lines about the flight, its schedule, what its impulses correct, and what its images leave open."""
     found = feasibility(scenario)
     if found is None:
         return []
     lines = [
-        f"flight: {duration_text(scenario.nominal_arrival_s)} in {found.steps} steps, with {found.images} images and "
-        f"{found.decisions} possible impulses",
+        f"flight: {duration_text(scenario.nominal_arrival_s)} in {found.steps} steps of {scenario.step_s:g} s",
+        *schedule_lines(scenario),
         f"miss without impulses: up to {length_text(found.unguided_miss_m)}; all impulses correct up to "
         f"{length_text(found.budget_corrects_m)}",
     ]
-    if found.last_possible_miss_m is not None:
-        possible = length_text(found.last_possible_miss_m)
-        lines.append(f"miss that the images leave possible, with errors at their bounds: up to {possible}")
+    possible = found.possible_miss
+    if possible is not None and possible.images_m is not None:
+        lines.append(
+            "miss that the images alone leave possible, with errors at their bounds (closed form): up to "
+            f"{length_text(possible.images_m)}"
+        )
+    if possible is not None:
+        lines.append(
+            "miss that the images and the speeds of [uncertainty] leave possible, with errors at their bounds: up to "
+            f"{length_text(possible.images_and_speeds_m)}"
+        )
     return lines
+
+
+def schedule_lines(scenario: Scenario) -> list[str]:
+    """Return lines about the images and impulses that will happen, and where the file asks for other times."""
+    times = schedule(scenario)
+    if times is None:
+        return []
+    lines = []
+    decided = f"; {times.images_before_last_decision} before the last decision of an impulse"
+    for name, before_s, more in (("images", times.images_s, decided), ("possible impulses", times.impulses_s, "")):
+        span = ""
+        if before_s:
+            span = f", from {_seconds(before_s[0])} s to {_seconds(before_s[-1])} s before the nominal arrival"
+        lines.append(f"{name}: {len(before_s)}{span}{more}")
+    by_key: dict[str, list[str]] = {}
+    for each in times.differences:
+        by_key.setdefault(each.key, []).append(f"{_seconds(each.scheduled_s)} s instead of {_seconds(each.asked_s)} s")
+    for key, texts in by_key.items():
+        rest = f", and {len(texts) - FEW_TIMES} more" if len(texts) > FEW_TIMES else ""
+        lines.append(f"{key}: {'; '.join(texts[:FEW_TIMES])}{rest} (nearest possible times)")
+    return lines
+
+
+def schedule_json(scenario: Scenario) -> dict[str, Any] | None:
+    """Return the key `schedule` of JSON: times before the nominal arrival, s; None if the arrival is too far away."""
+    times = schedule(scenario)
+    if times is None:
+        return None
+
+    def ends(before_s: Sequence[float]) -> dict[str, float | int | None]:
+        first_s, last_s = (before_s[0], before_s[-1]) if before_s else (None, None)
+        return {"number": len(before_s), "first_s": first_s, "last_s": last_s}
+
+    return {
+        "nominal_arrival_s": scenario.nominal_arrival_s,
+        "step_s": scenario.step_s,
+        "images": {**ends(times.images_s), "before_last_decision": times.images_before_last_decision},
+        "impulses": ends(times.impulses_s),
+        "differences": times.differences,
+    }
+
+
+def possible_miss_json(scenario: Scenario) -> PossibleMiss | None:
+    """Return the key `possible_miss` of JSON; None with fewer than two images, or if the arrival is too far away."""
+    found = feasibility(scenario)
+    return None if found is None else found.possible_miss
+
+
+def _seconds(time_s: float) -> str:
+    """Return a time with seven digits, which show a tenth of a second in a flight of a week."""
+    return f"{time_s:.7g}"
 
 
 def feasibility_warnings(scenario: Scenario) -> list[str]:
@@ -178,14 +241,15 @@ def feasibility_warnings(scenario: Scenario) -> list[str]:
                 f"does; a greater thruster.{key}, earlier impulses or a narrower dispersion would change it"
             )
         before = share
-    possible_m, radius_m = found.last_possible_miss_m, scenario.radius_m
-    if possible_m is not None and radius_m is not None and possible_m > radius_m:
+    possible, radius_m = found.possible_miss, scenario.radius_m
+    if possible is not None and radius_m is not None and possible.images_and_speeds_m > radius_m:
         lines.append(
-            f"the images before the last decision leave misses of up to {length_text(possible_m)} possible, and "
+            "the images before the last decision and the speeds of [uncertainty] leave misses of up to "
+            f"{length_text(possible.images_and_speeds_m)} possible, and "
             f"body.radius_m is {radius_m:g}: no hit is certain before the flight; smaller errors of the images or a "
             "later last impulse would change it"
         )
-    if found.decisions < FEW_STEPS and not scenario.thruster.impulses_s:
+    if found.decisions < FEW_STEPS and not scenario.thruster.is_scheduled:
         lines.append(
             f"step_s is {scenario.step_s:g} s: impulses can be decided in only {found.decisions} steps of the flight; "
             f"check its unit, or write a shorter step (at most {scenario.nominal_arrival_s / 100:.3g} s for 100 steps)"
@@ -207,10 +271,11 @@ def feasibility_warnings(scenario: Scenario) -> list[str]:
 def _timing_warnings(scenario: Scenario) -> list[str]:
     """Return a line if no angle is measured before the last impulse is decided."""
     model, arrival_s = scenario.set_model, scenario.nominal_arrival_s
+    if arrival_s > FAR * MAX_STEPS * model.step_s:
+        return []  # the nominal range has a warning, and its steps are too many to be searched
     sensor, steps = model.angle_sensor, scenario.impulse_steps
     last_step = int(arrival_s / model.step_s) if steps is None else steps[-1]
-    measured = range(0, last_step - scenario.thruster.delay_steps + 1, model.steps_in(sensor.period_s))
-    if any(sensor.measures_at(arrival_s - step * model.step_s) for step in reversed(measured)):
+    if any(True for _ in images_until(scenario, last_step - scenario.thruster.delay_steps)):
         return []
     first_s = arrival_s if sensor.first_image_s is None else sensor.first_image_s
     fired_s = arrival_s - last_step * model.step_s

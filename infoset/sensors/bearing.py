@@ -11,13 +11,12 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from infoset.arrays import Flags, Floats
+from infoset.clock import steps_between
 from infoset.limits import Fraction, NotNegative, Part, Positive, check_fields
 from infoset.sensors.sensor import Apart, Cuttable, Geometry, Measurements, Sensor
 
 RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
 
-TIME_TOLERANCE = 1e-6
-"""Rounding of the first and the last image, as a share of the time between two images."""
 NEGLIGIBLE_ERROR_RAD = 1e-60
 """Error bound of an axis that is measured without error."""
 
@@ -45,8 +44,8 @@ class BearingSensor(Sensor):
     period_s : float
         Time between measurements, s; the first is at t = 0.
     first_image_s, last_image_s : float
-        Times before the nominal arrival of the first and the last image, s. Images begin at the start for None, and
-        continue until the true arrival for 0.
+        Times before the nominal arrival, s; the images nearest to them are the first and the last one. Images begin at
+        the start for None, and continue until the true arrival for 0.
     miss_probability : float
         Probability that an image is lost, in [0, 1).
 
@@ -126,11 +125,14 @@ class BearingSensor(Sensor):
         return self.error_bounds(sight.range_m)
 
     def measures_at(self, before_arrival_s: float) -> bool:
-        """Return whether there are images at a time before the nominal arrival, s."""
-        room_s = TIME_TOLERANCE * self.period_s
-        too_early = self.first_image_s is not None and before_arrival_s > self.first_image_s + room_s
-        too_late = self.last_image_s > 0.0 and before_arrival_s < self.last_image_s - room_s
-        return not (too_early or too_late)
+        """Return whether the image at a time before the nominal arrival, s, is taken.
+
+        Images can be taken every `period_s`. The first and the last one are nearest to `first_image_s` and
+        `last_image_s` (`infoset.clock.steps_between`).
+        """
+        if self.first_image_s is not None and steps_between(before_arrival_s, self.first_image_s, self.period_s) > 0:
+            return False
+        return self.last_image_s == 0.0 or steps_between(before_arrival_s, self.last_image_s, self.period_s) >= 0
 
     def error(self, sight: Geometry, measured: Floats) -> Floats:
         """Return the error of measured angles in units of the bound."""

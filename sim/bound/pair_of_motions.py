@@ -129,7 +129,7 @@ class Approach:
     def best_pair(self, try_first_before_s: float | None = None) -> TruthPair:
         """Return the best pair over the last common step, by a search that starts at a time before arrival, s."""
         candidates = self.candidates
-        if self.scenario.thruster.impulses_s and len(candidates) <= FEW_CANDIDATES:
+        if self.scenario.thruster.is_scheduled and len(candidates) <= FEW_CANDIDATES:
             return max(map(self.pair, candidates.tolist()), key=UNLIMITED)
         start = len(candidates) - 1
         if try_first_before_s is not None:

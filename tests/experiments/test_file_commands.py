@@ -20,9 +20,14 @@ MINE = {"scenarios": "own-scenario", "problems": "service-2"}
 
 FACTS = [
     "flight",
+    "images",
+    "possible impulses",
     "miss without impulses",
-    "miss that the images leave possible, with errors at their bounds",
+    "miss that the images and the speeds of [uncertainty] leave possible, with errors at their bounds",
 ]
+CAMERA_FACT = "miss that the images alone leave possible, with errors at their bounds (closed form)"
+TIMES = ["camera.first_image_s", "thruster.impulses_s"]
+"""Facts of deep-impact-2005, whose times are not those of its steps."""
 
 
 @pytest.mark.parametrize("noun", MINE)
@@ -54,10 +59,71 @@ def test_a_built_in_file_is_shown_copied_checked_and_written_again(name: str, in
     code, out, _ = infoset(noun, "check", "mine.toml")
     ok, *facts = out.splitlines()
     assert (code, ok) == (0, f"ok  mine  {fingerprint(value)}")
-    assert [fact.partition(":")[0] for fact in facts] == (FACTS if noun == "scenarios" else [])
+    expected = FACTS if noun == "scenarios" else []
+    if name in ("dart-2022", "deep-impact-2005", "haiv-2013"):
+        expected = [*FACTS[:-1], CAMERA_FACT, FACTS[-1]]
+    if name == "deep-impact-2005":
+        expected = [*expected[:3], *TIMES, *expected[3:]]
+    assert [fact.partition(":")[0] for fact in facts] == expected
     found = json.loads(infoset(noun, "check", "mine.toml", "--json")[1])
     assert (found["name"], found.get("kind", SCENARIO)) == ("mine", file.kind)
     assert infoset(noun, "check", name, "--quiet") == (0, "", "")
+
+
+def test_check_prints_the_schedule_that_will_happen(infoset: Command) -> None:
+    """24 h at 10.3 km/s and 15 s are 5592 steps and 3.495 s."""
+    _, out, _ = infoset("scenarios", "check", "deep-impact-2005")
+    assert out.splitlines()[1:6] == [
+        "flight: 23.3 h in 5592 steps of 15 s",
+        "images: 481, from 7203.495 s to 3.495146 s before the nominal arrival; "
+        "431 before the last decision of an impulse",
+        "possible impulses: 3, from 5403.495 s to 753.4951 s before the nominal arrival",
+        "camera.first_image_s: 7203.495 s instead of 7200 s (nearest possible times)",
+        "thruster.impulses_s: 5403.495 s instead of 5400 s; 2103.495 s instead of 2100 s; 753.4951 s instead of 750 s "
+        "(nearest possible times)",
+    ]
+    found = json.loads(infoset("scenarios", "check", "deep-impact-2005", "--json")[1])
+    schedule = found["schedule"]
+    assert schedule["images"]["number"] == 481
+    assert schedule["impulses"]["number"] == 3
+    assert schedule["impulses"]["last_s"] == pytest.approx(864e6 / 10.3e3 - 5542 * 15.0)
+    assert [each["asked_s"] for each in schedule["differences"]] == [7200.0, 5400.0, 2100.0, 750.0]
+    assert set(found["possible_miss"]) == {"images_m", "images_and_speeds_m"}
+
+
+def test_check_lists_few_of_many_differences(infoset: Command) -> None:
+    settings = ("thruster.last_impulse_s=120", "thruster.impulse_period_s=64", "thruster.first_impulse_s=440")
+    options = [option for setting in settings for option in ("--set", setting)]
+    _, out, _ = infoset("scenarios", "check", "dart-2022", *options)
+    (line,) = [line for line in out.splitlines() if line.startswith("thruster.impulse_period_s")]
+    assert line == (
+        "thruster.impulse_period_s: 180 s instead of 184 s; 250 s instead of 248 s; 310 s instead of 312 s, and 1 more "
+        "(nearest possible times)"
+    )
+    assert "possible impulses: 6, from 440 s to 120 s before the nominal arrival" in out
+
+
+def test_check_of_a_nominal_arrival_that_is_far_too_late(infoset: Command) -> None:
+    setting = "nominal_range_m=1e50"
+    code, out, err = infoset("scenarios", "check", "dart-2022", "--set", setting)
+    assert (code, len(out.splitlines())) == (0, 1)
+    assert "nominal_range_m is 1e+50 m, far outside" in err
+    found = json.loads(infoset("scenarios", "check", "dart-2022", "--set", setting, "--json")[1])
+    assert found["schedule"] is found["possible_miss"] is None
+
+
+@pytest.mark.parametrize(
+    ("noun", "name", "setting", "wrong"),
+    [
+        ("scenarios", "dart-2022", "thruster.last_impulse_s=900", "thruster.last_impuls_s=900"),
+        ("problems", "service-2", "target.2.time_min=45", "target.2.tim_min=45"),
+    ],
+)
+def test_check_takes_settings(noun: str, name: str, setting: str, wrong: str, infoset: Command) -> None:
+    plain, changed = (json.loads(infoset(noun, "check", name, *more, "--json")[1]) for more in ([], ["--set", setting]))
+    hashes = [found.get("scenario_hash") or found["problem_hash"] for found in (plain, changed)]
+    assert hashes[0] != hashes[1]
+    assert "has no key" in infoset.refused(noun, "check", name, "--set", wrong)
 
 
 @pytest.mark.parametrize("noun", MINE)

@@ -11,6 +11,7 @@ from experiments.interception.scenario_file import scenario_warnings
 from guidance import Thruster
 from sim.closed_form import possible_miss_of
 from sim.scenario import of_model
+from sim.schedule import image_times_s
 from tests.experiments.command_line import Command
 
 
@@ -29,10 +30,23 @@ def test_a_schedule_without_impulses_names_the_key_to_change(thruster: dict[str,
         engine.impulse_steps(100.0, 10.0)
 
 
-def test_an_image_window_between_two_measurements_has_a_warning() -> None:
+def test_an_image_window_between_two_images_has_the_nearest_two() -> None:
     scenario = load_scenario("dart-2022", ["camera.first_image_s=308", "camera.last_image_s=302"])
+    assert image_times_s(scenario) == [310.0, 300.0]
+    assert not scenario_warnings(scenario)
+
+
+def test_images_before_the_start_have_a_warning() -> None:
+    scenario = load_scenario("dart-2022", ["camera.first_image_s=20000", "camera.last_image_s=14406"])
+    assert image_times_s(scenario) == []
     (line,) = scenario_warnings(scenario)
-    assert "no impulse follows a measurement: images are taken from 308 s to 302 s before" in line
+    assert "no impulse follows a measurement: images are taken from 20000 s to 14406 s before" in line
+
+
+def test_a_nominal_arrival_that_is_far_too_late_is_checked_at_once() -> None:
+    """Its steps are not searched: in floating point the time before the arrival does not change with the step."""
+    scenario = load_scenario("dart-2022", ["nominal_range_m=1e50"])
+    assert "nominal_range_m is 1e+50 m, far outside uncertainty.x_m" in scenario_warnings(scenario)[-1]
 
 
 def test_the_closed_form_is_not_that_of_a_camera_that_loses_images() -> None:

@@ -18,10 +18,11 @@ from infoset.arrays import Floats
 from sim import Record, Results, Scenario, fly_one, simulate
 from sim.bound.lower_bound import lower_bound, pair_at
 from sim.bound.pair_flight import fly_pair
-from sim.closed_form import image_times_s, possible_miss_m, possible_miss_of
+from sim.closed_form import possible_miss_m, possible_miss_of
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.scenario import of_model
+from sim.schedule import image_times_s
 
 SPEED_M_S, PIXEL_RAD, CENTROID_M = 6140.0, 5e-6, 12.0
 FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0
@@ -289,8 +290,10 @@ def test_images_are_taken_from_the_first_to_the_last_and_measured_from_then_on()
     assert times_s == np.arange(1800.0, 3000.1, EVERY_S).tolist()
     assert np.isnan(record.truth_margin_m[0])
     # The period begins at t = 0, whatever the first image is.
-    odd = fly_one(camera_scenario(first_image_s=1799.0, last_image_s=601.0))
-    assert odd.time_s[odd.measures("angle")].tolist() == times_s[1:-1]
+    odd = fly_one(camera_scenario(first_image_s=1786.0, last_image_s=614.0))
+    assert odd.time_s[odd.measures("angle")].tolist() == times_s
+    later = fly_one(camera_scenario(first_image_s=1784.0, last_image_s=615.0))
+    assert later.time_s[later.measures("angle")].tolist() == times_s[1:-1]
 
 
 def test_a_lost_image_is_no_value_of_the_record_and_no_cut() -> None:

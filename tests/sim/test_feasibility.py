@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from experiments import load_scenario
 from guidance import Thruster
 from sim import Body, Scenario, possible_miss_of, simulate
+from sim.bound.lower_bound import pair_at
+from sim.closed_form import possible_miss
 from sim.feasibility import STARTS, feasibility
+
+CASES = Path(__file__).parent / "cases"
 
 
 @pytest.mark.parametrize(
@@ -43,13 +48,36 @@ def test_the_possible_miss_is_the_closed_form_of_a_camera(name: str, setting: st
     scenario = load_scenario(name, settings)
     found = feasibility(scenario)
     assert found is not None
-    # The closed form has images at all times, and the flight every ten seconds.
-    assert found.last_possible_miss_m == pytest.approx(possible_miss_of(scenario), rel=0.01)
+    possible = found.possible_miss
+    assert possible is not None
+    assert possible.images_m == possible_miss_of(scenario)
+    # The closed form has images at all times, and the flight every ten seconds. The speeds at the start add nothing.
+    assert possible.images_and_speeds_m == pytest.approx(possible_miss_of(scenario), rel=0.01)
+
+
+def test_the_speeds_at_the_start_and_the_images_leave_the_miss_of_a_pair() -> None:
+    """The linear program of a pair is another way to the number; the images alone leave more."""
+    scenario = replace(load_scenario(CASES / "late-cut-off.toml"), sun=None)
+    found = possible_miss(scenario)
+    assert found is not None
+    pair = pair_at(scenario, scenario.nominal_range_m, -scenario.closing_speed_m_s)
+    assert found.images_and_speeds_m == pytest.approx(pair.bound_m, rel=1e-4)
+    assert found.images_m is not None
+    assert found.images_m > 1.2 * found.images_and_speeds_m
+
+
+@pytest.mark.parametrize("setting", ["camera.miss_probability=0.1", None])
+def test_images_alone_have_no_closed_form_without_a_camera_that_loses_none(setting: str | None) -> None:
+    scenario = load_scenario("asteroid-1997") if setting is None else load_scenario("dart-2022", [setting])
+    found = possible_miss(scenario)
+    assert found is not None
+    assert found.images_m is None
+    assert found.images_and_speeds_m > 0.0
 
 
 def test_numbers_of_a_flight_and_a_nominal_arrival_that_is_far_too_late(brief: Scenario) -> None:
     found = feasibility(brief)
     assert found is not None
     assert found.steps == int(595e3 / 58e3 / 0.5) == 20
-    assert found.last_possible_miss_m is not None
+    assert found.possible_miss is not None
     assert feasibility(replace(brief, nominal_range_m=1e12)) is None

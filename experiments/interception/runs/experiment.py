@@ -45,6 +45,8 @@ FIGURE = "figure-4-distributions"
 CORRIDOR = "figure-corridor"
 LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
 """Levels of the quantiles of a burn, by key in JSON."""
+MAX_BURN_ROWS = 20
+"""Maximum number of burns of a curve in the table: the four curves of an experiment are two screens."""
 
 
 def run(options: Experiment) -> None:
@@ -141,7 +143,10 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
         f"{scenario.name}: quantiles of {some_runs(runs)} per curve; game noise with the tie rule {scenario.tie.value}"
     )
     yield table
-    if scenario.thruster.impulses_s:
+    burns = len(scenario.impulse_steps or ()) if scenario.thruster.is_scheduled else 0
+    if burns > MAX_BURN_ROWS:
+        yield f"impulses at {burns} times: --json has the quantiles of each"
+    elif burns:
         yield burn_table(scenario, curves)
     counts = SetCounts()
     for curve in curves:

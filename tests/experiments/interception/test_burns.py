@@ -27,7 +27,7 @@ def test_the_burns_of_a_schedule(infoset: Command) -> None:
     assert len(curves) == 4
     for curve in curves:
         first, second = curve["burns"]
-        # The steps of 0.5 s at those times or just before them; the nominal arrival is at 5801.3 km / 58 km/s.
+        # The steps of 0.5 s nearest to those times; the nominal arrival is at 5801.3 km / 58 km/s.
         arrival_s = 5801.3 / 58.0
         assert first["before_arrival_s"] == pytest.approx(arrival_s - 20.0)
         assert second["before_arrival_s"] == pytest.approx(arrival_s - 60.0)
@@ -52,3 +52,12 @@ def test_burns_are_columns_of_the_results() -> None:
     assert join([without, without]).take(np.array([1])).burns_m_s is None
     idle = simulate(load_scenario("asteroid-1997", [*SETTINGS, "thruster.budget_m_s=0.0"]), 2)
     assert [burn["share"] for burn in burns_key(scenario, idle)["burns"]] == [None, None]
+
+
+def test_many_burns_are_only_in_json(infoset: Command) -> None:
+    settings = ("thruster.last_impulse_s=20", "thruster.impulse_period_s=1")
+    options = [option for setting in settings for option in ("--set", setting)]
+    _, out, _ = infoset("experiment", "asteroid-1997", "--runs", 4, *options, "--json", "results.json")
+    assert "impulses at 81 times: --json has the quantiles of each" in out
+    assert "burn, s before arrival" not in out
+    assert len(strict(Path("results.json").read_text())["curves"][0]["burns"]) == 81
