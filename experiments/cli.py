@@ -32,7 +32,7 @@ app = typer.Typer(
 )
 EXTRAS = {
     **dict.fromkeys(("pandas", "pyarrow"), "campaign"),
-    **dict.fromkeys(("oem", "astropy", "spiceypy"), "trajectory"),
+    "spiceypy": "trajectory",
     "distributed": "distributed",
 }
 """The optional extra of each library that a command may lack."""

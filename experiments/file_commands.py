@@ -16,11 +16,35 @@ BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in nam
 FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
 Like = Annotated[str, typer.Option("--like", metavar="NAME", help="The built-in file to copy.")]
 LikeScenario = Annotated[
-    str, typer.Option("--like", metavar="NAME", help="The scenario whose sensors, engine and body it takes.")
+    str, typer.Option("--like", metavar="NAME", help="The scenario whose sensors, engine and settings it takes.")
 ]
 Sigmas = Annotated[
     float,
     typer.Option("--sigma", min=0.1, max=10.0, help="Standard deviations that uncertainty and dispersion contain."),
+]
+BodyRadius = Annotated[
+    float | None,
+    typer.Option(
+        "--body-radius-m", metavar="M", min=1e-3, max=1e9, help="Radius of the target, m; without it no run hits."
+    ),
+]
+Disturbance = Annotated[
+    float | None,
+    typer.Option(
+        "--disturbance",
+        metavar="M_S2",
+        min=0.0,
+        max=1e3,
+        help="Bound of the target's acceleration beside gravity, m/s^2; without it: 0.",
+    ),
+]
+FilesIn = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--files-in",
+        metavar="FOLDER",
+        help="A folder whose OEM files and kernels the file may name too; repeat it for several.",
+    ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="FILE", help="The scenario file to write; - is stdout.")]
 NewFile = Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")]
@@ -143,19 +167,22 @@ def from_states(
     out: Out,
     like: LikeScenario = "dart-2022",
     sigma: Sigmas = 3.0,
+    body_radius_m: BodyRadius = None,
+    disturbance: Disturbance = None,
+    files_in: FilesIn = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
     """Make a scenario from the states of a spacecraft and an object, and their covariance."""
     from experiments.common.screen import say_warnings
     from experiments.interception.scenario_file import all_warnings, load_scenario
-    from experiments.interception.trajectory_file import scenario_of
+    from experiments.interception.trajectory_file import KnownTarget, scenario_of
 
     model = load_scenario(like)
-    scenario, text = scenario_of(file, model, sigma)
+    found = scenario_of(file, model, sigma, KnownTarget(body_radius_m, disturbance), files_in or ())
     note = f"with the sensors and the engine of {model.name}; change them, then: infoset scenarios check {out}"
-    _write(out, text, note, overwrite, quiet)
-    say_warnings(all_warnings(scenario), quiet)
+    _write(out, found.text, note, overwrite, quiet)
+    say_warnings([*found.warnings, *all_warnings(found.scenario)], quiet, found.notes)
 
 
 problems = _commands("problem", "A problem is one of rendezvous, pursuit or estimation, or a trajectory.", "service-2")

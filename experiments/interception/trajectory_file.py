@@ -3,27 +3,36 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from experiments.common.errors import InputError, input_errors
-from experiments.common.input_file import read_file, to_toml
+from experiments.common.errors import InputError, input_errors, on_a_screen
+from experiments.common.input_file import read_file, read_input, to_toml
+from experiments.interception.trajectory import craft_state, kernels
+from experiments.interception.trajectory.craft_state import CraftState
+from experiments.interception.trajectory.epochs import Epoch, converted, parse_epoch
+from experiments.interception.trajectory.files import named_file
+from experiments.interception.trajectory.frames import centre_name, frame_of_spice
+from experiments.interception.trajectory.oem import MAX_OEM_BYTES, OemSegment, read_oem
 from infoset.arrays import Floats
-from infoset.limits import NUMBER, Description, Name, Positive, check_fields
+from infoset.limits import NUMBER, Description, Line, Name, Positive, check_fields
 from sim.approach import Approach, find_approach
 from sim.covariance import Covariance
 from sim.gravity import on_board_model
-from sim.scenario import Scenario
+from sim.scenario import Body, Scenario
 
-ROTATING = ("ITRF", "GRC", "TDR", "EFG")
-"""Beginnings of the names of rotating frames in OEM files."""
+_Text = Line(longest=1000)
+"""Names and paths: one line, because they are repeated in messages and in the comments of the scenario."""
+KERNEL_SCALE = "TDB"
+"""Time scale of SPICE."""
 
 
 @dataclass(frozen=True)
-class Craft:
+class CraftTrack:
     """The state of a spacecraft or an object from the attracting body.
 
     It is two vectors, or the path of an orbit ephemeris message (`oem`), or a body of SPICE kernels (`spice`).
@@ -31,16 +40,16 @@ class Craft:
 
     position_m: Annotated[tuple[float, ...], NUMBER] | None = None
     velocity_m_s: Annotated[tuple[float, ...], NUMBER] | None = None
-    oem: str | None = None
-    spice: str | None = None
+    oem: Annotated[str, _Text] | None = None
+    spice: Annotated[str, _Text] | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
         vectors = [vector for vector in (self.position_m, self.velocity_m_s) if vector is not None]
         if [len(vectors), self.oem, self.spice].count(None) + (not vectors) != 2 or len(vectors) == 1:
-            raise ValueError("Craft: must have position and velocity, or oem, or spice")
+            raise ValueError("CraftTrack: must have position and velocity, or oem, or spice")
         if any(len(vector) != 3 for vector in vectors):
-            raise ValueError("Craft: position and velocity must have three components")
+            raise ValueError("CraftTrack: position and velocity must have three components")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,47 +72,104 @@ class Trajectory:
         SPICE kernels, paths relative to the file.
     centre, frame : str
         Attracting body and axes of the states from SPICE kernels.
+    covariance : Covariance or None
+        None is the sum of the covariances of the OEM files.
     """
 
     kind: ClassVar[str] = "trajectory"
     name: Name
     description: Description = ""
-    epoch: str | None = None
+    epoch: Annotated[str, _Text] | None = None
     gravitational_parameter_m3_s2: Positive | None = None
     flight_s: Positive | None = None
     pole: Annotated[tuple[float, ...], NUMBER] = (0.0, 0.0, 1.0)
-    kernels: tuple[str, ...] = ()
-    centre: str = "SUN"
-    frame: str = "ECLIPJ2000"
-    spacecraft: Craft
-    object: Craft
-    covariance: Covariance
+    kernels: Annotated[tuple[str, ...], _Text] = ()
+    centre: Annotated[str, _Text] = "SUN"
+    frame: Annotated[str, _Text] = "ECLIPJ2000"
+    spacecraft: CraftTrack
+    object: CraftTrack
+    covariance: Covariance | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
         if len(self.pole) != 3 or not any(self.pole):
             raise ValueError("pole must have three components, not all zero")
-        if self.covariance.size != 6:
+        if self.covariance is not None and self.covariance.size != 6:
             raise ValueError(f"covariance must have 6 components: got {self.covariance.size}")
-        if self.epoch is None and any(craft.position_m is None for craft in (self.spacecraft, self.object)):
+        crafts = (self.spacecraft, self.object)
+        if self.covariance is None and not any(craft.oem for craft in crafts):
+            raise ValueError("covariance is missing: only OEM files may have it instead")
+        if self.epoch is None and any(craft.position_m is None for craft in crafts):
             raise ValueError("epoch is missing: the time of the states in OEM files and kernels")
 
 
-def scenario_of(file: str | os.PathLike[str], like: Scenario, sigmas: float) -> tuple[Scenario, str]:
-    """Return the scenario of a trajectory file or of a built-in one, and its file with comments.
+class KnownTarget(NamedTuple):
+    """What the files of a trajectory do not contain about the target: its radius, m, and the bound of its acceleration.
 
-    It takes the sensors, the engine, the body and the settings of the scenario `like`. Uncertainty and dispersion
-    contain a number of standard deviations, `sigmas`. `InputError` if a file is invalid, or the states do not meet.
+    None is not known.
+    """
+
+    radius_m: float | None = None
+    disturbance_m_s2: float | None = None
+
+
+class FoundScenario(NamedTuple):
+    """The scenario of a trajectory, its file with comments, and notes and warnings about the trajectory."""
+
+    scenario: Scenario
+    text: str
+    notes: list[str]
+    warnings: list[str]
+
+
+class _Pair(NamedTuple):
+    """The states of both craft, the covariance of the relative state, and notes about them."""
+
+    spacecraft: CraftState
+    object: CraftState
+    covariance: Floats
+    notes: list[str]
+
+
+def scenario_of(
+    file: str | os.PathLike[str],
+    like: Scenario,
+    sigmas: float,
+    target: KnownTarget | None = None,
+    folders: Sequence[Path] = (),
+) -> FoundScenario:
+    """Return the scenario of a trajectory file or of a built-in one.
+
+    Parameters
+    ----------
+    file : str or path
+        The trajectory file, or the name of a built-in one.
+    like : Scenario
+        The scenario from which sensors, engine and settings are taken; nothing of its target is.
+    sigmas : float
+        Number of standard deviations that uncertainty and dispersion contain.
+    target : KnownTarget or None
+        The size of the target, and the bound of its acceleration.
+    folders : sequence of Path
+        Folders whose files the trajectory file may name; it may always name those below its own folder.
+
+    Raises
+    ------
+    InputError
+        If a file is invalid, or the states do not meet.
     """
     trajectory, source = read_file(Trajectory, file), os.fspath(file)
     if not like.is_spatial:
         raise InputError(f"--like: {like.name} is a scenario in a plane; take one in space, for example dart-2022")
-    states = _states(trajectory, Path(file).parent, source)
+    target = target or KnownTarget()
+    pair = _pair(trajectory, Path(file).parent, folders, source)
+    _check_accuracy(pair, source)
+    own, other = pair.spacecraft.state, pair.object.state
     with input_errors(source):
         found = find_approach(
-            states,
+            np.concatenate([own, other - own]),
             trajectory.gravitational_parameter_m3_s2 or 0.0,
-            trajectory.covariance.matrix,
+            pair.covariance,
             np.array(trajectory.pole),
             trajectory.flight_s,
         )
@@ -121,13 +187,51 @@ def scenario_of(file: str | os.PathLike[str], like: Scenario, sigmas: float) -> 
             uncertainty=box,
             dispersion=box,
             covariance=found.covariance,
+            target=None,
+            body=None if target.radius_m is None else Body(target.radius_m),
+            information_set=replace(
+                like.information_set,
+                disturbance_m_s2=target.disturbance_m_s2 or 0.0,
+                disturbance_y_m_s2=None,
+            ),
         )
         on_board_model(scenario)
-    return scenario, _text(scenario, found, like.name, sigmas, source)
+
+    missing = _missing(target)
+    notes = [*pair.notes, *missing]
+    warnings = [*pair.spacecraft.warnings, *pair.object.warnings]
+    origins = _origins(trajectory, pair)
+    text = _text(scenario, found, like.name, sigmas, source, [*origins, *pair.notes, *warnings, *missing])
+    return FoundScenario(scenario, text, notes, warnings)
 
 
-def _text(scenario: Scenario, found: Approach, like: str, sigmas: float, source: str) -> str:
+def _missing(target: KnownTarget) -> list[str]:
+    """Return a line for each value of the target that is not known."""
+    lines = []
+    if target.radius_m is None:
+        lines.append("missing: [body], the radius of the target: no run has a hit without it; add --body-radius-m")
+    if target.disturbance_m_s2 is None:
+        lines.append(
+            "missing: information_set.disturbance_m_s2, here 0: the guarantee holds only if nothing but the gravity of "
+            "[sun] accelerates the target; add --disturbance, for example 1e-6"
+        )
+    return lines
+
+
+def _origins(trajectory: Trajectory, pair: _Pair) -> list[str]:
+    """Return where the states and the covariance come from, one line each."""
+    lines = []
+    if trajectory.epoch is not None:
+        lines.append(f"Epoch: {trajectory.epoch}")
+    lines += [f"Spacecraft: {pair.spacecraft.origin}.", f"Object: {pair.object.origin}."]
+    return lines
+
+
+def _text(
+    scenario: Scenario, found: Approach, like: str, sigmas: float, source: str, about_states: Sequence[str]
+) -> str:
     t_km, r_km = (value / 1e3 for value in found.miss_m)
+    about = "".join(f"# {on_a_screen(line)}\n" for line in about_states)
     head = f"""\
 # The approach of {source}, written by infoset scenarios from-states.
 # x is along the line of approach (S of the B-plane), y along T, z along R; the origin is the spacecraft.
@@ -135,7 +239,7 @@ def _text(scenario: Scenario, found: Approach, like: str, sigmas: float, source:
 # Closest approach without impulses: B.T = {t_km:.6g} km, B.R = {r_km:.6g} km.
 # Until then gravity changes the closing speed by {found.speed_change_m_s:.3g} m/s and turns the line of approach by
 # {found.turn_rad:.3g} rad; B.T and B.R are in the plane across the line at the start.
-# What is not explained here has the values of {like}: replace them by yours.
+{about}# What is not explained here has the values of {like}: replace them by yours.
 """
     comments = {
         **{f"[{part.name}]": f"as {like}" for part in fields(Scenario)},
@@ -143,6 +247,9 @@ def _text(scenario: Scenario, found: Approach, like: str, sigmas: float, source:
         "[uncertainty]": f"known on board: {sigmas:g} sigma around the states",
         "[dispersion]": f"true starts are within {sigmas:g} sigma; those of the covariance beyond are drawn again",
         "[covariance]": "of the start, components y, z, x and their rates; lower triangle of the correlations",
+        "[camera]": f"as {like}; centroid_error_m depends on the size of the target",
+        "[body]": "of --body-radius-m",
+        "[information_set]": f"as {like}, but the disturbance",
     }
     lines = []
     for line in to_toml(scenario).replace("], [", "],\n    [").splitlines():
@@ -151,51 +258,109 @@ def _text(scenario: Scenario, found: Approach, like: str, sigmas: float, source:
     return head + "\n".join(lines) + "\n"
 
 
-def _states(trajectory: Trajectory, folder: Path, source: str) -> Floats:
-    """Return position and velocity of the spacecraft, and of the object from it, shape (4, 3)."""
-    found, frames = [], {}
-    for craft in (trajectory.spacecraft, trajectory.object):
-        if craft.oem is not None:
-            state, frames[craft.oem] = _oem_state(folder / craft.oem, str(trajectory.epoch))
-        elif craft.spice is not None:
-            state = _spice_state(trajectory, craft.spice, folder)
+def _pair(trajectory: Trajectory, folder: Path, folders: Sequence[Path], source: str) -> _Pair:
+    """Return the states of both craft at the epoch from their sources."""
+    crafts = (trajectory.spacecraft, trajectory.object)
+    with input_errors(source, kind=InputError):
+        messages = {craft.oem: _oem(craft.oem, folder, folders) for craft in crafts if craft.oem is not None}
+        epoch = _epoch(trajectory, is_needed=bool(messages))
+        scale = "" if epoch is None else craft_state.epoch_scale(epoch, list(messages.values()))
+
+        states = []
+        for craft in crafts:
+            if craft.oem is not None and epoch is not None:
+                state = craft_state.oem_craft(
+                    messages[craft.oem],
+                    craft.oem,
+                    epoch,
+                    scale,
+                    trajectory.gravitational_parameter_m3_s2 or 0.0,
+                    with_covariance=trajectory.covariance is None,
+                )
+            elif craft.spice is not None:
+                state = _spice_craft(trajectory, craft.spice, epoch, scale, folder, folders)
+            else:
+                state = CraftState(np.array([craft.position_m, craft.velocity_m_s]), source)
+            states.append(state)
+
+    one, other = states
+    craft_state.need_same_axes(one, other, source)
+    covariance, from_files = _covariance(trajectory, one, other, source)
+    notes = [*one.notes, *other.notes, *craft_state.axes_note(one, other), *from_files]
+    if epoch is not None:
+        wanted = [segment.scale for segments in messages.values() for segment in segments]
+        if any(craft.spice for craft in crafts):
+            wanted.append(KERNEL_SCALE)
+        notes += craft_state.time_notes(epoch, scale, wanted)
+    return _Pair(one, other, covariance, notes)
+
+
+def _oem(name: str, folder: Path, folders: Sequence[Path]) -> list[OemSegment]:
+    """Return the segments of the OEM file that a trajectory file in a folder names."""
+    return read_oem(read_input(named_file(name, folder, folders), MAX_OEM_BYTES), name)
+
+
+def _epoch(trajectory: Trajectory, *, is_needed: bool) -> Epoch | None:
+    """Return the epoch; None if it is not needed, or only SPICE reads it."""
+    if trajectory.epoch is None:
+        return None
+    try:
+        return parse_epoch(trajectory.epoch)
+    except ValueError as error:
+        if is_needed:
+            raise InputError(f"epoch: {trajectory.epoch} {error}") from None
+        return None
+
+
+def _spice_craft(
+    trajectory: Trajectory, body: str, epoch: Epoch | None, scale: str, folder: Path, folders: Sequence[Path]
+) -> CraftState:
+    """Return the state of a body of SPICE kernels; other epochs than those of `parse_epoch` are read by SPICE."""
+    files = kernels.kernel_files(trajectory.kernels, folder, folders)
+    with kernels.loaded(files) as spice:
+        if epoch is None:
+            time_s = spice.str2et(trajectory.epoch)
         else:
-            state = np.array([craft.position_m, craft.velocity_m_s])
-        found.append(state)
-    if len(set(frames.values())) > 1:
-        (one, first), (other, second) = frames.items()
-        raise InputError(
-            f"{source}: {one} has {', '.join(first)}, and {other} has {', '.join(second)} (centre, frame, time "
-            "system): they must be the same; convert one of the files"
-        )
-    return np.concatenate([found[0], found[1] - found[0]])
+            with input_errors("epoch"):
+                time_s = float(converted(epoch, scale, KERNEL_SCALE))
+        state = kernels.kernel_state(spice, body, time_s, trajectory.frame, trajectory.centre)
+    return CraftState(
+        state=state,
+        source=f"spice {body}",
+        centre=centre_name(trajectory.centre),
+        frame=frame_of_spice(trajectory.frame),
+        origin=f"body {body} of SPICE kernels, {trajectory.frame}",
+    )
 
 
-def _oem_state(file: Path, epoch: str) -> tuple[Floats, tuple[str, str, str]]:
-    """Return position and velocity of an OEM file at an epoch, m and m/s, and its centre, frame and time system."""
-    from oem import OrbitEphemerisMessage  # isort: skip  # it needs astropy
-    from astropy.time import Time
+def _covariance(trajectory: Trajectory, one: CraftState, other: CraftState, source: str) -> tuple[Floats, list[str]]:
+    """Return the covariance of the relative state, and a line about it if it is that of OEM files."""
+    if trajectory.covariance is not None:
+        return trajectory.covariance.matrix, []
+    found = {craft.source: craft.covariance for craft in (one, other) if craft.covariance is not None}
+    if not found:
+        raise InputError(f"{source}: covariance: is missing, and the OEM files have none; write the table [covariance]")
+    if len(found) == 1:
+        (name,) = found
+        note = f"covariance: that of {name}; the other state is taken as exact"
+    else:
+        note = f"covariance: the sum of those of {' and '.join(found)}, taken as independent"
 
-    try:
-        message = OrbitEphemerisMessage.open(str(file))
-        known = message.segments[0].metadata
-        frame = known["CENTER_NAME"], known["REF_FRAME"], known["TIME_SYSTEM"]
-        state = message(Time(epoch, scale=frame[2].lower()))
-    except Exception as error:  # the library has errors of many types for damaged files
-        raise InputError(f"{file}: cannot be read at the epoch {epoch}: {error}") from None
-    if frame[1].upper().startswith(ROTATING):
-        raise InputError(f"{file}: REF_FRAME {frame[1]} rotates; convert the file to an inertial frame")
-    return 1e3 * np.array([state.position, state.velocity]), frame
+    total = np.sum([*found.values()], axis=0)
+    rows = tuple(map(tuple, total.tolist()))
+    with input_errors(f"{source}: covariance of {' and '.join(found)}"):
+        return Covariance(matrix_m2=rows).matrix, [note]
 
 
-def _spice_state(trajectory: Trajectory, body: str, folder: Path) -> Floats:
-    """Return position and velocity of a body of SPICE kernels at the epoch, m and m/s."""
-    import spiceypy
-
-    try:
-        with spiceypy.KernelPool([str(folder / kernel) for kernel in trajectory.kernels]):
-            time_s = spiceypy.str2et(trajectory.epoch)
-            state: Any = spiceypy.spkezr(body, time_s, trajectory.frame, "NONE", trajectory.centre)[0]
-    except spiceypy.SpiceyError as error:
-        raise InputError(f"spice: {body}: {error.long or error.short}") from None
-    return 1e3 * np.reshape(state, (2, 3))
+def _check_accuracy(pair: _Pair, source: str) -> None:
+    """Refuse states that the tables give with greater errors than the covariance claims: both cannot be right."""
+    errors = pair.spacecraft.error + pair.object.error
+    variances = pair.covariance.diagonal()
+    claimed = np.sqrt([variances[:3].sum(), variances[3:].sum()])
+    if (errors <= claimed).all():
+        return
+    raise InputError(
+        f"{source}: the interpolation has errors of about {errors[0]:.3g} m and {errors[1]:.3g} m/s, more than the "
+        f"standard deviations of the covariance, {claimed[0]:.3g} m and {claimed[1]:.3g} m/s: give tables with shorter "
+        "steps, or a covariance that contains these errors"
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +13,13 @@ from scipy.spatial.transform import Rotation
 
 from experiments import load_scenario
 from experiments.common.input_file import read_text
-from experiments.interception.trajectory_file import scenario_of
+from experiments.interception.trajectory_file import KnownTarget, scenario_of
 from infoset.arrays import Floats
 from sim.approach import propagate
 from sim.kepler import KeplerMotion
 from sim.scenario import Scenario, corners
 from tests.experiments.command_line import Command
+from tests.oem_text import HEADER, covariance_block, segment
 
 DATA = Path(__file__).parents[2] / "data" / "oem"
 EARTH_KM3_S2 = 398600.4418
@@ -59,9 +62,13 @@ def test_a_scenario_as_states_and_back_has_the_same_numbers(name: str, tmp_path:
     rows = (both.T @ matrix @ both).tolist()
     text = "matrix_m2 = [{}]".format(", ".join(f"{row}".replace("\n", "") for row in rows))
     (tmp_path / "states.toml").write_text(toml(craft, body, text.replace("],", "],\n"), *head))
-    found, written = scenario_of(tmp_path / "states.toml", scenario, 2.0)
+    found, written, _, _ = scenario_of(
+        tmp_path / "states.toml", scenario, 2.0, KnownTarget(scenario.radius_m, disturbance_m_s2=1e-6)
+    )
     assert read_text(Scenario, written, "written") == found
     assert (found.camera, found.thruster, found.body) == (scenario.camera, scenario.thruster, scenario.body)
+    assert found.information_set == replace(scenario.information_set, disturbance_m_s2=1e-6, disturbance_y_m_s2=None)
+    assert found.target is None
     assert found.nominal_range_m == pytest.approx(scenario.nominal_range_m, rel=1e-9)
     assert found.closing_speed_m_s == pytest.approx(scenario.closing_speed_m_s, rel=1e-9)
     scale = np.repeat([scenario.nominal_range_m, scenario.closing_speed_m_s], 3)
@@ -180,51 +187,61 @@ def oem_trajectory(folder: Path, **changes: str) -> Path:
 
 def test_two_oem_files_one_of_another_program(tmp_path: Path) -> None:
     """The satellite's file has the higher terms of the Earth's gravity, so the states meet within some metres."""
-    pytest.importorskip("oem", reason="needs the extra trajectory: pip install '.[trajectory]'")
     like = load_scenario("asteroid-1997-space", ["information_set.range_threshold_km=1"])
-    found, text = scenario_of(oem_trajectory(tmp_path), like, 3.0)
+    found, text, _, warnings = scenario_of(oem_trajectory(tmp_path), like, 3.0)
     rows = (DATA / "leo.oem").read_text().splitlines()
     speed_m_s = np.linalg.norm(np.array(next(row for row in rows if "12:10:00" in row).split()[4:], float)) * 1e3
     assert found.closing_speed_m_s == pytest.approx(2.0 * speed_m_s, rel=0.01)  # the orbits turn by 0.1 rad
     assert found.nominal_range_m / found.closing_speed_m_s == pytest.approx(90.0, rel=0.01)
     assert "90.0" in text.split("s before the closest")[0]
+    assert "segment 1 of leo.oem, LAGRANGE of degree 7" in text
+    assert warnings == []
 
 
 @pytest.mark.parametrize(
     ("changes", "problem"),
     [
-        ({"CENTER_NAME": "Sun"}, "must be the same; convert one of the files"),
-        ({"REF_FRAME": "EME2000"}, "object.oem has Earth, EME2000, UTC"),
-        ({"TIME_SYSTEM": "TDB"}, "object.oem has Earth, ICRF, TDB"),
-        ({"REF_FRAME": "ITRF2000"}, "object.oem: REF_FRAME ITRF2000 rotates"),
-        ({"START_TIME": "2020-06-01T12:09:00.000000"}, "object.oem: cannot be read at the epoch"),
+        ({"CENTER_NAME": "Sun"}, "must be the same; convert one of them"),
+        ({"REF_FRAME": "EME2000"}, "leo.oem has EARTH, ICRF, and object.oem has EARTH, EME2000 (centre, frame)"),
+        ({"TIME_SYSTEM": "TDB"}, "epoch: has no time scale, and the OEM files have TDB and UTC"),
+        ({"REF_FRAME": "ITRF2000"}, "object.oem: segment 1: REF_FRAME ITRF2000 is not a known inertial frame"),
+        ({"START_TIME": "2020-06-01T12:09:00.000000"}, "object.oem: no segment holds the epoch"),
     ],
 )
 def test_oem_files_that_do_not_fit_are_refused(changes: dict[str, str], problem: str, infoset: Command) -> None:
-    pytest.importorskip("oem", reason="needs the extra trajectory: pip install '.[trajectory]'")
     oem_trajectory(Path(), **changes)
     assert problem in infoset.refused("scenarios", "from-states", "states.toml", "--out", "mine.toml")
 
 
 def test_without_the_extra_it_is_named(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    for library, source in (("oem", 'oem = "leo.oem"'), ("spiceypy", 'spice = "-135"')):
-        monkeypatch.setitem(__import__("sys").modules, library, None)
-        text = toml(CRAFT, BODY, SIGMAS, 'epoch = "2020-06-01"')
-        first, rest = text.split("[object]")
-        Path("states.toml").write_text(f"{first.split('[spacecraft]')[0]}[spacecraft]\n{source}\n[object]{rest}")
-        message = infoset.refused("scenarios", "from-states", "states.toml", "--out", "-")
-        assert f"{library} is not installed" in message
-        assert "install infoset with the extra [trajectory]" in message
+    monkeypatch.setitem(__import__("sys").modules, "spiceypy", None)
+    Path("states.toml").write_text(with_source(toml(CRAFT, BODY, SIGMAS, 'epoch = "2020-06-01"'), 'spice = "-135"'))
+
+    message = infoset.refused("scenarios", "from-states", "states.toml", "--out", "-")
+
+    assert "spiceypy is not installed" in message
+    assert "install infoset with the extra [trajectory]" in message
+
+
+def with_source(text: str, source: str) -> str:
+    """A trajectory file whose spacecraft has another source than vectors."""
+    first, rest = text.split("[object]")
+    return f"{first.split('[spacecraft]')[0]}[spacecraft]\n{source}\n[object]{rest}"
+
+
+def write_kernel(folder: Path) -> None:
+    """Write a kernel in which both craft move on straight lines from J2000 on, -999 and 2000433."""
+    spice: Any = pytest.importorskip("spiceypy", reason="needs the extra trajectory: pip install '.[trajectory]'")
+    handle = spice.spkopn(str(folder / "both.bsp"), "test", 0)
+    for body, state in ((-999, CRAFT), (2000433, BODY)):
+        states = [1e-3 * (state[0] + time * state[1]) for time in (-86400.0, 0.0, 86400.0)]
+        rows = np.array([[*place, *(1e-3 * state[1])] for place in states])
+        spice.spkw08(handle, body, 10, "ECLIPJ2000", -86400.0, 86400.0, "straight", 1, 3, rows, -86400.0, 86400.0)
+    spice.spkcls(handle)
 
 
 def test_states_of_spice_kernels(tmp_path: Path) -> None:
-    spice: Any = pytest.importorskip("spiceypy", reason="needs the extra trajectory: pip install '.[trajectory]'")
-    handle = spice.spkopn(str(tmp_path / "both.bsp"), "test", 0)
-    for body, state in ((-999, CRAFT), (2000433, BODY)):
-        states = [1e-3 * (state[0] + time * state[1]) for time in (0.0, 86400.0)]
-        rows = np.array([[*place, *(1e-3 * state[1])] for place in states])
-        spice.spkw08(handle, body, 10, "ECLIPJ2000", 0.0, 86400.0, "straight", 1, 2, rows, 0.0, 86400.0)
-    spice.spkcls(handle)
+    write_kernel(tmp_path)
     (tmp_path / "time.tls").write_text(
         "KPL/LSK\n\\begindata\nDELTET/DELTA_T_A = 32.184\nDELTET/K = 1.657D-3\n"
         "DELTET/EB = 1.671D-2\nDELTET/M = ( 6.239996 1.99096871D-7 )\nDELTET/DELTA_AT = ( 10, @1972-JAN-1 )\n"
@@ -237,3 +254,244 @@ def test_states_of_spice_kernels(tmp_path: Path) -> None:
     dart = load_scenario("dart-2022")
     found, expected = (scenario_of(tmp_path / f"{name}.toml", dart, 3.0)[0] for name in ("kernels", "vectors"))
     np.testing.assert_allclose(corners(found.dispersion), corners(expected.dispersion), rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize("epoch", ["2000-01-01T12:00:00 TDB", "2000-001T11:58:55.816Z", "2000-01-01T11:58:55.816"])
+def test_kernels_need_no_leap_seconds_for_common_epochs(epoch: str, tmp_path: Path) -> None:
+    """J2000 in TDB is 11:58:55.816 in UTC, to 0.1 ms."""
+    write_kernel(tmp_path)
+    dart = load_scenario("dart-2022")
+    vectors = toml(CRAFT, BODY, SIGMAS, f'epoch = "{epoch}"', 'kernels = ["both.bsp"]', SUN)
+    (tmp_path / "vectors.toml").write_text(vectors)
+    (tmp_path / "kernel.toml").write_text(with_source(vectors, 'spice = "-999"'))
+
+    expected, found = (scenario_of(tmp_path / f"{name}.toml", dart, 3.0).scenario for name in ("vectors", "kernel"))
+
+    # 1e-4 s at 29 km/s are 3 m.
+    np.testing.assert_allclose(corners(found.dispersion), corners(expected.dispersion), rtol=1e-9, atol=5.0)
+
+
+def meeting_oem(folder: Path, *, spacecraft_scale: str = "TDB", covariance: str = "", **metadata: str) -> Path:
+    """OEM files of the two craft of `CRAFT` and `BODY` on straight lines from 2000-01-01T12:00 on."""
+    seconds = [600.0 * row for row in range(-4, 9)]
+    epochs = [f"2000-01-01T{12 + row // 6:02}:{10 * (row % 6):02}:00" for row in range(-4, 9)]
+    for name, state, scale in (("spacecraft", CRAFT, spacecraft_scale), ("object", BODY, "TDB")):
+        states = np.array([[state[0] + time * state[1], state[1]] for time in seconds])
+        text = segment(epochs, states, covariance, TIME_SYSTEM=scale, REF_FRAME="ECLIPJ2000", **metadata)
+        (folder / f"{name}.oem").write_text(HEADER + text)
+    text = toml(CRAFT, BODY, SIGMAS, 'epoch = "2000-01-01T12:05:00"')
+    text = with_source(text, 'oem = "spacecraft.oem"')
+    first, rest = text.split("[object]")
+    (folder / "states.toml").write_text(
+        f'{first}[object]\noem = "object.oem"\n[covariance]{rest.split("[covariance]")[1]}'
+    )
+    return folder / "states.toml"
+
+
+def test_oem_file_beside_a_kernel_is_read_at_the_same_time(tmp_path: Path) -> None:
+    """The epoch has the scale of the OEM file; with UTC for the kernel the object was 64 s, 1900 km, ahead."""
+    write_kernel(tmp_path)
+    file = meeting_oem(tmp_path)
+    expected = scenario_of(file, load_scenario("dart-2022"), 3.0).scenario
+    text = file.read_text().replace('oem = "object.oem"', 'spice = "2000433"')
+    file.write_text(text.replace("[spacecraft]", 'kernels = ["both.bsp"]\n[spacecraft]'))
+
+    found = scenario_of(file, load_scenario("dart-2022"), 3.0).scenario
+
+    # Positions of 1.5e11 m have roundings of 3e-5 m in the kernel, in km, and in the OEM file.
+    np.testing.assert_allclose(corners(found.dispersion), corners(expected.dispersion), rtol=1e-9, atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (("ECLIPJ2000", "J2000"), "spacecraft.oem has SUN, ECLIPJ2000, and spice 2000433 has SUN, J2000 of SPICE"),
+        (("ECLIPJ2000", "IAU_EARTH"), "frame: IAU_EARTH is not an inertial frame of SPICE"),
+        (('"SUN"', '"-999"'), "spacecraft.oem has SUN, ECLIPJ2000, and spice 2000433 has -999, ECLIPJ2000"),
+        (('"SUN"', '"NOWHERE"'), "spice: "),
+        (("both.bsp", "missing.bsp"), '"missing.bsp": cannot be read'),
+    ],
+)
+def test_kernels_with_other_axes_are_refused(change: tuple[str, str], problem: str, infoset: Command) -> None:
+    write_kernel(Path())
+    file = meeting_oem(Path())
+    keys = 'kernels = ["both.bsp"]\nframe = "ECLIPJ2000"\ncentre = "SUN"\n[spacecraft]'
+    text = file.read_text().replace('oem = "object.oem"', 'spice = "2000433"').replace("[spacecraft]", keys)
+    file.write_text(text.replace(*change))
+
+    assert problem in infoset.refused("scenarios", "from-states", "states.toml", "--out", "-")
+
+
+def test_what_describes_another_target_is_not_taken(infoset: Command) -> None:
+    code, _, err = infoset("scenarios", "from-states", "two-states", "--out", "mine.toml")
+    text, scenario = Path("mine.toml").read_text(), load_scenario("mine.toml")
+
+    assert code == 0
+    assert (scenario.body, scenario.target, scenario.information_set.disturbance_m_s2) == (None, None, 0.0)
+    for told in (
+        "missing: [body]",
+        "add --body-radius-m",
+        "missing: information_set.disturbance_m_s2",
+        "--disturbance",
+    ):
+        assert told in err
+        assert told in text
+
+
+def test_target_of_the_options_is_taken(infoset: Command) -> None:
+    options = ("--body-radius-m", "50", "--disturbance", "1e-6")
+
+    _, _, err = infoset("scenarios", "from-states", "two-states", "--out", "mine.toml", *options)
+
+    scenario = load_scenario("mine.toml")
+    assert (scenario.radius_m, scenario.information_set.disturbance_m_s2, scenario.target) == (50.0, 1e-6, None)
+    assert "missing" not in err + Path("mine.toml").read_text()
+
+
+@pytest.mark.parametrize("options", [("--body-radius-m", "0"), ("--disturbance", "-1"), ("--disturbance", "nan")])
+def test_target_that_is_none_is_refused(options: tuple[str, str], infoset: Command) -> None:
+    infoset.refused("scenarios", "from-states", "two-states", "--out", "mine.toml", *options)
+
+
+MATRIX = np.diag([1e4, 4e4, 9e4, 1e-4, 4e-4, 9e-4])
+BLOCK = covariance_block("2000-01-01T12:05:00", MATRIX)
+
+
+def without_covariance(file: Path) -> Path:
+    file.write_text(file.read_text().split("[covariance]")[0])
+    return file
+
+
+def test_covariances_of_both_files_are_added(tmp_path: Path) -> None:
+    found = scenario_of(without_covariance(meeting_oem(tmp_path, covariance=BLOCK)), load_scenario("dart-2022"), 3.0)
+    with_table = meeting_oem(tmp_path)
+    rows = ", ".join(f"{row}" for row in (2.0 * MATRIX).tolist())
+    with_table.write_text(without_covariance(with_table).read_text() + f"[covariance]\nmatrix_m2 = [{rows}]\n")
+
+    expected = scenario_of(with_table, load_scenario("dart-2022"), 3.0)
+
+    assert found.scenario.covariance is not None
+    assert expected.scenario.covariance is not None
+    np.testing.assert_allclose(
+        found.scenario.covariance.matrix, expected.scenario.covariance.matrix, rtol=1e-9, atol=1e-9
+    )
+    assert "covariance: the sum of those of spacecraft.oem and object.oem, taken as independent" in found.notes
+
+
+def test_covariance_of_one_file_is_used_and_said(tmp_path: Path) -> None:
+    file = without_covariance(meeting_oem(tmp_path, covariance=BLOCK))
+    (tmp_path / "object.oem").write_text((tmp_path / "object.oem").read_text().split("COVARIANCE_START")[0])
+
+    notes = scenario_of(file, load_scenario("dart-2022"), 3.0).notes
+
+    assert "covariance: that of spacecraft.oem; the other state is taken as exact" in notes
+
+
+def test_covariance_of_the_trajectory_file_wins(tmp_path: Path) -> None:
+    plain = scenario_of(meeting_oem(tmp_path), load_scenario("dart-2022"), 3.0)
+
+    found = scenario_of(meeting_oem(tmp_path, covariance=BLOCK), load_scenario("dart-2022"), 3.0)
+
+    assert found.scenario == plain.scenario
+
+
+@pytest.mark.parametrize(
+    ("covariance", "problem"),
+    [
+        ("", "covariance: is missing, and the OEM files have none; write the table [covariance]"),
+        (
+            covariance_block("2000-01-01T12:10:00", MATRIX),
+            "no covariance of the epoch, the nearest is of 2000-01-01T12:10",
+        ),
+        (
+            BLOCK.replace("9.000000000000000e-02", "-9.0"),
+            "covariance of spacecraft.oem and object.oem: Covariance: the variances",
+        ),
+    ],
+    ids=["none", "another epoch", "negative"],
+)
+def test_missing_or_wrong_covariance_is_refused(covariance: str, problem: str, infoset: Command) -> None:
+    without_covariance(meeting_oem(Path(), covariance=covariance))
+
+    assert problem in infoset.refused("scenarios", "from-states", "states.toml", "--out", "-")
+
+
+def test_vectors_without_covariance_are_refused(infoset: Command) -> None:
+    Path("states.toml").write_text(toml(CRAFT, BODY, SIGMAS).split("[covariance]")[0])
+
+    assert "covariance is missing" in infoset.refused("scenarios", "from-states", "states.toml", "--out", "-")
+
+
+def test_interpolation_that_the_covariance_does_not_contain_is_refused(infoset: Command) -> None:
+    """LINEAR with steps of 600 s has an error of 6e-3 m/s2 (600 s)^2 / 8 = 270 m beside a star."""
+    file = meeting_oem(Path(), INTERPOLATION="LINEAR")
+    for name, state in (("spacecraft", CRAFT), ("object", BODY)):
+        pair = np.concatenate([state, np.zeros((2, 3))])
+        states = np.array([propagate(pair, 1.327e20, 600.0 * row)[0][:2] for row in range(-4, 9)])
+        epochs = [f"2000-01-01T{12 + row // 6:02}:{10 * (row % 6):02}:00" for row in range(-4, 9)]
+        Path(f"{name}.oem").write_text(HEADER + segment(epochs, states, INTERPOLATION="LINEAR", REF_FRAME="ECLIPJ2000"))
+    head = file.read_text().replace("[spacecraft]", f"{SUN}\n[spacecraft]")
+    file.write_text(head.replace("position_sigma_km = [1.0, 1.0, 1.0]", "position_sigma_m = [100.0, 100.0, 100.0]"))
+
+    message = infoset.refused("scenarios", "from-states", "states.toml", "--out", "-")
+
+    assert "the interpolation has errors of about" in message
+    assert "more than the standard deviations of the covariance, 173 m" in message
+
+
+@pytest.mark.parametrize("name", ["../elsewhere.oem", "/dev/zero"])
+def test_file_elsewhere_is_opened_only_if_allowed(name: str, infoset: Command) -> None:
+    file = meeting_oem(Path())
+    Path("mine").mkdir()
+    Path("elsewhere.oem").write_text(Path("spacecraft.oem").read_text())
+    Path("mine/object.oem").write_text(Path("object.oem").read_text())
+    Path("mine/states.toml").write_text(file.read_text().replace("spacecraft.oem", name))
+
+    assert "is not below the folder" in infoset.refused("scenarios", "from-states", "mine/states.toml", "--out", "-")
+
+    allowed = ("--files-in", Path(name).parent if name.startswith("/") else ".")
+    if name == "/dev/zero":
+        message = infoset.refused("scenarios", "from-states", "mine/states.toml", "--out", "-", *allowed)
+        assert "is not a regular file" in message
+    else:
+        assert infoset("scenarios", "from-states", "mine/states.toml", "--out", "-", *allowed)[0] == 0
+
+
+@pytest.mark.parametrize("key", ["epoch", "spice", "oem", "kernels", "centre", "frame"])
+def test_text_with_a_new_line_cannot_write_keys_into_the_scenario(key: str, infoset: Command) -> None:
+    hostile = r'"2000-01-01\nstep_s = 1.0"'
+    text = toml(CRAFT, BODY, SIGMAS)
+    if key in ("spice", "oem"):
+        text = with_source(text.replace("[spacecraft]", 'epoch = "2000-01-01"\n[spacecraft]'), f"{key} = {hostile}")
+    else:
+        value = f"[{hostile}]" if key == "kernels" else hostile
+        text = text.replace("[spacecraft]", f"{key} = {value}\n[spacecraft]")
+    Path("states.toml").write_text(text)
+
+    assert "must be one line without control characters" in infoset.refused(
+        "scenarios", "from-states", "states.toml", "--out", "-"
+    )
+
+
+def test_size_is_limited_before_reading(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.interception.trajectory_file.MAX_OEM_BYTES", 100)
+    meeting_oem(Path())
+
+    assert "spacecraft.oem: has more than 100 bytes" in infoset.refused(
+        "scenarios", "from-states", "states.toml", "--out", "-"
+    )
+
+
+@pytest.mark.skipif(find_spec("benchmarks") is None, reason="the benchmarks are not installed")
+@pytest.mark.parametrize(
+    "numbers", [pytest.param(range(15)), pytest.param(range(15, 200), marks=pytest.mark.thorough)], ids=["15", "200"]
+)
+def test_random_encounters_from_tables_are_right_or_refused(numbers: range) -> None:
+    """B.T and B.R within 10 m of DOP853: five kinds of steps, three interpolations, two segments, four time systems."""
+    from benchmarks.trajectory_tables import ALLOWED_M, outcomes
+
+    found = list(outcomes(numbers.start, len(numbers)))
+
+    assert all(each.refusal or each.error_m <= ALLOWED_M for each in found)
+    assert all(each.refusal for each in found if not each.encounter.is_sound)
+    assert sum(not each.refusal for each in found) >= len(found) // 3

@@ -1,0 +1,265 @@
+"""The state of a spacecraft or an object at an epoch, from each source, with its frame and covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+from experiments.common.errors import InputError
+from experiments.interception.trajectory.epochs import Epoch, converted, is_guess, tdb_drift_s
+from experiments.interception.trajectory.frames import SOLAR_SYSTEM, Frame, centre_name, inertial_frame, is_same_frame
+from experiments.interception.trajectory.interpolation import Interpolated, interpolate
+from experiments.interception.trajectory.oem import OemCovariance, OemSegment
+from infoset.arrays import Floats
+from sim.approach import propagate
+
+SAME_EPOCH_S = Fraction(1, 1000)
+"""Difference between the epoch of a covariance and of the states: files write both with milliseconds."""
+MODEL_SHARE = 0.01
+"""Difference to two-body motion, as a share of the distance to the nearest tabulated state, that is a warning.
+
+Perturbations of an orbit change it by less (the Earth's oblateness by 0.1 %), wrong units and manoeuvres by more.
+"""
+ALONG_RADIUS = ("RTN", "RSW", "RIC", "QSW")
+ALONG_VELOCITY = ("TNW",)
+"""Names of local axes: radius, transverse, normal; and velocity, in-plane normal, normal of the orbit."""
+
+
+@dataclass(frozen=True)
+class CraftState:
+    """A state, shape (2, 3), and what its source says about it.
+
+    Parameters
+    ----------
+    source : str
+        The file, or the body of kernels.
+    centre, frame : str and Frame, or None
+        None for vectors of the trajectory file.
+    covariance : array of shape (6, 6) or None
+        Of position and velocity, in the axes of the state.
+    origin : str
+        How the state was found, for the comments of the scenario.
+    error : array of shape (2,)
+        Estimated error of the interpolation of position and velocity.
+    notes, warnings : tuple of str
+        What the user must know, one line each.
+    """
+
+    state: Floats
+    source: str
+    centre: str | None = None
+    frame: Frame | None = None
+    covariance: Floats | None = None
+    origin: str = "vectors of the trajectory file"
+    error: Floats = field(default_factory=lambda: np.zeros(2))
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def epoch_scale(epoch: Epoch, files: Sequence[Sequence[OemSegment]]) -> str:
+    """Return the time scale of an epoch: as written, or that of all OEM files; UTC without such files, as in SPICE.
+
+    `InputError` if the files have several.
+    """
+    if epoch.scale is not None:
+        return epoch.scale
+    scales = sorted({segment.scale for segments in files for segment in segments})
+    if len(scales) > 1:
+        raise InputError(
+            f"epoch: has no time scale, and the OEM files have {' and '.join(scales)}; write one of them after it, for "
+            f'example epoch = "2029-03-01T00:00:00 {scales[0]}"'
+        )
+    return scales[0] if scales else "UTC"
+
+
+def oem_craft(
+    segments: Sequence[OemSegment],
+    source: str,
+    epoch: Epoch,
+    scale: str,
+    parameter_m3_s2: float,
+    *,
+    with_covariance: bool,
+) -> CraftState:
+    """Return the state of an OEM file at an epoch in a time scale, with its covariance if that is wanted.
+
+    `InputError` if no segment holds the epoch, its frame rotates or is unknown, the epoch is in a gap, or the segment
+    has covariances and none of them is of the epoch.
+    """
+    segment = _segment_at(segments, source, epoch, scale)
+    where = f"{source}: segment {segment.number}"
+    seconds = converted(epoch, scale, segment.scale)
+    try:
+        frame = inertial_frame(segment.metadata["REF_FRAME"], segment.metadata.get("REF_FRAME_EPOCH"))
+        found = interpolate(
+            seconds,
+            segment.seconds,
+            segment.states,
+            segment.method,
+            segment.degree,
+            lambda time: tdb_drift_s(time, segment.scale),
+        )
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from None
+
+    centre = centre_name(segment.metadata["CENTER_NAME"])
+    covariance = None
+    if with_covariance and segment.covariances:
+        covariance = _covariance_at(segment, where, seconds, frame, found.state)
+
+    notes = []
+    if found.method not in ("TABULATED", "LINEAR") and found.degree < segment.degree:
+        notes.append(
+            f"{where}: has fewer states around the epoch than degree + 1 = {segment.degree + 1}: interpolated with "
+            f"degree {found.degree}"
+        )
+    return CraftState(
+        state=found.state,
+        source=source,
+        centre=centre,
+        frame=frame,
+        covariance=covariance,
+        origin=f"segment {segment.number} of {source}, {_method_text(found)}",
+        error=found.error,
+        notes=tuple(notes),
+        warnings=tuple(_warnings(where, found, centre, frame, parameter_m3_s2)),
+    )
+
+
+def time_notes(epoch: Epoch, scale: str, wanted: Sequence[str]) -> list[str]:
+    """Return a line if an epoch in UTC is converted to other scales with leap seconds that are not yet known."""
+    if any(is_guess(epoch, scale, each) for each in wanted):
+        return [f"the leap seconds of {epoch.day} are not yet known: UTC is converted with TAI - UTC = 37 s"]
+    return []
+
+
+def need_same_axes(one: CraftState, other: CraftState, source: str) -> None:
+    """Raise `InputError` unless two states from files have the same centre and frame."""
+    if one.frame is None or other.frame is None or one.centre is None or other.centre is None:
+        return
+    if one.centre == other.centre and is_same_frame(one.frame, other.frame):
+        return
+    raise InputError(
+        f"{source}: {one.source} has {one.centre}, {one.frame.name}, and {other.source} has {other.centre}, "
+        f"{other.frame.name} (centre, frame): they must be the same; convert one of them"
+    )
+
+
+def axes_note(one: CraftState, other: CraftState) -> list[str]:
+    """Return a line if only one of two states has a known frame."""
+    known = [craft for craft in (one, other) if craft.frame is not None]
+    if len(known) != 1 or known[0].frame is None:
+        return []
+    return [
+        f"the vectors of the trajectory file are taken in the axes of {known[0].source}: {known[0].centre}, "
+        f"{known[0].frame.name}"
+    ]
+
+
+def _segment_at(segments: Sequence[OemSegment], source: str, epoch: Epoch, scale: str) -> OemSegment:
+    """Return the segment that holds an epoch; of two that meet there, the later one, after a manoeuvre."""
+    holding = []
+    for segment in segments:
+        try:
+            seconds = converted(epoch, scale, segment.scale)
+        except ValueError as error:
+            raise InputError(f"epoch: {error}") from None
+        if segment.start <= seconds <= segment.stop:
+            holding.append((segment, seconds))
+
+    if not holding:
+        first, last = segments[0].metadata, segments[-1].metadata
+        raise InputError(
+            f"{source}: no segment holds the epoch: their states or usable spans are "
+            f"from {first.get('START_TIME', 'the first state')} to {last.get('STOP_TIME', 'the last state')} "
+            f"{segments[0].scale}; take an epoch between them"
+        )
+    inside = [segment for segment, seconds in holding if segment.start < seconds < segment.stop]
+    if len(inside) > 1:
+        raise InputError(f"{source}: segments {inside[0].number} and {inside[1].number} both hold the epoch")
+    return inside[0] if inside else holding[-1][0]
+
+
+def _method_text(found: Interpolated) -> str:
+    if found.method == "TABULATED":
+        return "a tabulated state"
+    return (
+        f"{found.method} of degree {found.degree}, estimated errors {found.error[0]:.2g} m and {found.error[1]:.2g} m/s"
+    )
+
+
+def _warnings(where: str, found: Interpolated, centre: str, frame: Frame, parameter_m3_s2: float) -> list[str]:
+    lines = []
+    if frame.is_of_date:
+        lines.append(f"{where}: the frame {frame.name} is of date, its axes turn slowly; EME2000 or ICRF are better")
+    if centre == SOLAR_SYSTEM and parameter_m3_s2:
+        lines.append(f"{where}: the centre is the {SOLAR_SYSTEM}, and gravity is computed from there")
+
+    distance_m = float(np.linalg.norm(found.state[0] - found.nearest[0]))
+    difference_m = _two_body_difference(found, parameter_m3_s2)
+    if difference_m > MODEL_SHARE * distance_m:
+        lines.append(
+            f"{where}: the state differs by {difference_m / 1e3:.4g} km from two-body motion from the nearest "
+            f"tabulated state, {distance_m / 1e3:.4g} km away: check the units, gravitational_parameter and the steps"
+        )
+    return lines
+
+
+def _two_body_difference(found: Interpolated, parameter_m3_s2: float) -> float:
+    """Return the distance from the two-body motion of the nearest tabulated state, m; infinite if that fails."""
+    if not found.nearest_s:
+        return 0.0
+    pair = np.concatenate([found.nearest, np.zeros((2, 3))])
+    try:
+        moved, _ = propagate(pair, parameter_m3_s2, found.nearest_s)
+    except ValueError:
+        return np.inf
+    return float(np.linalg.norm(moved[0] - found.state[0]))
+
+
+def _covariance_at(segment: OemSegment, where: str, seconds: Fraction, frame: Frame, state: Floats) -> Floats:
+    """Return the covariance of a segment at an epoch, in the axes of its states."""
+    nearest = min(segment.covariances, key=lambda each: abs(each.seconds - seconds))
+    if abs(nearest.seconds - seconds) > SAME_EPOCH_S:
+        raise InputError(
+            f"{where}: has no covariance of the epoch, the nearest is of {nearest.epoch}; take that epoch, or write "
+            "[covariance] in the trajectory file"
+        )
+    both = np.kron(np.eye(2), _axes_of(nearest, where, segment, frame, state))
+    return np.asarray(both.T @ nearest.matrix @ both)
+
+
+def _axes_of(covariance: OemCovariance, where: str, segment: OemSegment, frame: Frame, state: Floats) -> Floats:
+    """Return the axes of a covariance as rows, in the axes of the states."""
+    name = covariance.frame
+    if name is None:
+        return np.eye(3)
+    plain = name.upper().removesuffix("_INERTIAL")
+    if plain in (*ALONG_RADIUS, *ALONG_VELOCITY):
+        return _local_axes(state, where, along_radius=plain in ALONG_RADIUS)
+
+    try:
+        is_same = inertial_frame(name, segment.metadata.get("REF_FRAME_EPOCH")) == frame
+    except ValueError:
+        is_same = False
+    if not is_same:
+        raise InputError(
+            f"{where}: COV_REF_FRAME {name} is neither the frame of the states nor one of "
+            f"{', '.join((*ALONG_RADIUS, *ALONG_VELOCITY))}; write [covariance] in the trajectory file"
+        )
+    return np.eye(3)
+
+
+def _local_axes(state: Floats, where: str, *, along_radius: bool) -> Floats:
+    """Return the axes of an orbit at a state as rows; the first is along the radius or along the velocity."""
+    position, velocity = state
+    normal = np.cross(position, velocity)
+    if not normal.any():
+        raise InputError(f"{where}: the covariance is in the axes of the orbit, and the motion is along the radius")
+    first = position if along_radius else velocity
+    first = first / np.linalg.norm(first)
+    normal = normal / np.linalg.norm(normal)
+    return np.stack([first, np.cross(normal, first), normal])
