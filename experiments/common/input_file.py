@@ -40,9 +40,10 @@ _MAX_FAULTS = 50
 MAX_FILE_BYTES = 100_000
 """Size of the largest TOML file that is read."""
 MAX_KEY_PARTS = 20
-"""Maximum number of parts of a dotted key of a TOML file. The time of the parser grows as the square of this number: for
-a file of `MAX_FILE_BYTES` with parts of one letter it is 0.3 s with 20 parts, 1 s with 100, and 11 s with half of the
-file in one key. The longest key of a file has three parts."""
+"""Maximum number of parts of a dotted key of a TOML file; the longest key of our files has three.
+
+The time of the parser grows as the square of this number: for a file of `MAX_FILE_BYTES` with parts of one letter it is
+0.3 s with 20 parts, 1 s with 100, and 11 s with half of the file in one key."""
 _TOKENS = re.compile(
     r"""(?P<dot>\.)|(?P<blank>[ \t]++)|(?P<comment>\#[^\n]*+)"""
     r'''|(?P<part>"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|"(?:[^"\\\n]|\\.)*+"?|[A-Za-z0-9_-]++'''
