@@ -29,7 +29,7 @@ MAX_EXCESS = 1e-6
 """In units of length: the scan is less accurate than the solution of the game."""
 MAX_UNDECIDED = 0.5
 """Share of the directions that may be undecided in a claim: a scan that compares less than half of them has not looked
-at most of the alternatives. Captures of the first revolutions leave a third to two fifths of them undecided."""
+at most of the alternatives. `geo-pursuit` leaves 47 of 120 undecided."""
 
 _PANELS, _POINTS, _MAX_CHANGES = 32, 8, 3
 _BEYOND = 1.0 + 1e-6
