@@ -348,8 +348,12 @@ def _covariance(trajectory: Trajectory, one: CraftState, other: CraftState, sour
 
     total = np.sum([*found.values()], axis=0)
     rows = tuple(map(tuple, total.tolist()))
-    with input_errors(f"{source}: covariance of {' and '.join(found)}"):
-        return Covariance(matrix_m2=rows).matrix, [note]
+    try:
+        covariance = Covariance(matrix_m2=rows)
+    except ValueError as error:
+        reason = str(error).removeprefix("Covariance: ")
+        raise InputError(f"{source}: covariance of {' and '.join(found)}: {reason}") from None
+    return covariance.matrix, [note]
 
 
 def _check_accuracy(pair: _Pair, source: str) -> None:

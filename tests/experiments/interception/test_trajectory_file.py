@@ -405,7 +405,7 @@ def test_covariance_of_the_trajectory_file_wins(tmp_path: Path) -> None:
         ),
         (
             BLOCK.replace("9.000000000000000e-02", "-9.0"),
-            "covariance of spacecraft.oem and object.oem: Covariance: the variances",
+            "covariance of spacecraft.oem and object.oem: the variances",
         ),
     ],
     ids=["none", "another epoch", "negative"],
