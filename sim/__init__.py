@@ -10,7 +10,7 @@ from sim.miss_cause import MissCause
 from sim.parallel import CampaignNoise
 from sim.record import Inconsistency, Record, fly_one
 from sim.requirement import HitRequirement, Requirement
-from sim.results import Outcome, Results
+from sim.results import GuaranteeWarning, Outcome, Results
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 from sim.simulate import simulate
 from sim.statistics import (
@@ -32,6 +32,7 @@ __all__ = [
     "CampaignNoise",
     "Covariance",
     "Distribution",
+    "GuaranteeWarning",
     "HitEstimate",
     "HitRequirement",
     "Inconsistency",

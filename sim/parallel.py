@@ -21,7 +21,7 @@ from guidance.noise import NoiseSource
 from sim.engagement import Step
 from sim.results import Results, join
 from sim.scenario import Scenario
-from sim.simulate import simulate
+from sim.simulate import simulate_runs
 from sim.versions import need_versions, versions
 
 _PARENT_CHECK_S = 0.5
@@ -156,7 +156,7 @@ def simulate_task(task: Task, stopped: Callable[[], bool] | None = None) -> Resu
     runs_by_noise = {each: [run for run in task.runs if kind.of_run(run) is each] for each in kind.kinds}
     results = join(
         [
-            simulate(
+            simulate_runs(
                 each.applied_to(task.scenario),
                 runs,
                 seed=task.seed,

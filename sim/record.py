@@ -112,11 +112,12 @@ class Record:
     def __repr__(self) -> str:
         result = self.result
         inside = "inside" if result.truth_kept[0] else "not inside"
+        exceeds = "" if result.phi_held.filled(True)[0] else ", miss above the bound Phi"
         return (
             f"<engagement of {self.scenario.name}, seed {self.seed}, run {self.run}: {self.strategy}, "
             f"{self.noise_name} noise, {self.steps} steps\n {self.ending}, "
             f"miss {result.miss_m[0]:.4g} m for {result.impulse_m_s[0]:.4g} m/s, "
-            f"true state {inside} its section at every step>"
+            f"true state {inside} its section at every step{exceeds}>"
         )
 
 

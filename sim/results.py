@@ -20,6 +20,10 @@ from sim.statistics import HitEstimate, estimate_hits
 MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
 
 
+class GuaranteeWarning(UserWarning):
+    """A guarantee failed: a set lost the true state or became empty, or a miss exceeds the bound Phi."""
+
+
 class Outcome(Enum):
     """How an engagement ended. Whether it hit is a separate column."""
 
@@ -149,6 +153,18 @@ class Results:
         return count_causes(causes, self.unguided_miss_m, self.engine_corrects_m, self.last_possible_m.filled(0.0))
 
     @property
+    def failures(self) -> str:
+        """In how many runs a guarantee failed, as text: the set, or the bound Phi; empty if none did."""
+        failed_sets = int((~self.truth_kept | self.set_emptied).sum())
+        exceeded = int((~self.phi_held.filled(True)).sum())
+        found = []
+        if failed_sets:
+            found.append(f"in {failed_sets} of {len(self)} runs the set lost the true state or became empty")
+        if exceeded:
+            found.append(f"in {exceeded} of {int(self.phi_held.count())} runs the miss exceeds the bound Phi")
+        return ", ".join(found)
+
+    @property
     def redrawn_share(self) -> float | None:
         """Share of the normal starts that were outside the dispersion and drawn again; None for uniform starts."""
         return None if self.redraws is None else float(1.0 - len(self) / (len(self) + self.redraws.sum()))
@@ -178,7 +194,8 @@ class Results:
     def __repr__(self) -> str:
         miss, fuel = np.median(self.miss_m), np.median(self.impulse_m_s)
         hits = "" if self.hits is None else f", {self.hits.hits} hit"
-        return f"<{len(self)} engagements{hits}: median miss {miss:.3g} m for {fuel:.4g} m/s>"
+        failures = f"; {self.failures}" if self.failures else ""
+        return f"<{len(self)} engagements{hits}: median miss {miss:.3g} m for {fuel:.4g} m/s{failures}>"
 
 
 def ending(outcome: str, hit: bool | None, cause: str | None) -> str:

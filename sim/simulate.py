@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -12,7 +14,7 @@ from guidance.noise import NoiseSource
 from infoset.limits import WHOLE, shown
 from sim.draws import draw, max_number_of_steps
 from sim.engagement import Engagements, Step
-from sim.results import Results, join
+from sim.results import GuaranteeWarning, Results, join
 from sim.scenario import Scenario, with_noise, with_strategy
 
 ENGAGEMENTS_AT_ONCE = 200
@@ -35,6 +37,8 @@ def simulate(
     observe: Callable[[int, Step], None] | None = None,
 ) -> Results:
     """Simulate engagements whose starts and measurement errors are drawn at random.
+
+    A `GuaranteeWarning` says in how many runs a guarantee failed, once in a call.
 
     Parameters
     ----------
@@ -67,6 +71,57 @@ def simulate(
         If there are no runs, a run number or the seed is not a whole number, the strategy or the noise is not
         registered, or one of your own returns values that are not allowed.
     """
+    results = simulate_runs(
+        scenario,
+        runs,
+        seed=seed,
+        strategy=strategy,
+        noise=noise,
+        guarantee=guarantee,
+        progress=progress,
+        observe=observe,
+    )
+    warn_of_failures(scenario, results)
+    return results
+
+
+def warn_of_failures(scenario: Scenario, results: Results) -> None:
+    """Warn the user's code, once, of runs whose set failed or whose miss exceeds the bound Phi."""
+    failures = results.failures
+    if not failures:
+        return
+    if scenario.set_model.is_guaranteed:
+        reason = (
+            "an assumption of the model does not hold: the noise exceeds the bounds of the sensors, or the scenario "
+            "exceeds those of the model; infoset scenarios check FILE examines it"
+        )
+    else:
+        reason = "the model paper does not promise to keep the true state; information_set.model = guaranteed does"
+    warnings.warn(f"{scenario.name}: {failures}: {reason}", GuaranteeWarning, stacklevel=_level_of_user())
+
+
+def _level_of_user() -> int:
+    """Return the level of the first caller outside the simulator and its commands, for `warnings.warn` there."""
+    frame = inspect.currentframe()
+    level = 0
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("sim", "experiments"):
+        frame = frame.f_back
+        level += 1
+    return level
+
+
+def simulate_runs(
+    scenario: Scenario,
+    runs: int | Sequence[int],
+    *,
+    seed: int,
+    strategy: Strategy | str | None = None,
+    noise: NoiseSource | str | None = None,
+    guarantee: bool = True,
+    progress: Callable[[float], None] | None = None,
+    observe: Callable[[int, Step], None] | None = None,
+) -> Results:
+    """Return the results of `simulate` without its warning, for commands: they report such runs themselves."""
     WHOLE.need("seed", seed)
     scenario, own = with_strategy(scenario, strategy)
     scenario, own_noise = with_noise(scenario, noise)

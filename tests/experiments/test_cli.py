@@ -72,7 +72,7 @@ def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_
 def test_what_is_wrong_is_one_message_before_the_work(
     line: str, part: str, infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sim.parallel.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("sim.parallel.simulate_runs", lambda *_: pytest.fail("began to work"))
     monkeypatch.setattr("experiments.interception.runs.engage.fly_one", lambda *_: pytest.fail("began to work"))
     assert part in " ".join(infoset.refused(*line.split()).split())
     assert names_in(tmp_path) == []
@@ -238,7 +238,7 @@ def test_results_that_are_not_finite_are_refused(infoset: Command, monkeypatch: 
         results.miss_m[:] = math.inf
         return results
 
-    monkeypatch.setattr("sim.parallel.simulate", overflowing)
+    monkeypatch.setattr("sim.parallel.simulate_runs", overflowing)
     assert "not finite" in infoset.refused("experiment", "--runs", 1)
 
 
@@ -246,7 +246,7 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sim.parallel.simulate", interrupt)
+    monkeypatch.setattr("sim.parallel.simulate_runs", interrupt)
     code, out, err = infoset("experiment", "--out", "out")
     # Before it, perhaps, that kernels are compiled.
     assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")

@@ -385,7 +385,7 @@ def test_results_that_are_not_finite_are_not_stored(
         results = simulate(*arguments, **options)
         return replace(results, miss_m=np.full(len(results), np.inf))
 
-    monkeypatch.setattr("sim.parallel.simulate", overflow)
+    monkeypatch.setattr("sim.parallel.simulate_runs", overflow)
     with pytest.raises(FloatingPointError, match="not finite"):
         mixed(brief, tmp_path).run()
     assert shards(tmp_path) == []
