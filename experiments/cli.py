@@ -51,8 +51,11 @@ def _add(name: str, options: type, run: str, *, example: str) -> None:
     hints = get_type_hints(options, include_extras=True)
 
     def command(**values: Any) -> None:
+        from infoset.kernels import NOTICE  # loads Numba
+
         try:
-            import_module(RUNS[options]).run(options(**values))
+            with NOTICE.of(f"infoset {name}"):
+                import_module(RUNS[options]).run(options(**values))
         except KeyboardInterrupt as interrupt:
             typer.echo("interrupted" + "".join(map(str, interrupt.args)), err=True)
             raise

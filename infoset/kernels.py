@@ -6,11 +6,14 @@ loaded. Numba itself compares only the file that defines a kernel, not the files
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
 import os
 import re
+import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -141,26 +144,78 @@ def _text(file: Path) -> str:
     return file.read_text(encoding="utf-8")
 
 
-class _Notice(event.Listener):
-    """One notice in a process that compiles kernels."""
+@dataclass
+class _Compiled:
+    """The kernels that a command has compiled, by their modules, and the time that it took."""
 
-    given = False
+    modules: list[str] = field(default_factory=list)
+    elapsed_s: float = 0.0
+
+    def text(self, of_what: str) -> str:
+        """Return one line about them."""
+        count = len(self.modules)
+        packages = sorted({".".join(module.split(".")[:2]) for module in self.modules})
+        kernels = f"{count} kernel{'' if count == 1 else 's'}{of_what}"
+        return f"compiled {kernels} in {self.elapsed_s:.1f} s ({', '.join(packages)})"
+
+
+class CompileNotice(event.Listener):
+    """The notice about compiling: one line at the first kernel of a command or a process, one at the end of a command.
+
+    Numba holds a lock while it compiles a kernel and, within it, those that it calls.
+    """
+
+    def __init__(self) -> None:
+        self.purpose = ""
+        self._compiled = _Compiled()
+        self._depth = 0
+        self._began_s = 0.0
 
     def on_start(self, event: Any) -> None:
-        """Give the notice at the first kernel that is compiled."""
+        """Count a kernel that is compiled; give the notice at the first one."""
         function = event.data["dispatcher"].py_func
-        if self.given or not function.__module__.startswith(PACKAGES):
+        if not function.__module__.startswith(PACKAGES):
             return
-        self.given = True
-        folder = cache_folder(function)
+        if self._depth == 0:
+            self._began_s = time.perf_counter()
+        self._depth += 1
+        self._compiled.modules.append(function.__module__)
+        if len(self._compiled.modules) == 1:
+            self._announce(cache_folder(function))
+
+    def on_end(self, event: Any) -> None:
+        """Add the time of a kernel that Python called; it contains that of the kernels within it."""
+        function = event.data["dispatcher"].py_func
+        if not function.__module__.startswith(PACKAGES):
+            return
+        self._depth -= 1
+        if self._depth == 0:
+            self._compiled.elapsed_s += time.perf_counter() - self._began_s
+
+    @contextlib.contextmanager
+    def of(self, purpose: str) -> Iterator[None]:
+        """Name what the kernels are for; at the end of the context, say which were compiled and how long it took."""
+        self.purpose = purpose
+        self._compiled = _Compiled()
+        try:
+            yield
+            if self._compiled.modules:
+                LOGGER.warning("%s", self._compiled.text(self._of_what()))
+        finally:
+            self.purpose = ""
+
+    def _announce(self, folder: Path | None) -> None:
         if folder is None:
             how = f"in every process, because the cache folder cannot be written: set {VARIABLE} to a folder that can"
         else:
-            how = f"for this and later runs; the machine code is stored in {folder.parent}"
-        LOGGER.warning("compiling the numerical kernels (up to about 25 s), %s", how)
+            how = f"once; later runs load the machine code from {folder.parent}"
+        LOGGER.warning("compiling the numerical kernels%s (up to about 25 s), %s", self._of_what(), how)
 
-    def on_end(self, event: Any) -> None:
-        """Do nothing."""
+    def _of_what(self) -> str:
+        return f" of {self.purpose}" if self.purpose else ""
 
 
-event.register("numba:compile", _Notice())
+NOTICE = CompileNotice()
+"""The notice of this process."""
+
+event.register("numba:compile", NOTICE)

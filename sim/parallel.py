@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import logging
 import multiprocessing
 import os
 import signal
@@ -13,11 +14,14 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from multiprocessing.synchronize import Lock
+from typing import NamedTuple
 
 import numpy as np
 
 from guidance import NoiseKind, Strategy
 from guidance.noise import NoiseSource
+from infoset.kernels import LOGGER, NOTICE
 from sim.engagement import Step
 from sim.results import Results, join
 from sim.scenario import Scenario
@@ -190,9 +194,9 @@ def worker_processes(count: int) -> Iterator[Executor]:
     this process has ended.
     """
     before = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(
-        count, multiprocessing.get_context("spawn"), initializer=_end_with, initargs=(os.getpid(),)
-    )
+    spawning = multiprocessing.get_context("spawn")
+    notice = _WorkerNotice(LOGGER.getEffectiveLevel(), NOTICE.purpose, spawning.Lock())
+    pool = ProcessPoolExecutor(count, spawning, initializer=_start_worker, initargs=(os.getpid(), notice))
     try:
         yield pool
     except BaseException:
@@ -201,6 +205,25 @@ def worker_processes(count: int) -> Iterator[Executor]:
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+class _WorkerNotice(NamedTuple):
+    """The notice about compiling in worker processes: the level of its logger, its purpose, and who may give it.
+
+    Only the process that acquires the lock, which nobody releases, gives the notice.
+    """
+
+    level: int
+    purpose: str
+    first: Lock
+
+
+def _start_worker(parent: int, notice: _WorkerNotice) -> None:
+    """Take over the notice about compiling from the parent, and end with it."""
+    NOTICE.purpose = notice.purpose
+    is_first = notice.first.acquire(block=False)
+    LOGGER.setLevel(notice.level if is_first else logging.ERROR)
+    _end_with(parent)
 
 
 def _end_with(parent: int) -> None:

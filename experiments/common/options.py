@@ -14,6 +14,7 @@ from experiments.common.errors import InputError, nearest, shown
 
 
 def _silence_the_compile_notice(quiet: bool) -> bool:
+    # By its name: the module of the logger loads Numba, which --help does not need.
     logging.getLogger("infoset.kernels").setLevel(logging.ERROR if quiet else logging.NOTSET)
     return quiet
 

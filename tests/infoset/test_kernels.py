@@ -1,0 +1,91 @@
+"""The notice about compiling: one at the beginning of a command and one at its end."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from infoset.kernels import VARIABLE, CompileNotice
+
+
+def kernel_of(module: str) -> Any:
+    """Return the event of a kernel of a module, as Numba gives it."""
+
+    def kernel() -> None:
+        pass
+
+    kernel.__module__ = module
+    return SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=kernel)})
+
+
+def compile_within(notice: CompileNotice, *modules: str) -> None:
+    """Compile a kernel that calls one of the next module, and so on."""
+    for module in modules:
+        notice.on_start(kernel_of(module))
+    for module in reversed(modules):
+        notice.on_end(kernel_of(module))
+
+
+def test_kernels_of_several_modules_give_one_notice_and_one_summary(caplog: pytest.LogCaptureFixture) -> None:
+    notice = CompileNotice()
+    with notice.of("infoset engage"):
+        compile_within(notice, "infoset.engine.chains", "infoset.geometry.polygon")
+        compile_within(notice, "sim.kepler")
+        compile_within(notice, "numba.core")  # not ours
+    first, last = caplog.messages
+    assert first.startswith("compiling the numerical kernels of infoset engage (up to about 25 s), ")
+    assert last.startswith("compiled 3 kernels of infoset engage in ")
+    assert last.endswith(" s (infoset.engine, infoset.geometry, sim.kepler)")
+
+
+def test_every_command_names_itself(caplog: pytest.LogCaptureFixture) -> None:
+    notice = CompileNotice()
+    for name in ("infoset engage", "infoset bound"):
+        with notice.of(name):
+            compile_within(notice, "sim.kepler")
+    assert [line.count("infoset engage") for line in caplog.messages] == [1, 1, 0, 0]
+    assert [line.count("infoset bound") for line in caplog.messages] == [0, 0, 1, 1]
+
+
+def test_time_within_nested_kernels_counts_once(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    times_s = iter([10.0, 15.0])  # of the outer kernel only
+    monkeypatch.setattr("time.perf_counter", lambda: next(times_s))
+    notice = CompileNotice()
+    with notice.of("infoset pareto"):
+        compile_within(notice, "sim.kepler", "sim.kepler")
+    assert "compiled 2 kernels of infoset pareto in 5.0 s" in caplog.messages[-1]
+
+
+def test_nothing_is_said_if_nothing_is_compiled_or_the_command_is_quiet(caplog: pytest.LogCaptureFixture) -> None:
+    notice = CompileNotice()
+    with notice.of("infoset engage"):
+        pass
+    caplog.set_level(logging.ERROR, "infoset.kernels")  # as of --quiet
+    with notice.of("infoset engage"):
+        compile_within(notice, "sim.kepler")
+    assert caplog.messages == []
+
+
+def test_a_first_command_says_what_it_compiles_and_the_second_says_nothing(tmp_path: Path) -> None:
+    environment = {**os.environ, VARIABLE: str(tmp_path)}
+
+    def said() -> list[str]:
+        command = [sys.executable, "-m", "experiments", "pareto", "--json", "-"]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return [line for line in done.stderr.splitlines() if "compil" in line]
+
+    first, last = said()
+    assert "compiling the numerical kernels of infoset pareto (up to about 25 s), once; later runs load " in first
+    assert str(tmp_path) in first
+    assert " of infoset pareto in " in last
+    assert "rendezvous." in last
+    assert said() == []
