@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version as installed_version
@@ -36,6 +38,8 @@ EXTRAS = {
     "distributed": "distributed",
 }
 """The optional extra of each library that a command may lack."""
+BACKEND = "MPLBACKEND"
+"""Environment variable with the backend of Matplotlib."""
 RUNS: dict[type, str] = {}
 """The module in `experiments` whose function ``run`` takes the options, by the class of the options."""
 
@@ -128,13 +132,31 @@ def commands() -> Any:
     return typer.main.get_command(app)
 
 
+@contextlib.contextmanager
+def _agg_backend() -> Iterator[None]:
+    """Let Matplotlib, when a command imports it, use Agg: a backend of the user's that is missing stops the import.
+
+    A notebook, for example, sets its backend for all processes that it starts.
+    """
+    before = os.environ.get(BACKEND)
+    os.environ[BACKEND] = "agg"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[BACKEND]
+        else:
+            os.environ[BACKEND] = before
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command `infoset`, and exit with its code; None takes the arguments from the process.
 
     It always raises `SystemExit`: 0 done, 1 a published number disagrees, 2 wrong input, 130 interrupted.
     """
     try:
-        commands()(args=arguments, prog_name="infoset")
+        with _agg_backend():
+            commands()(args=arguments, prog_name="infoset")
     except (InputError, OSError, MemoryError, ModuleNotFoundError) as error:
         message = str(error) or "not enough memory"
         if isinstance(error, ModuleNotFoundError):

@@ -66,8 +66,11 @@ LINE_LOOKS: tuple[dict[str, Any], ...] = (
 
 @contextlib.contextmanager
 def style() -> Iterator[None]:
-    """Apply the style of the figures: a context, or with ``@style()`` a decorator."""
-    with matplotlib.style.context(STYLE):
+    """Apply the style of the figures: a context, or with ``@style()`` a decorator.
+
+    It begins with Matplotlib's defaults, so that settings of the user, as TeX for all texts, change no figure.
+    """
+    with matplotlib.style.context(STYLE, after_reset=True):
         yield
 
 
