@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from experiments.common.figure_style import INK, style, subplots
+from experiments.common.figure_style import INK, plain, style, subplots
 from experiments.interception.course import Clock, evenly
 from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
 from experiments.interception.figures.sets import draw_plane, level_planes, planes_at
@@ -56,7 +56,8 @@ def animate(
         for axes, plane in zip(above, planes, strict=True):
             axes.clear()
             draw_plane(axes, plane)
-            axes.set_title(clock.text(plane.record, float(plane.record.time_s[plane.step])))
+            time_text = clock.text(plane.record, float(plane.record.time_s[plane.step]))
+            axes.set_title(f"{plain(plane.noise)}\n{time_text}")
         level_planes(above, planes)
         for line, (record, _) in zip(lines, traces, strict=True):
             line.set_xdata(clock.at(record, [time, time]))

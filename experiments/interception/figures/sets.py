@@ -71,6 +71,7 @@ class Plane:
     """Sections of one step in the (omega, alpha) plane of one lateral axis."""
 
     title: str
+    noise: str
     record: Record
     axis: int
     step: int
@@ -117,7 +118,9 @@ def planes_at(records: Sequence[Record], time_s: float, sections: int) -> list[P
         ranges = f"{_km(chosen[0])} to {_km(chosen[-1])} km" if chosen else "no section is left"
         noise = name.removeprefix(f"({ascii_lowercase[number]}) ") if len(records) > 1 else name
         title = plain(f"{noise},\n{clock.text(record, float(record.time_s[step]))}, {ranges}")
-        planes += [Plane(title, record, axis, step, chosen) for axis in range(len(record.scenario.set_model.axes))]
+        planes += [
+            Plane(title, noise, record, axis, step, chosen) for axis in range(len(record.scenario.set_model.axes))
+        ]
     return planes
 
 
