@@ -34,6 +34,8 @@ from rendezvous.reachability import SetKind
 _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
 """Relative error of the drawn sets."""
 _MAX_TIMES, _MAX_TIMES_IN_SPACE = 6, 4
+_COLOUR_RANGE = (0.1, 0.95)
+"""Part of the colour map for the times of the sets, from yellow to violet: it differs in hue and in brightness."""
 _NAMES = {
     "energy": "minimum energy",
     "l1": "minimum L1",
@@ -104,7 +106,7 @@ def _draw_motion(axes: Axes, report: Report, states: list[int], max_times: int, 
     unit, per_m = report.length_unit
     factors = np.array([per_m if state < 3 else 1.0 for state in states])
     times = shown_times(report.solution.problem.periods, max_times)
-    for t, colour in zip(times, mpl.colormaps["Blues"](np.linspace(0.35, 0.85, len(times))), strict=True):
+    for t, colour in zip(times, mpl.colormaps["viridis_r"](np.linspace(*_COLOUR_RANGE, len(times))), strict=True):
         points = report.solution.sets.projection(SetKind.TUBE, t, states, tolerance) * factors
         _draw_set(axes, points, colour, f"tube at t = {t}")
     for look, member, path in _shown(report):
@@ -128,8 +130,10 @@ def _draw_set(axes: Any, points: Floats, colour: Any, label: str) -> None:
     if points.shape[1] == 2:
         axes.fill(*points[hull.vertices].T, facecolor=colour, edgecolor=colour, alpha=0.25, label=label)
     else:
-        look: dict[str, Any] = {"facecolors": colour, "alpha": 0.18, "shade": True, "label": label}
+        look: dict[str, Any] = {"facecolors": colour, "alpha": 0.25, "shade": True}
         axes.add_collection3d(Poly3DCollection(points[hull.simplices], **look))
+        # In the legend a mark of its own: that of the collection has the colour of its first, shaded facet.
+        axes.plot([], [], [], marker="s", markersize=8.0, linestyle="none", color=colour, alpha=0.6, label=label)
 
 
 @style()
