@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from infoset.limits import MAXIMUM
 from infoset.observer.sets import Set, polytope_of
 
 MAX_CSV_BYTES = 10_000_000
+SEPARATORS = (",", ";", "\t")
 MAX_STATE = 1e40
 """Maximum state of which sets are computed."""
 
@@ -108,10 +110,9 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
     wanted = _renamed(names, columns)
     content = read_input(file, MAX_CSV_BYTES)
     try:
-        header, *table = list(csv.reader(content.decode("utf-8-sig").rstrip().splitlines())) or [[]]
+        header, *table = _rows(content, wanted)
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"--data: {file}: is not a CSV file in UTF-8: {error}") from None
-    header = [cell.strip() for cell in header]
     if any(header.count(name) != 1 for name in wanted):
         raise InputError(
             f"--data: {file}: the header must have each of {','.join(wanted)} once (see --columns); found the header "
@@ -128,12 +129,28 @@ def read_csv(file: Path, problem: ObserverProblem, columns: str) -> Data:
             row = []
         if not row or any(abs(value) > MAXIMUM for value in row) or any(map(math.isnan, row[outputs:])):
             raise InputError(
-                f"--data: {file}: line {line}: {','.join(wanted)} must be numbers of at most {MAXIMUM:g} in size, and "
-                f"only measurements may be empty or NaN; found {shown(','.join(cells))}"
+                f"--data: {file}: line {line}: {','.join(wanted)} must be numbers of at most {MAXIMUM:g} in size, "
+                f"with a decimal point, and only measurements may be empty or NaN; found {shown(','.join(cells))}"
             )
         rows.append(row)
     values = np.array(rows)
     return Data(values[:, :outputs], values[:, outputs:], None, f"measurements of {file.name}")
+
+
+def _rows(content: bytes, wanted: list[str]) -> list[list[str]]:
+    """Return the cells of a CSV file by row, the header first; commas, semicolons or tabs separate them.
+
+    The separator is the first one that gives a header with the wanted columns, or a comma. A byte order mark selects
+    UTF-16, as of spreadsheets; without one the file is UTF-8.
+    """
+    is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    lines = content.decode("utf-16" if is_utf_16 else "utf-8-sig").rstrip(" \r\n").splitlines()
+
+    def header_by(separator: str) -> list[str]:
+        return [cell.strip() for cell in next(csv.reader(lines[:1], delimiter=separator), [])]
+
+    separator = next((each for each in SEPARATORS if set(wanted) <= set(header_by(each))), SEPARATORS[0])
+    return [header_by(separator), *csv.reader(lines[1:], delimiter=separator)]
 
 
 def _renamed(names: list[str], columns: str) -> list[str]:

@@ -85,6 +85,29 @@ def test_wrong_data_are_refused(content: bytes, told: str, infoset: Command) -> 
     assert told in infoset.refused("observe", "vehicle", "--data", "data.csv")
 
 
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_files_of_spreadsheets_give_the_same(separator: str, encoding: str, newline: str, infoset: Command) -> None:
+    rows = [["note", "y1", "u1"], ["a, b", "0.0", "1.0"], ["", "", "0.5"], ["", "12.0", "0"]]
+    text = newline.join(separator.join(cell if separator not in cell else f'"{cell}"' for cell in row) for row in rows)
+    Path("data.csv").write_bytes(f"{text}{newline}".encode(encoding))
+    Path("plain.csv").write_text("y1,u1\n0.0,1.0\n,0.5\n12.0,0\n")
+    steps = infoset.json("observe", "vehicle", "--data", "data.csv")["steps"]
+    assert steps == infoset.json("observe", "vehicle", "--data", "plain.csv")["steps"]
+
+
+def test_a_last_measurement_that_is_missing_in_a_file_with_tabs_is_a_step(infoset: Command) -> None:
+    Path("data.csv").write_text("u1\ty1\n1.0\t0.0\n0.5\t\n")
+    assert len(infoset.json("observe", "vehicle", "--data", "data.csv")["steps"]) == 2
+
+
+def test_decimal_commas_are_refused_and_not_read_as_other_numbers(infoset: Command) -> None:
+    Path("data.csv").write_text("y1;u1\n1,234;0\n")
+    told = infoset.refused("observe", "vehicle", "--data", "data.csv")
+    assert "line 2: y1,u1 must be numbers of at most 1e+60 in size, with a decimal point" in told
+
+
 def test_an_empty_cell_is_a_missing_measurement(infoset: Command) -> None:
     Path("data.csv").write_text("y1,u1\n0.0,1.0\n ,0.5\n12.0,0\n")
     results = infoset.json("observe", "vehicle", "--data", "data.csv")
