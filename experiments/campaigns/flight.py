@@ -11,6 +11,7 @@ from functools import partial
 from experiments.campaigns.cluster import workers_of
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
+from experiments.common.output import need_writable
 from experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
 from experiments.interception.scenario_file import feasibility_warnings, scenario_warnings, study_scenario
 from experiments.interception.strategies import OwnNoise, chosen_noise, own_code_errors
@@ -50,6 +51,7 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> tuple[Camp
     Return the folder, the warnings about the scenarios, and the time of this session, s.
     """
     need_free(options.out, resume=options.resume)
+    need_writable(options.out)
     scenarios = campaign.cells or (campaign.scenario,)
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
     corners = dict.fromkeys((scenarios[0], scenarios[-1]))

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import io
 import json
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from enum import Enum
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from sim import HitEstimate, Results
 
 STDOUT = "-"
+ENDINGS = {"--html": (".html", ".htm"), "--gif": (".gif",), "--record": (".npz",)}
+"""Endings of the files of options that other programs open by their endings: browsers, viewers, `infoset replay`."""
 Cell = str | int | float | bool | None
 
 
@@ -96,11 +99,14 @@ def output_of(
 
     Single files are those of the options ``json``, ``csv`` and ``html``, and of `files`, by option; `names` are those
     that the command writes into the folder of ``--out``. Raise `InputError` before the work if a file exists and
-    ``--overwrite`` is not given, or two files have the same path.
+    ``--overwrite`` is not given, two files have the same path, a file has the ending of another kind, or a folder
+    cannot be written.
     """
     given = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")} | dict(files or {})
     single = {option: path for option, path in given.items() if path is not None}
     folder = options.out if names else None
+    for option, path in single.items():
+        _check_ending(option, path)
     paths = [*single.values(), *(folder / name for name in names if folder is not None)]
     for number, path in enumerate(paths):
         if path in paths[:number]:
@@ -111,12 +117,38 @@ def output_of(
             raise InputError("-: only JSON, CSV and HTML can be printed; give the name of a file")
     if folder is not None and folder.is_file():
         raise InputError(f"{folder}: is a file, not a folder; choose another name for the folder")
+    for parent in dict.fromkeys(path.parent for path in paths if str(path) != STDOUT):
+        need_writable(parent)
     output = Output(folder, single, options.overwrite)
     yield output
     if output.written and not options.quiet:
         for parent in dict.fromkeys(file.parent for file in output.written):
             written = ", ".join(file.name for file in output.written if file.parent == parent)
             say(f"wrote {written}" + (f" in {parent}" if parent != Path() else ""), quiet=False)
+
+
+def _check_ending(option: str, path: Path) -> None:
+    """Raise `InputError` if the file of an option does not have the ending of its kind."""
+    name = option.partition(" ")[0]  # "--record of random" is one of two files of an option
+    endings = ENDINGS.get(name)
+    if endings is not None and str(path) != STDOUT and path.suffix.lower() not in endings:
+        example = f"{path.stem}{endings[0]}"
+        raise InputError(f"{name}: {path}: the file must end in {endings[0]}; for example {example}")
+
+
+def need_writable(folder: Path) -> None:
+    """Raise `InputError` if no file can be written into a folder. Folders that are missing are made, and removed."""
+    missing = [each for each in (folder, *folder.parents) if not each.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another folder") from None
+    finally:
+        for each in missing:
+            with contextlib.suppress(OSError):  # those that could not be made
+                each.rmdir()
 
 
 def _check_new(file: Path, overwrite: bool) -> None:

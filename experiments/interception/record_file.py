@@ -112,7 +112,10 @@ def record_bytes(record: Record) -> bytes:
 
 def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write a record, completely or not at all; `InputError` if the file cannot be written, or exists already."""
-    write_file(Path(path), record_bytes(record), overwrite=overwrite)
+    file = Path(path)
+    if file.suffix.lower() != ".npz":
+        raise InputError(f"{file}: a record is written as .npz; for example {file.stem}.npz")
+    write_file(file, record_bytes(record), overwrite=overwrite)
 
 
 def load_record(path: str | os.PathLike[str]) -> Record:

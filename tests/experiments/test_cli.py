@@ -67,6 +67,18 @@ def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_
         ("engage --json - --csv -", "is given twice"),
         ("engage --csv /dev/null --overwrite", "/dev/null: exists already"),
         (f"engage --json {'n' * 300}", "File name too long"),
+        ("engage --record out.txt", "--record: out.txt: the file must end in .npz; for example out.npz"),
+        ("engage --noise both --record out", "--record: out-random: the file must end in .npz"),
+        ("adversary --record worst", "--record: worst: the file must end in .npz"),
+        ("replay no.npz --html a.txt", "--html: a.txt: the file must end in .html; for example a.html"),
+        ("replay no.npz --gif a.png", "--gif: a.png: the file must end in .gif; for example a.gif"),
+        ("pareto --html a.txt", "--html: a.txt: the file must end in .html"),
+        ("engage --out /dev/null/figures", "/dev/null/figures: cannot be written: Not a directory"),
+        ("experiment --out /dev/null/figures", "/dev/null/figures: cannot be written: Not a directory"),
+        ("compare --csv /dev/null/a/b.csv", "/dev/null/a: cannot be written: Not a directory"),
+        ("pareto --json /dev/null/a.json", "/dev/null: cannot be written: "),
+        ("campaign --model guaranteed --runs 2 --out /dev/null/runs", "/dev/null/runs"),
+        ("sweep --model guaranteed --vary thruster.budget_m_s=1:2:2 --out /dev/null/runs", "/dev/null/runs"),
     ],
 )
 def test_what_is_wrong_is_one_message_before_the_work(
