@@ -123,5 +123,5 @@ def _symmetric(name: str, rows: Rows) -> Floats:
     matrix = np.array([[*row, *(rows[k][len(row) - 1] for k in range(len(row), size))] for row in rows])
     scale = np.sqrt(np.abs(matrix.diagonal()))
     if (np.abs(matrix - matrix.T) > ROUNDING * np.outer(scale, scale)).any():
-        raise ValueError(f"Covariance: {name} must be symmetric")
+        raise ValueError(f"Covariance: {name} must be symmetric: correct it, or write its lower triangle only")
     return np.asarray(0.5 * (matrix + matrix.T))

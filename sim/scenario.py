@@ -20,6 +20,21 @@ from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
 from sim.covariance import Covariance
 
+LIGHT_M_S = 299_792_458.0
+
+
+@dataclass(frozen=True)
+class _Speed(Limits):
+    """A positive speed of a Newtonian motion: at most 1 % of the speed of light, where mistakes of units begin."""
+
+    def problem(self, value: object) -> str | None:
+        """Return why a speed is not allowed, or None."""
+        number: Any = value
+        is_fast = super().problem(value) is None and number > 0.01 * LIGHT_M_S
+        return "is more than a hundredth of the speed of light; check its unit" if is_fast else super().problem(value)
+
+
+_SPEED = _Speed(above=0.0)
 _DIRECTION = Limits(minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
 _ELEVATION = Limits(minimum=-0.5 * math.pi, maximum=0.5 * math.pi)
 _SIGMA = Limits(minimum=0.01, maximum=10.0)
@@ -154,7 +169,7 @@ class Scenario:
     name: Name
     description: Description = ""
     nominal_range_m: Positive
-    closing_speed_m_s: Positive
+    closing_speed_m_s: Annotated[float, _SPEED]
     step_s: Positive
     strategy: str = "symmetric-miss"
     noise: NoiseKind = NoiseKind.RANDOM

@@ -12,7 +12,7 @@ import os
 import re
 import tomllib
 import types
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from decimal import Context, Decimal, InvalidOperation
 from enum import Enum
@@ -25,7 +25,7 @@ from pydantic import ValidationError
 
 from experiments.common.built_in_files import PROBLEMS, SCENARIO, built_in, built_in_names, kind_of, taken_by
 from experiments.common.errors import InputError, nearest, shown
-from experiments.common.units import quantity_and_unit, si_factor
+from experiments.common.units import quantity_and_unit, si_factor, units_like
 from infoset.limits import LONGEST_DESCRIPTION, plain_number
 from sim.storage.codec import adapter
 
@@ -189,6 +189,11 @@ class _Reading:
         """Note a key that no field has, with the nearest one of its table, or the same key of another table."""
         if len(self._faults) > _MAX_FAULTS:
             return
+        with_unit = _with_wrong_unit(path[-1], known)
+        if with_unit is not None:
+            self._guessed.add((*path[:-1], with_unit))
+            self._faults[path] = f"is not a known key; {_units_text(with_unit)}"
+            return
         quantity, unit = quantity_and_unit(path[-1])
         by_quantity = {quantity_and_unit(name)[0]: name for name in known}
         near = by_quantity.get(nearest(quantity, [*by_quantity]) or "")
@@ -206,8 +211,13 @@ class _Reading:
             raise InputError(f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set name=mine")
         found = _found(values, self._owner, key)
         if found is None:
+            prefix, _, last = key.rpartition(".")
+            siblings = [name.rsplit(".", 1)[-1] for name in keys_of(self._owner) if name.rpartition(".")[0] == prefix]
+            with_unit = _with_wrong_unit(last, siblings)
             guess = similar_key(key, keys_of(self._owner))
             hint = f"; did you mean {guess}?" if guess else ""
+            if with_unit is not None:
+                hint = f"; {_units_text(with_unit)}"
             raise InputError(f"--set: {self._source} has no key {shown(key)}{hint}")
         table, owner, name, end = found
         path = key.split(".")[: None if end is None else -1]
@@ -243,6 +253,12 @@ class _Reading:
             return
         text = details["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
         text = "is missing" if details["type"] == "missing" else re.sub(r"^[A-Z]\w+: ", "", text)
+        name, _, rest = text.partition(" ")
+        written = self._written.get((*path, name))
+        if written is not None and written[0] != name and rest.startswith("must be"):
+            # The key is written in another unit: name it as it is written, with its value.
+            path = (*path, name)
+            text = rest
         while path and path not in self._written and path[-1].isdecimal():
             text, path = f"number {int(path[-1]) + 1} {text}", path[:-1]
         self._faults.setdefault(path, text)
@@ -295,6 +311,23 @@ def similar_key(key: str, known: Sequence[str]) -> str | None:
     last = key.rsplit(".", 1)[-1]
     alike = [name for name in known if name.rsplit(".", 1)[-1] == last or si_factor(last, name.rsplit(".", 1)[-1])]
     return " or ".join(alike[:3]) or nearest(key, known)
+
+
+def _with_wrong_unit(key: str, known: Iterable[str]) -> str | None:
+    """Return the known key that a key is except for its unit: `pixel_error_rad` for `pixel_error_mas`."""
+    for name in known:
+        quantity, unit = quantity_and_unit(name)
+        if unit and (key == quantity or key.startswith(f"{quantity}_")) and si_factor(key, name) is None:
+            return name
+    return None
+
+
+def _units_text(name: str) -> str:
+    """Return the keys that a quantity can be written as."""
+    quantity = quantity_and_unit(name)[0]
+    first, *others = units_like(name)
+    text = f"write {quantity}_{first}"
+    return f"{text}, or another unit: {', '.join(others)}" if others else text
 
 
 def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:

@@ -45,6 +45,14 @@ def quantity_and_unit(name: str) -> tuple[str, str]:
     return name, ""
 
 
+def units_like(name: str) -> list[str]:
+    """Return the units that the quantity of a name can have, the SI unit first; none if the name has no unit."""
+    unit = quantity_and_unit(name)[1]
+    if not unit:
+        return []
+    return [other for other, (quantity, _) in UNITS.items() if quantity == UNITS[unit][0]]
+
+
 def si_factor(name: str, si_name: str) -> Decimal | None:
     """Return the factor from a name's unit to that of another name; None unless both are the same quantity."""
     if name == si_name:

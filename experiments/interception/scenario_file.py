@@ -29,6 +29,8 @@ FEW_TIMES = 3
 """Number of times of a key that a line lists; JSON has all of them."""
 STEP_COST_S = 1e-5
 """Typical time of a step of a run along one axis, s."""
+LARGEST_BODY_M = 20_000.0
+"""Radius, m, above that of all near-Earth asteroids: (1036) Ganymed, the largest one, has about 18 km."""
 SMALL_ANGLE_RAD = 0.01
 """Largest line-of-sight angle for the model `paper`, which replaces tangents by their angles."""
 
@@ -248,6 +250,15 @@ def feasibility_warnings(scenario: Scenario) -> list[str]:
             f"{length_text(possible.images_and_speeds_m)} possible, and "
             f"body.radius_m is {radius_m:g}: no hit is certain before the flight; smaller errors of the images or a "
             "later last impulse would change it"
+        )
+    if radius_m is not None and found.unguided_miss_m <= radius_m:
+        lines.append(
+            f"body.radius_m is {radius_m:g}, and the starts of [dispersion] miss by at most "
+            f"{length_text(found.unguided_miss_m)}: all of them hit without impulses; check the unit of the radius"
+        )
+    elif radius_m is not None and radius_m > LARGEST_BODY_M:
+        lines.append(
+            f"body.radius_m is {radius_m:g}: no near-Earth asteroid and hardly a comet is so large; check its unit"
         )
     if found.decisions < FEW_STEPS and not scenario.thruster.is_scheduled:
         lines.append(
