@@ -21,7 +21,7 @@ curves = [
     Curve(number, scenario.noise.value, scenario.range_sensor is not None, simulate(scenario, runs=50))
     for number, scenario in curve_scenarios(load_scenario("asteroid-1997"))
 ]
-library_figure = draw_distributions(curves, printed=printed_single_runs())
+library_figure = draw_distributions(curves, printed=printed_single_runs(), numbered=True)
 
 # %%
 # Fifty runs determine a distribution function to within 0.19 at 95 % confidence, so the bands are wide. The conclusion

@@ -11,7 +11,7 @@ from experiments.common.printed_numbers import Ours, Progress, read_paper
 from experiments.common.screen import parts_of
 from experiments.interception.runs.shared import simulate_all
 from experiments.interception.scenario_file import load_scenario
-from experiments.interception.study import curve_scenarios
+from experiments.interception.study import OF_PAPER, curve_scenarios
 from guidance import NoiseKind, TieRule
 from infoset import Recovery
 from infoset.arrays import Floats
@@ -19,7 +19,7 @@ from sim import Results
 from sim.parallel import Task
 
 PAPER = "interception"
-SINGLE, MANY = "asteroid-1997-single", "asteroid-1997"
+MANY, SINGLE = OF_PAPER
 ONE_RUN = "section 8, one run"
 """Miss and impulse of the two engagements from z = -8 km, without a range sensor."""
 RUNS = 200

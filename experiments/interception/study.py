@@ -16,8 +16,9 @@ from guidance.noise import NoiseSource
 from infoset import Model
 from infoset.arrays import Flags, Floats
 from sim import HitEstimate, MissCause, Results, Scenario, estimate_hits
+from sim.requirement import CONFIDENCE, HitRequirement, runs_needed
 from sim.results import join
-from sim.statistics import shown_quantiles
+from sim.statistics import runs_for_hits, shown_quantiles
 
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 """Levels of the quantiles in tables and JSON, by name."""
@@ -26,6 +27,12 @@ QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 def summary(sample: Floats) -> dict[str, float | None]:
     """Return the quantiles of a sample by name; None if the sample is too small to show one."""
     return dict(zip(QUANTILES, shown_quantiles(sample, [*QUANTILES.values()]), strict=True))
+
+
+WANTED_SHARES = tuple(1.0 - 10.0**-digits for digits in range(2, 8))
+"""Probabilities of a hit that a study may have to show: from 99 % to one miss in the number of runs of a campaign."""
+OF_PAPER = ("asteroid-1997", "asteroid-1997-single")
+"""Scenarios of the paper of 1997. Only their results have its names: curves 1 to 4, figures 2 to 4."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,20 @@ class Curve:
     noise: str
     range_sensor: bool
     results: Results
+
+    def title(self, scenario: Scenario) -> str:
+        """Return the name of the curve in lines and tables: its number only for a scenario of the paper."""
+        return f"curve {self.number}" if is_of_paper(scenario) else case_title(self.noise, self.range_sensor)
+
+
+def is_of_paper(scenario: Scenario) -> bool:
+    """Return whether a scenario is one of the paper's."""
+    return scenario.name in OF_PAPER
+
+
+def case_title(noise: str, range_sensor: bool) -> str:
+    """Return the name of a case of the experiment: ``random``, ``game + range sensor``."""
+    return f"{noise}{' + range sensor' if range_sensor else ''}"
 
 
 def curve_scenarios(scenario: Scenario, noise: NoiseKind = NoiseKind.RANDOM) -> Sequence[tuple[int, Scenario]]:
@@ -221,6 +242,28 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
         f"hit (miss at most {scenario.body.radius_m:g} m): {hits.hits} of {some_runs(hits.runs)} "
         f"({percent(hits.probability)}), 95 % CI {percent(hits.lower)} to {percent(hits.upper)}"
     )
+
+
+def outlook_text(hits: HitEstimate | None) -> str:
+    """Return what shows a greater probability of a hit than a sample does; an empty text if the sample excludes it.
+
+    The probability is the first of 99 %, 99.9 % and so on that the sample does not show yet.
+    """
+    if hits is None:
+        return ""
+    misses = hits.runs - hits.hits
+    share = next(share for share in WANTED_SHARES if hits.runs < runs_for_hits(share, misses))
+    if hits.upper < share:
+        return ""
+    needed = runs_for_hits(share, misses)
+    allowed = "without a miss" if misses == 0 else f"with at most {misses} miss{'' if misses == 1 else 'es'}"
+    requirement = HitRequirement(share)
+    text = (
+        f"for {percent(share)} with {percent(CONFIDENCE)} confidence: at least {needed} runs {allowed}; "
+        f'infoset sweep --require "{requirement}" --until decided decides it'
+    )
+    until_decided = runs_needed(hits.hits, hits.runs, share)
+    return f"{text}, after about {until_decided} runs" if until_decided is not None else text
 
 
 def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:

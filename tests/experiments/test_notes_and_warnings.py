@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from experiments import load_scenario
 from experiments.interception.scenario_file import scenario_warnings
+from experiments.interception.study import outlook_text
 from guidance import Thruster
+from sim import HitRequirement, estimate_hits
 from sim.closed_form import possible_miss_of
+from sim.requirement import Decision, judge
 from sim.scenario import of_model
 from sim.schedule import image_times_s
 from tests.experiments.command_line import Command
@@ -74,3 +80,81 @@ def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command
     assert len(notes) == 2
     _, out, _ = infoset("report", "out", "--require", "impulse_m_s p50<100")
     assert "is met in " in out
+
+
+@pytest.mark.parametrize(
+    ("hits", "runs", "text"),
+    [
+        (100, 100, "for 99 % with 95 % confidence: at least 299 runs without a miss; "),
+        (298, 298, "for 99 % with 95 % confidence: at least 299 runs without a miss; "),
+        # 0.999^2995 <= 0.05 < 0.999^2994
+        (299, 299, "for 99.9 % with 95 % confidence: at least 2995 runs without a miss; "),
+        # 0.99^473 + 473 * 0.01 * 0.99^472 <= 0.05, and not for 472
+        (99, 100, "for 99 % with 95 % confidence: at least 473 runs with at most 1 miss; "),
+    ],
+)
+def test_what_shows_a_greater_probability_is_said(hits: int, runs: int, text: str) -> None:
+    outlook = outlook_text(estimate_hits(hits, runs))
+    assert outlook.startswith(text)
+    share = "0.999" if "99.9" in text else "0.99"
+    assert f'infoset sweep --require "hit>={share}" --until decided decides it' in outlook
+
+
+@pytest.mark.parametrize(("hits", "runs"), [(50, 100), (0, 10), (1900, 2000)])
+def test_samples_that_exclude_the_probability_need_no_more_runs(hits: int, runs: int) -> None:
+    assert outlook_text(estimate_hits(hits, runs)) == ""
+
+
+def test_the_sweep_needs_the_runs_that_the_outlook_names() -> None:
+    """The confidence sequence decides after the named number of hits, and not one run earlier."""
+    outlook = outlook_text(estimate_hits(100, 100))
+    needed = int(outlook.rpartition("after about ")[2].split()[0])
+    assert judge(np.ones(needed), HitRequirement(0.99), watched=True).decision is Decision.MET
+    assert judge(np.ones(needed - 1), HitRequirement(0.99), watched=True).decision is Decision.UNDECIDED
+
+
+def test_an_experiment_with_a_body_says_what_would_show_more(infoset: Command, file: Path) -> None:
+    code, out, _ = infoset("experiment", file, "--runs", 4, "--set", "body.radius_m=1e5")
+    assert code == 0
+    lines = out.splitlines()
+    for case in ("random", "random + range sensor", "game", "game + range sensor"):
+        (number,) = (at for at, line in enumerate(lines) if line.startswith(f"{case}: hit"))
+        assert lines[number + 1].startswith(f"{case}: for 99 % with 95 % confidence: at least 299 runs without a miss")
+    assert "99 %" not in infoset("experiment", file, "--runs", 4)[1]
+
+
+PAPERS_WORDS = re.compile(r"curve|figure-[234]|figure [234]|published|printed")
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_words_of_the_paper_are_for_its_scenarios(infoset: Command, file: Path, tmp_path: Path) -> None:
+    own = "\n".join(
+        [
+            *infoset("experiment", file, "--runs", 2, "--out", "own")[1:],
+            *infoset("engage", file, "--out", "flight", "--record", "a.npz")[1:],
+            *infoset("adversary", file, "--budget", 20, "--out", "worst")[1:],
+            *infoset("replay", "a.npz", "--out", "again")[1:],
+        ]
+    )
+    names = [each.name for folder in ("own", "flight", "worst", "again") for each in (tmp_path / folder).iterdir()]
+    assert {"figure-distributions.png", "figure-process.png", "figure-sets.png"} <= set(names)
+    assert not PAPERS_WORDS.search(own)
+    assert not [name for name in names if PAPERS_WORDS.search(name)]
+    assert "published_curve" not in (tmp_path / "own" / "results.csv").read_text()
+    assert "published_curve" not in (tmp_path / "own" / "results.json").read_text()
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_scenarios_of_the_paper_keep_its_words(infoset: Command, tmp_path: Path) -> None:
+    _, out, err = infoset("experiment", "asteroid-1997-single", "--runs", 1, "--out", "curves")
+    assert "curves 1 and 3 only" in err
+    assert "curve 1: true state" in out
+    assert (tmp_path / "curves" / "figure-4-distributions.png").exists()
+    _, out, _ = infoset("engage", "asteroid-1997-single", "--out", "flight")
+    assert "the paper prints 244.7 m/s (random noise) and 521.7 m/s (game noise)" in out
+    assert "docs/interception.md says" in out
+    assert (tmp_path / "flight" / "figure-2-process.png").exists()
+
+
+def test_an_engagement_of_another_scenario_has_no_printed_impulse(infoset: Command, file: Path) -> None:
+    assert "the paper prints" not in infoset("engage", file)[1]

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from math import comb
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim import empirical_distribution, estimate_hits, estimate_quantiles
-from sim.statistics import order_statistics, shown_quantiles, shows
+from sim.statistics import order_statistics, runs_for_hits, shown_quantiles, shows
 
 
 def test_the_distribution_of_a_small_sample_by_hand() -> None:
@@ -92,3 +93,39 @@ def test_a_quantile_needs_values_beyond_it(level: float, fewest: int) -> None:
     sample = np.arange(float(fewest))
     assert shown_quantiles(sample, [level]) == [np.quantile(sample, level)]
     assert shown_quantiles(np.arange(1.0), [0.99, 1.0]) == [None, 0.0]
+
+
+def probability_of_at_most(misses: int, runs: int, share: Fraction) -> Fraction:
+    """Return the probability of at most so many misses in some runs; `share` is the probability of a hit."""
+    return sum(
+        (comb(runs, miss) * (1 - share) ** miss * share ** (runs - miss) for miss in range(misses + 1)), Fraction(0)
+    )
+
+
+@pytest.mark.parametrize(
+    ("share", "misses", "confidence"),
+    [
+        ("0.99", 0, "0.95"),
+        ("0.99", 1, "0.95"),
+        ("0.99", 4, "0.95"),
+        ("0.9", 0, "0.95"),
+        ("0.9", 7, "0.99"),
+        ("0.75", 3, "0.6"),
+    ],
+)
+def test_the_runs_for_hits_are_the_least_of_the_exact_test(share: str, misses: int, confidence: str) -> None:
+    runs = runs_for_hits(float(share), misses, float(confidence))
+    level = 1 - Fraction(confidence)
+    assert probability_of_at_most(misses, runs, Fraction(share)) <= level
+    assert runs == misses + 1 or probability_of_at_most(misses, runs - 1, Fraction(share)) > level
+
+
+def test_299_runs_without_a_miss_show_99_percent() -> None:
+    assert runs_for_hits(0.99) == 299
+    assert Fraction(99, 100) ** 299 <= Fraction(5, 100) < Fraction(99, 100) ** 298
+
+
+def test_runs_for_hits_of_values_without_a_meaning_are_refused() -> None:
+    for arguments in ((1.0,), (0.0,), (0.9, -1), (0.9, 0, 1.0)):
+        with pytest.raises(ValueError, match=r"share|misses|confidence"):
+            runs_for_hits(*arguments)

@@ -17,8 +17,8 @@ from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
-from experiments.interception.published import MANY, SINGLE, printed_single_runs
-from experiments.interception.study import Comparison, Curve
+from experiments.interception.published import printed_single_runs
+from experiments.interception.study import Comparison, Curve, is_of_paper
 from sim import Record, Results, Scenario
 
 DEFAULT_TIMES = (0.5, 4.0, 8.0)
@@ -26,8 +26,9 @@ DEFAULT_TIMES = (0.5, 4.0, 8.0)
 
 def draw_experiment(scenario: Scenario, curves: Sequence[Curve], courses: Sequence[Courses]) -> Iterator[Figure]:
     """Draw the distributions and the corridor, and in space the misses across the approach for each noise."""
-    printed = printed_single_runs() if scenario.name in (MANY, SINGLE) else None
-    yield draw_distributions(curves, scenario.radius_m, printed)
+    of_paper = is_of_paper(scenario)
+    printed = printed_single_runs() if of_paper else None
+    yield draw_distributions(curves, scenario.radius_m, printed, numbered=of_paper)
     yield draw_corridor(curves, courses)
     for noise in dict.fromkeys(curve.noise for curve in curves) if scenario.is_spatial else ():
         clouds = [

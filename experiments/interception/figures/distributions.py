@@ -45,16 +45,23 @@ class Sample:
 
 
 def draw_distributions(
-    curves: Sequence[Curve], radius_m: float | None = None, printed: Mapping[str, tuple[float, float]] | None = None
+    curves: Sequence[Curve],
+    radius_m: float | None = None,
+    printed: Mapping[str, tuple[float, float]] | None = None,
+    *,
+    numbered: bool = False,
 ) -> Figure:
     """Draw the distribution functions of the curves of the experiment with `draw_samples`.
 
-    `printed` are the miss, m, and the impulse, m/s, of the run that the paper prints for a noise.
+    `printed` are the miss, m, and the impulse, m/s, of the run that the paper prints for a noise; if `numbered`, the
+    curves have their numbers in the paper's figure 4.
     """
     samples, runs = [], []
     for curve in curves:
         sensor = "with" if curve.range_sensor else "no"
-        name = f"{curve.number}  {curve.noise} noise, {sensor} range sensor, {some_runs(len(curve.results))}"
+        name = f"{curve.noise} noise, {sensor} range sensor, {some_runs(len(curve.results))}"
+        if numbered:
+            name = f"{curve.number}  {name}"
         samples.append(Sample(name, CURVE_LOOKS[curve.number], curve.results.miss_m, curve.results.impulse_m_s))
         if printed and curve.noise in printed and not curve.range_sensor:
             miss_m, impulse_m_s = np.array(printed[curve.noise])[:, None]

@@ -14,7 +14,7 @@ from experiments.common.units import M_PER_KM
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_bytes
 from experiments.interception.runs.engage import steps_csv
-from experiments.interception.runs.engagement_table import FIGURES, draw_engagements
+from experiments.interception.runs.engagement_table import draw_engagements, engagement_figures
 from experiments.interception.runs.shared import WorstMisses, find_worst_misses, work_of
 from experiments.interception.scenario_file import study_scenario
 from experiments.interception.strategies import own_strategy
@@ -29,7 +29,7 @@ def run(options: Adversary) -> None:
     """Search, write the files and print the table."""
     scenario, notes = study_scenario(options)
     own = own_strategy(options.strategy)
-    names = ("steps.csv", RECORD, *figure_files(*FIGURES))
+    names = ("steps.csv", RECORD, *figure_files(*engagement_figures(scenario)))
     with work_of(options, scenario, names, {"--record": options.record}, notes) as work:
         worst = find_worst_misses(
             scenario,

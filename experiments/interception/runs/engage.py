@@ -13,13 +13,14 @@ from experiments.common.screen import figure_files, show
 from experiments.interception.command import Engage
 from experiments.interception.record_file import record_bytes
 from experiments.interception.runs.engagement_table import (
-    FIGURES,
     draw_engagements,
+    engagement_figures,
     engagement_parts,
 )
 from experiments.interception.runs.shared import need_finite, work_of
 from experiments.interception.scenario_file import scenario_with
 from experiments.interception.strategies import NOISES, chosen_noise, own_strategy
+from experiments.interception.study import is_of_paper
 from guidance import NoiseKind
 from guidance.noise import NoiseSource
 from guidance.thruster import modulus
@@ -43,7 +44,7 @@ def run(options: Engage) -> None:
     files = {f"--record of {noise}": options.record for noise in noises}
     if both and (file := options.record) is not None:
         files = {f"--record of {noise}": file.with_name(f"{file.stem}-{noise}{file.suffix}") for noise in noises}
-    names = ["steps.csv", *(f"record-{noise}.npz" for noise in noises), *figure_files(*FIGURES)]
+    names = ["steps.csv", *(f"record-{noise}.npz" for noise in noises), *figure_files(*engagement_figures(scenario))]
     with work_of(options, scenario, names, files) as work:
         records, summaries = [], {}
         for noise in noises:
@@ -66,12 +67,16 @@ def run(options: Engage) -> None:
 def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
     scenario, first = record.scenario, record.inconsistency
     contradiction = first and {"step": first.step, "time_s": float(record.time_s[first.step]), "label_m": first.label_m}
+    published = {}
+    if is_of_paper(scenario):
+        is_game = record.noise_name == NoiseKind.GAME.value
+        published["published_curve"] = 1 + (scenario.range_sensor is not None) + 2 * is_game
     return {
         "seed": record.seed,
         "run": record.run,
         "runs": 1,
         "elapsed_s": elapsed_s,
-        "published_curve": 1 + (scenario.range_sensor is not None) + 2 * (record.noise_name == NoiseKind.GAME.value),
+        **published,
         "noise": record.noise_name,
         "strategy": record.strategy,
         **{name: values[0] for name, values in outcome_columns(record.result).items()},

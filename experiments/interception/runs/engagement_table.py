@@ -6,10 +6,19 @@ from collections.abc import Iterator, Sequence
 
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
+from experiments.interception.published import printed_single_runs
 from experiments.interception.runs.shared import allowance, bound_name
-from sim import Record
+from experiments.interception.study import is_of_paper
+from sim import Record, Scenario
 
-FIGURES = ("figure-2-process", "figure-3-sets", "figure-approach")
+FIGURES = ("figure-process", "figure-sets", "figure-approach")
+FIGURES_OF_PAPER = ("figure-2-process", "figure-3-sets", "figure-approach")
+"""Names of the figures of engagements, and with their numbers in the paper."""
+
+
+def engagement_figures(scenario: Scenario) -> Sequence[str]:
+    """Return the names of the figures of engagements of a scenario."""
+    return FIGURES_OF_PAPER if is_of_paper(scenario) else FIGURES
 
 
 def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
@@ -39,7 +48,18 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
         table.add_row(name, *(values.get(name, "") for _, values in columns))
     yield " | ".join(dict.fromkeys(record.scenario.name for record in records))
     yield table
+    if any(is_of_paper(record.scenario) for record in records):
+        yield printed_impulses_note()
     yield from dict.fromkeys(filter(None, (allowance(record.scenario) for record in records)))
+
+
+def printed_impulses_note() -> str:
+    """Return a line about the impulses that the paper prints for its run, which ours do not reach."""
+    printed = [f"{impulse_m_s:g} m/s ({noise} noise)" for noise, (_, impulse_m_s) in printed_single_runs().items()]
+    return (
+        f"impulse: the paper prints {' and '.join(printed)} for its run from z = -8 km without a range sensor; "
+        "docs/interception.md says which variants were tried, and that the difference is not explained"
+    )
 
 
 def _yes(value: bool | None) -> str:
@@ -61,4 +81,5 @@ def draw_engagements(
     if written.folder is not None:
         from experiments.interception.figures.commands import draw_flights
 
-        written.draw(FIGURES, draw_flights(records, times_s), begin("figures"))
+        names = engagement_figures(records[0].scenario)
+        written.draw(names, draw_flights(records, times_s), begin("figures"))

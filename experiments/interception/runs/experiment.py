@@ -26,10 +26,13 @@ from experiments.interception.study import (
     QUANTILES,
     Curve,
     SetCounts,
+    case_title,
     curve_scenarios,
     hit_text,
+    is_of_paper,
     miss_text,
     noise_notes,
+    outlook_text,
     redrawn_text,
     set_counts,
     set_warnings,
@@ -41,7 +44,7 @@ from sim.parallel import Task
 from sim.scenario import strategy_name
 from sim.statistics import shown_quantiles
 
-FIGURE = "figure-4-distributions"
+FIGURE, FIGURE_OF_PAPER = "figure-distributions", "figure-4-distributions"
 CORRIDOR = "figure-corridor"
 LEVELS = {"p50_m_s": 0.5, "p99_m_s": 0.99}
 """Levels of the quantiles of a burn, by key in JSON."""
@@ -59,12 +62,17 @@ def run(options: Experiment) -> None:
         (noise, None, NoiseKind(noise)) if isinstance(noise, str) else (noise.name, noise, NoiseKind.RANDOM)
     )
     names = {1: name, 2: name, 3: NoiseKind.GAME.value, 4: NoiseKind.GAME.value}
-    figures = [FIGURE, CORRIDOR, *b_plane_figures(scenario, dict.fromkeys(names.values()))]
+    figures = [
+        FIGURE_OF_PAPER if is_of_paper(scenario) else FIGURE,
+        CORRIDOR,
+        *b_plane_figures(scenario, dict.fromkeys(names.values())),
+    ]
     with work_of(options, scenario, ["results.csv", *figure_files(*figures)]) as work:
         if scenario.range_sensor is None:
-            say(f"{scenario.name} has no [range_sensor]: curves 1 and 3 only", options.quiet)
+            cases = "curves 1 and 3 only" if is_of_paper(scenario) else f"{name} and game noise only"
+            say(f"{scenario.name} has no [range_sensor]: {cases}", options.quiet)
         slowest_first = [
-            (curve, flown, f"curve {curve}: {names[curve]}{' + range sensor' if flown.range_sensor else ''}")
+            (curve, flown, _progress_title(scenario, curve, case_title(names[curve], flown.range_sensor is not None)))
             for curve, flown in reversed(curve_scenarios(scenario, kind))
         ]
         courses = [Courses(flown, options.runs) for _, flown, _ in slowest_first]
@@ -86,7 +94,7 @@ def run(options: Experiment) -> None:
         remedies: dict[int, list[Remedy]] = {curve.number: [] for curve in curves}
         if options.remedy and scenario.body is not None:
             for task, curve in zip(tasks[::-1], curves, strict=True):
-                found = find_remedies(task, curve.results, work.begin(f"remedies of curve {curve.number}"))
+                found = find_remedies(task, curve.results, work.begin(f"remedies of {curve.title(scenario)}"))
                 remedies[curve.number] = found
         work.save(
             {
@@ -95,7 +103,7 @@ def run(options: Experiment) -> None:
                 "runs": options.runs,
                 "curves": [
                     {
-                        **_key(curve),
+                        **_key(scenario, curve),
                         **hit_key(curve.results.hits, curve.results.missed),
                         **({"redrawn_share": share} if (share := curve.results.redrawn_share) is not None else {}),
                         **burns_key(scenario, curve.results),
@@ -107,7 +115,7 @@ def run(options: Experiment) -> None:
                 "notes": noise_notes(scenario, dict.fromkeys(names.values())),
             }
         )
-        work.written.save("results.csv", _csv(curves), "--csv")
+        work.written.save("results.csv", _csv(scenario, curves), "--csv")
         if options.out is not None:
             from experiments.interception.figures.commands import draw_experiment
 
@@ -115,24 +123,29 @@ def run(options: Experiment) -> None:
     show(_parts(scenario, curves, remedies), options.quiet or work.written.stdout_taken)
 
 
-def _key(curve: Curve) -> dict[str, int | str | bool]:
-    return {"published_curve": curve.number, "noise": curve.noise, "range_sensor": curve.range_sensor}
+def _progress_title(scenario: Scenario, curve: int, case: str) -> str:
+    return f"curve {curve}: {case}" if is_of_paper(scenario) else case
 
 
-def _csv(curves: Sequence[Curve]) -> str:
+def _key(scenario: Scenario, curve: Curve) -> dict[str, int | str | bool]:
+    key: dict[str, int | str | bool] = {"noise": curve.noise, "range_sensor": curve.range_sensor}
+    return {"published_curve": curve.number, **key} if is_of_paper(scenario) else key
+
+
+def _csv(scenario: Scenario, curves: Sequence[Curve]) -> str:
     rows = [
-        [*_key(curve).values(), *values]
+        [*_key(scenario, curve).values(), *values]
         for curve in curves
         for values in zip(*curve.results.to_dict().values(), strict=True)
     ]
-    return to_csv((*_key(curves[0]), *curves[0].results.to_dict()), rows)
+    return to_csv((*_key(scenario, curves[0]), *curves[0].results.to_dict()), rows)
 
 
 def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, Sequence[Remedy]]) -> Iterator[Part]:
-    table, runs = number_table("curve", "quantity", *QUANTILES, left=2), len(curves[0].results)
+    table, runs = number_table(_heading(scenario), "quantity", *QUANTILES, left=2), len(curves[0].results)
     for curve in curves:
         results = curve.results
-        head = f"{curve.number} {curve.noise}"
+        head = f"{curve.number} {curve.noise}" if is_of_paper(scenario) else curve.noise
         table.add_row(head, "miss, m", *map(number, summary(results.miss_m).values()))
         ranging = "  + range sensor" if curve.range_sensor else ""
         table.add_row(ranging, "impulse, m/s", *map(number, summary(results.impulse_m_s).values()))
@@ -140,7 +153,8 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
             bounds = summary(results.guaranteed_miss_m.compressed())
             table.add_row("", bound_name(scenario), *map(number, bounds.values()))
     yield (
-        f"{scenario.name}: quantiles of {some_runs(runs)} per curve; game noise with the tie rule {scenario.tie.value}"
+        f"{scenario.name}: quantiles of {some_runs(runs)} per {_heading(scenario)}; game noise with the tie rule "
+        f"{scenario.tie.value}"
     )
     yield table
     burns = len(scenario.impulse_steps or ()) if scenario.thruster.is_scheduled else 0
@@ -156,10 +170,13 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
         outcomes = Counter(outcome.value for outcome in results.outcomes)
         lines = [hit_text(results.hits, scenario), certificate(sets, int(held.sum()), len(held))]
         lines += [f"{outcome}: {count}" for outcome, count in outcomes.items()]
-        yield f"curve {curve.number}: {'; '.join(filter(None, lines))}"
+        title = curve.title(scenario)
+        yield f"{title}: {'; '.join(filter(None, lines))}"
+        if outlook := outlook_text(results.hits):
+            yield f"{title}: {outlook}"
         if causes := miss_text(results.missed, runs, scenario):
-            yield f"curve {curve.number}: {causes}"
-        yield from (f"curve {curve.number}: {remedy}" for remedy in remedies[curve.number])
+            yield f"{title}: {causes}"
+        yield from (f"{title}: {remedy}" for remedy in remedies[curve.number])
     if started := redrawn_text(curves[0].results.redrawn_share):
         yield started
     yield from set_warnings(scenario.information_set.model, counts)
@@ -168,6 +185,11 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
     if allowed := allowance(scenario):
         yield allowed
     yield from quantile_notes(runs, [*QUANTILES.values()])
+
+
+def _heading(scenario: Scenario) -> str:
+    """Return what a sample of the experiment is called: the paper's word only for its scenarios."""
+    return "curve" if is_of_paper(scenario) else "noise"
 
 
 def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, float | None]]]:
@@ -193,12 +215,15 @@ def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, 
 
 def burn_table(scenario: Scenario, curves: Sequence[Curve]) -> Table:
     """Return the table of the burns of all curves."""
-    table = number_table("curve", "burn, s before arrival", "p50, m/s", "p99, m/s", "share of impulse, %", left=1)
+    table = number_table(
+        _heading(scenario), "burn, s before arrival", "p50, m/s", "p99, m/s", "share of impulse, %", left=1
+    )
     for curve in curves:
         for burn in burns_key(scenario, curve.results).get("burns", []):
             share = burn["share"]
+            case = case_title(curve.noise, curve.range_sensor)
             table.add_row(
-                f"{curve.number} {curve.noise}{' + range sensor' if curve.range_sensor else ''}",
+                f"{curve.number} {case}" if is_of_paper(scenario) else case,
                 f"{burn['before_arrival_s']:g}",
                 *(number(burn[key]) for key in LEVELS),
                 number(None if share is None else 100.0 * share),

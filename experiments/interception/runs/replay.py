@@ -12,6 +12,7 @@ from experiments.interception.page import MAX_RECORDS, interception_page
 from experiments.interception.record_file import load_record
 from experiments.interception.runs.engagement_table import (
     FIGURES,
+    FIGURES_OF_PAPER,
     draw_engagements,
     engagement_parts,
 )
@@ -25,8 +26,10 @@ def run(options: Replay) -> None:
         times_s = [float(time_s) for time_s in options.times.split(",") if time_s]
         if not all(0.0 <= time_s < math.inf for time_s in times_s):
             raise ValueError("times must be finite and not negative")
+    # The scenario, on which the names of the figures depend, is known after the records are read, which can take long.
+    figures = figure_files(*dict.fromkeys([*FIGURES, *FIGURES_OF_PAPER]))
     with (
-        output_of(options, figure_files(*FIGURES), {"--gif": options.gif}) as written,
+        output_of(options, figures, {"--gif": options.gif}) as written,
         progress_bar(options.quiet) as begin,
     ):
         records = [load_record(file) for file in options.records]
