@@ -323,11 +323,8 @@ def _with_wrong_unit(key: str, known: Iterable[str]) -> str | None:
 
 
 def _units_text(name: str) -> str:
-    """Return the keys that a quantity can be written as."""
-    quantity = quantity_and_unit(name)[0]
-    first, *others = units_like(name)
-    text = f"write {quantity}_{first}"
-    return f"{text}, or another unit: {', '.join(others)}" if others else text
+    """Return a question about a key, with the units that its quantity can have."""
+    return f"did you mean {name}? It can end in {', '.join(units_like(name))}"
 
 
 def numeric_key(owner: type, key: str) -> type[int] | type[float] | None:

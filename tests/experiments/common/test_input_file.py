@@ -45,7 +45,7 @@ MISTAKES = {
     "wrong unit": (
         "distance_km",
         "distance_deg",
-        "mine.toml: sun.distance_deg: is not a known key; write distance_m, or another unit: km, au",
+        "mine.toml: sun.distance_deg: is not a known key; did you mean distance_m? It can end in m, km, au",
     ),
     "two units of one key": (
         "direction_deg = 90.0",
