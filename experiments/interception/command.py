@@ -218,7 +218,7 @@ class Replay:
         str,
         typer.Option(
             metavar="T1,T2,...",
-            help="Times of the sets in figure 3 of --out, s, separated by commas; the nearest step is drawn.",
+            help="Times of the sets in the figure sets of --out, s, separated by commas; the nearest step is drawn.",
             show_default="0.5,4,8, or in a long flight evenly over the logarithm of the time to go",
         ),
     ] = ""
