@@ -151,9 +151,16 @@ def test_scenarios_of_the_paper_keep_its_words(infoset: Command, tmp_path: Path)
     assert "curve 1: true state" in out
     assert (tmp_path / "curves" / "figure-4-distributions.png").exists()
     _, out, _ = infoset("engage", "asteroid-1997-single", "--out", "flight")
-    assert "the paper prints 244.7 m/s (random noise) and 521.7 m/s (game noise)" in out
-    assert "docs/interception.md says" in out
+    assert re.search(r"impulse that the paper prints, m/s +244\.7\n", out)
+    assert "docs/interception.md says which variants were tried" in out
     assert (tmp_path / "flight" / "figure-2-process.png").exists()
+
+
+def test_both_noises_have_their_printed_impulses_and_others_none(infoset: Command) -> None:
+    _, out, _ = infoset("engage", "asteroid-1997-single", "--noise", "both")
+    assert re.search(r"impulse that the paper prints, m/s +244\.7 +521\.7\n", out)
+    _, out, _ = infoset("engage", "asteroid-1997-single", "--noise", "gaussian")
+    assert re.search(r"impulse that the paper prints, m/s +-\n", out)
 
 
 def test_an_engagement_of_another_scenario_has_no_printed_impulse(infoset: Command, file: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import shutil
 import subprocess
@@ -142,3 +143,38 @@ def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: 
     assert abs(float(done.stdout) - 0.1585290151921035) < 1e-15  # 1 - sin 1
     assert done.stderr.count("compiling") == 1
     assert "set NUMBA_CACHE_DIR" in done.stderr
+
+
+WORKERS = """
+import logging, sys
+from experiments import load_scenario
+from infoset.kernels import LOGGER, NOTICE
+from sim.parallel import Task, simulate_tasks, worker_processes
+
+if __name__ == "__main__":
+    LOGGER.setLevel(int(sys.argv[1]))
+    scenario = load_scenario("asteroid-1997")
+    with NOTICE.of("infoset campaign"), worker_processes(2) as pool:
+        tasks = [Task(scenario, [number], 0) for number in range(4)]
+        print(len(list(simulate_tasks(tasks, pool))))
+"""
+
+
+@pytest.mark.parametrize(("level", "notices"), [(logging.WARNING, 1), (logging.ERROR, 0)])
+def test_worker_processes_give_one_notice_or_none_if_the_command_is_quiet(
+    level: int, notices: int, tmp_path: Path
+) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(WORKERS)
+    root = str(Path(infoset.__file__).parents[1])
+    done = subprocess.run(
+        [sys.executable, program, str(level)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": root, VARIABLE: str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["4"]
+    assert done.stderr.count("compiling the numerical kernels of infoset campaign") == notices
+    assert done.stderr.count("compiling") == notices

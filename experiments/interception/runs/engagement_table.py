@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
@@ -16,6 +16,12 @@ FIGURES_OF_PAPER = ("figure-2-process", "figure-3-sets", "figure-approach")
 """Names of the figures of engagements, and with their numbers in the paper."""
 
 
+PRINTED_NOTE = (
+    "the paper prints impulses of one run with each noise, from z = -8 km and without a range sensor; "
+    "docs/interception.md says which variants were tried, and that the difference to ours is not explained"
+)
+
+
 def engagement_figures(scenario: Scenario) -> Sequence[str]:
     """Return the names of the figures of engagements of a scenario."""
     return FIGURES_OF_PAPER if is_of_paper(scenario) else FIGURES
@@ -25,6 +31,7 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     """Yield the results of engagements side by side, with the paper's for its scenario, for the screen."""
     bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
     lateral = sorted({axis for record in records for axis in record.scenario.set_model.axes})
+    printed = printed_single_runs() if any(is_of_paper(record.scenario) for record in records) else {}
     columns: list[tuple[str, dict[str, str]]] = []
     for record in records:
         result = {name: values[0] for name, values in record.result.to_dict().items()}
@@ -33,6 +40,7 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
             "miss, m": number(result["miss_m"]),
             **{f"miss along {axis}, m": number(result.get(f"miss_{axis}_m")) for axis in lateral},
             "impulse, m/s": number(result["impulse_m_s"]),
+            **_printed_impulse(record, printed),
             f"{' / '.join(bounds)}, m": number(result["guaranteed_miss_m"]),
             "outcome": _outcome(record),
             "true state inside the set\nat every step": _yes(result["truth_kept"]),
@@ -48,18 +56,17 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
         table.add_row(name, *(values.get(name, "") for _, values in columns))
     yield " | ".join(dict.fromkeys(record.scenario.name for record in records))
     yield table
-    if any(is_of_paper(record.scenario) for record in records):
-        yield printed_impulses_note()
+    if printed:
+        yield PRINTED_NOTE
     yield from dict.fromkeys(filter(None, (allowance(record.scenario) for record in records)))
 
 
-def printed_impulses_note() -> str:
-    """Return a line about the impulses that the paper prints for its run, which ours do not reach."""
-    printed = [f"{impulse_m_s:g} m/s ({noise} noise)" for noise, (_, impulse_m_s) in printed_single_runs().items()]
-    return (
-        f"impulse: the paper prints {' and '.join(printed)} for its run from z = -8 km without a range sensor; "
-        "docs/interception.md says which variants were tried, and that the difference is not explained"
-    )
+def _printed_impulse(record: Record, printed: Mapping[str, tuple[float, float]]) -> dict[str, str]:
+    """Return the row with the impulse that the paper prints for a noise; no row without printed numbers."""
+    if not printed:
+        return {}
+    of_noise = printed.get(record.noise_name) if is_of_paper(record.scenario) else None
+    return {"impulse that the paper prints, m/s": number(None if of_noise is None else of_noise[1])}
 
 
 def _yes(value: bool | None) -> str:
