@@ -12,8 +12,8 @@ and a division round their number by at most 4e-11. Times of a file are decimals
 def steps_between(start_s: float, time_s: float, step_s: float) -> int:
     """Return the number of steps from a time to the step nearest to another time.
 
-    Of two steps that are equally near it is the earlier one. No step is after the nominal arrival. The number is
-    negative if the nearest step is before the start.
+    Of two steps that are equally near it is the earlier one. No step is at or after the nominal arrival. The number
+    is negative if the nearest step is before the start.
 
     Parameters
     ----------
@@ -23,5 +23,5 @@ def steps_between(start_s: float, time_s: float, step_s: float) -> int:
         Time between two steps, s.
     """
     nearest = math.ceil((start_s - time_s) / step_s - 0.5 - ROUNDING)
-    last = math.floor(start_s / step_s + ROUNDING)
+    last = math.ceil(start_s / step_s - ROUNDING) - 1
     return min(nearest, last)

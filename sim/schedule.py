@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from infoset.clock import ROUNDING, steps_between
+from infoset.clock import steps_between
 from sim.scenario import MAX_STEPS, Scenario
 
 SAID_FROM = 0.1
@@ -47,8 +46,7 @@ def schedule(scenario: Scenario) -> Schedule | None:
     arrival_s, step_s = scenario.nominal_arrival_s, scenario.step_s
     if arrival_s > MAX_STEPS * step_s:
         return None
-    # A step at the nominal arrival is not before it.
-    last_step = math.ceil(arrival_s / step_s - ROUNDING) - 1
+    last_step = steps_between(arrival_s, 0.0, step_s)
     steps = scenario.impulse_steps
     if steps is None:
         steps = range(scenario.thruster.delay_steps, last_step + 1)

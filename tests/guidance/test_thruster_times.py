@@ -71,7 +71,7 @@ def test_a_first_impulse_without_a_period() -> None:
     engine = replace(ENGINE, first_impulse_s=46.0)
     steps = engine.impulse_steps(100.0, 10.0)
     assert steps is not None
-    assert list(steps) == [5, 6, 7, 8, 9, 10]
+    assert list(steps) == [5, 6, 7, 8, 9]
 
 
 @pytest.mark.parametrize(

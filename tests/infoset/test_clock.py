@@ -14,7 +14,7 @@ from infoset.clock import steps_between
 def nearest_step(start_s: Fraction, time_s: Fraction, step_s: Fraction) -> int:
     """Return the step with the least distance, the earlier of two, among those until the arrival."""
     below = math.floor((start_s - time_s) / step_s)
-    last = math.floor(start_s / step_s)
+    last = math.ceil(start_s / step_s) - 1
     steps = [step for step in range(below - 1, below + 3) if step <= last] or [last]
     return min(steps, key=lambda step: (abs(start_s - step * step_s - time_s), step))
 
@@ -45,6 +45,7 @@ def test_it_is_the_nearest_step_of_random_times() -> None:
         (100.0, 35.0, 10.0, 6),  # the middle of 40 s and 30 s
         (100.7, 0.1, 1.0, 100),  # step 101 is after the arrival
         (100.7, 0.0, 1.0, 100),
+        (100.0, 0.0, 10.0, 9),  # step 10 is at the arrival
         (100.0, 104.0, 10.0, 0),
         (100.0, 106.0, 10.0, -1),
         (0.3, 0.1, 0.1, 2),  # 0.3 - 0.1 is less than two steps in floating point
