@@ -204,6 +204,11 @@ class CompileNotice(event.Listener):
         finally:
             self.purpose = ""
 
+    @property
+    def is_given(self) -> bool:
+        """Whether the notice of this command has been given."""
+        return bool(self._compiled.modules)
+
     def _announce(self, folder: Path | None) -> None:
         if folder is None:
             how = f"in every process, because the cache folder cannot be written: set {VARIABLE} to a folder that can"

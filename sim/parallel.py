@@ -195,7 +195,8 @@ def worker_processes(count: int) -> Iterator[Executor]:
     """
     before = set(multiprocessing.active_children())
     spawning = multiprocessing.get_context("spawn")
-    notice = _WorkerNotice(LOGGER.getEffectiveLevel(), NOTICE.purpose, spawning.Lock())
+    level = logging.ERROR if NOTICE.is_given else LOGGER.getEffectiveLevel()
+    notice = _WorkerNotice(level, NOTICE.purpose, spawning.Lock())
     pool = ProcessPoolExecutor(count, spawning, initializer=_start_worker, initargs=(os.getpid(), notice))
     try:
         yield pool

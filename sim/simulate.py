@@ -121,7 +121,13 @@ def simulate_runs(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[int, Step], None] | None = None,
 ) -> Results:
-    """Return the results of `simulate` without its warning, for commands: they report such runs themselves."""
+    """Return the results of `simulate` without its warning, for commands: they report such runs themselves.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `simulate`.
+    """
     WHOLE.need("seed", seed)
     scenario, own = with_strategy(scenario, strategy)
     scenario, own_noise = with_noise(scenario, noise)

@@ -153,10 +153,11 @@ from sim.parallel import Task, simulate_tasks, worker_processes
 
 if __name__ == "__main__":
     LOGGER.setLevel(int(sys.argv[1]))
-    scenario = load_scenario("asteroid-1997")
-    with NOTICE.of("infoset campaign"), worker_processes(2) as pool:
-        tasks = [Task(scenario, [number], 0) for number in range(4)]
-        print(len(list(simulate_tasks(tasks, pool))))
+    with NOTICE.of("infoset campaign"):
+        scenario = load_scenario("asteroid-1997")
+        with worker_processes(2) as pool:
+            tasks = [Task(scenario, [number], 0) for number in range(4)]
+            print(len(list(simulate_tasks(tasks, pool))))
 """
 
 

@@ -116,7 +116,7 @@ def test_chosen_sections_keep_the_ends(records: list[Record]) -> None:
 
 
 def test_distributions_draw_the_curves_and_their_bands(curves: list[Curve]) -> None:
-    figure = draw_distributions(curves)
+    figure = draw_distributions(curves, numbered=True)
     assert_units(figure)
     half = np.sqrt(np.log(40.0) / (2.0 * RUNS))  # Dvoretzky-Kiefer-Wolfowitz
     share = np.arange(1, RUNS + 1) / RUNS
