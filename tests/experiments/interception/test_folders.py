@@ -14,7 +14,7 @@ from tests.experiments.command_line import Command, strict
 
 TIE_AND_SECTIONS = ("--set", "tie=lower", "--set", "information_set.sections=9")
 STUDIES = {
-    "experiment": (("--runs", 2, *TIE_AND_SECTIONS), ["4-distributions", "corridor"], ["results.csv"]),
+    "experiment": (("--runs", 2, *TIE_AND_SECTIONS), ["distributions", "corridor"], ["results.csv"]),
     "compare": (
         ("--runs", 2, "--strategies", "symmetric-miss,patient", "--no-range-sensor"),
         ["comparison"],
@@ -22,7 +22,7 @@ STUDIES = {
     ),
     "adversary": (
         ("--budget", 6, "--no-range-sensor"),
-        ["2-process", "3-sets", "approach"],
+        ["process", "sets", "approach"],
         ["record-worst.npz", "steps.csv"],
     ),
 }
