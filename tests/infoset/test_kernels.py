@@ -15,6 +15,12 @@ import pytest
 from infoset.kernels import VARIABLE, CompileNotice
 
 
+@pytest.fixture(autouse=True)
+def notices_are_shown(caplog: pytest.LogCaptureFixture) -> None:
+    """Show the notices, also after a command with --quiet in the same process."""
+    caplog.set_level(logging.WARNING, "infoset.kernels")
+
+
 def kernel_of(module: str) -> Any:
     """Return the event of a kernel of a module, as Numba gives it."""
 
