@@ -50,11 +50,22 @@ class Covariance:
         if bool(self.matrix_m2) == any(deviations) or (self.matrix_m2 and self.correlations):
             raise ValueError("Covariance: must have matrix_m2, or position_sigma_m and velocity_sigma_m_s")
         if deviations[0] != deviations[1]:
-            raise ValueError("Covariance: {} deviations of position and {} of velocity".format(*deviations))
+            raise ValueError(
+                "Covariance: position_sigma_m and velocity_sigma_m_s must have as many values: got {} and {}".format(
+                    *deviations
+                )
+            )
         if len(self.correlation) != self.size:
             raise ValueError(f"Covariance: correlations must have {self.size} rows: got {len(self.correlation)}")
         if not np.allclose(self.correlation.diagonal(), 1.0, atol=ROUNDING, rtol=0.0):
             raise ValueError("Covariance: the variances must not be negative, and correlations have the diagonal 1")
+        row, column = np.unravel_index(np.abs(self.correlation).argmax(), self.correlation.shape)
+        greatest = self.correlation[row, column]
+        if abs(greatest) > 1.0 + ROUNDING:
+            raise ValueError(
+                f"Covariance: the correlation of components {min(row, column) + 1} and {max(row, column) + 1} is "
+                f"{greatest:.3g}, and must be from -1 to 1"
+            )
         least = np.linalg.eigvalsh(self.correlation)[0]
         if least < -ROUNDING:
             raise ValueError(

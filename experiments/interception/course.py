@@ -17,6 +17,7 @@ from sim import Outcome, Record, Scenario
 from sim.adversary import WORST_FOUND
 from sim.engagement import Step
 from sim.results import ending
+from sim.schedule import schedule
 
 MAX_STEPS = 400
 """Number of steps above which a flight is long: its time axis is logarithmic in the time before the arrival."""
@@ -87,16 +88,24 @@ def kept_steps(record: Record) -> list[int]:
 
 
 def marks(scenario: Scenario) -> dict[str, float]:
-    """Return the times before the nominal arrival, s, of the first and the last image and of the last impulse."""
+    """Return the times before the nominal arrival, s, of the first and the last image and of the last impulse.
+
+    They are those of the schedule that will happen. A time that the scenario leaves open is left out.
+    """
     sensor, thruster = scenario.set_model.angle_sensor, scenario.thruster
-    times = {
-        "first image": sensor.first_image_s,
-        "last image": sensor.last_image_s or None,
-        "cut-off": thruster.last_impulse_s,
-    }
-    if thruster.impulses_s and thruster.last_impulse_s is None:
-        times["last impulse"] = thruster.impulses_s[-1]
-    return {name: time for name, time in times.items() if time is not None and time < scenario.nominal_arrival_s}
+    planned = schedule(scenario)
+    if planned is None:
+        return {}
+    times = {}
+    if sensor.first_image_s is not None and planned.images_s:
+        times["first image"] = planned.images_s[0]
+    if sensor.last_image_s and planned.images_s:
+        times["last image"] = planned.images_s[-1]
+    if thruster.last_impulse_s is not None and planned.impulses_s:
+        times["cut-off"] = planned.impulses_s[-1]
+    elif thruster.impulses_s:
+        times["last impulse"] = planned.impulses_s[-1]
+    return {name: time for name, time in times.items() if 0.0 < time < scenario.nominal_arrival_s}
 
 
 def true_predicted_misses(record: Record) -> Floats:

@@ -199,10 +199,12 @@ def study_title(scenario: Scenario, strategy: str, seed: int) -> str:
 
 def game_note(scenario: Scenario, rule: str | None = None) -> str:
     """Return a line about what a result with game noise is; `rule` is its tie rule, None that of the scenario."""
-    bound = "; no errors within the bounds give a miss above Phi" if scenario.set_model.is_guaranteed else ""
+    is_guaranteed = scenario.set_model.is_guaranteed
+    bound = "; the miss of a run is at most its Phi, and other errors can give a greater Phi" if is_guaranteed else ""
+    worse = "" if rule else "; infoset compare shows the worst of all tie rules"
     return (
         f"game noise ({rule or f'tie rule {scenario.tie.value}'}) is one adversary, not the worst case: infoset bound "
-        f"--budget 0 prints a miss, from the worst start, that no strategy can prevent{bound}"
+        f"--budget 0 prints a miss, from the worst start, that no strategy can prevent{bound}{worse}"
     )
 
 

@@ -219,11 +219,15 @@ def _missing(target: KnownTarget) -> list[str]:
 
 
 def _origins(trajectory: Trajectory, pair: _Pair) -> list[str]:
-    """Return where the states and the covariance come from, one line each."""
+    """Return where the states come from, and the plane of T and R, one line each."""
     lines = []
     if trajectory.epoch is not None:
         lines.append(f"Epoch: {trajectory.epoch}")
     lines += [f"Spacecraft: {pair.spacecraft.origin}.", f"Object: {pair.object.origin}."]
+    frames = [craft.frame.name for craft in (pair.spacecraft, pair.object) if craft.frame is not None]
+    axes = f"of {frames[0]}" if frames else "of the states"
+    x, y, z = trajectory.pole
+    lines.append(f"Reference plane of T and R: its normal (pole) is [{x:g}, {y:g}, {z:g}] in the axes {axes}.")
     return lines
 
 
@@ -340,11 +344,13 @@ def _covariance(trajectory: Trajectory, one: CraftState, other: CraftState, sour
     found = {craft.source: craft.covariance for craft in (one, other) if craft.covariance is not None}
     if not found:
         raise InputError(f"{source}: covariance: is missing, and the OEM files have none; write the table [covariance]")
+    named = " and ".join(
+        f"{craft.source} (axes: {craft.covariance_frame})" for craft in (one, other) if craft.covariance is not None
+    )
     if len(found) == 1:
-        (name,) = found
-        note = f"covariance: that of {name}; the other state is taken as exact"
+        note = f"covariance: that of {named}; the other state is taken as exact"
     else:
-        note = f"covariance: the sum of those of {' and '.join(found)}, taken as independent"
+        note = f"covariance: the sum of those of {named}, taken as independent"
 
     total = np.sum([*found.values()], axis=0)
     rows = tuple(map(tuple, total.tolist()))

@@ -52,10 +52,17 @@ def test_an_exact_component_and_one_that_follows_from_another_are_kept() -> None
     [
         ({}, "must have matrix_m2, or position_sigma_m and velocity_sigma_m_s"),
         ({"matrix_m2": ((1.0,),), "position_sigma_m": (1.0,)}, "must have matrix_m2, or"),
-        ({"position_sigma_m": (1.0, 1.0), "velocity_sigma_m_s": (1.0,)}, "2 deviations of position and 1 of velocity"),
+        (
+            {"position_sigma_m": (1.0, 1.0), "velocity_sigma_m_s": (1.0,)},
+            "position_sigma_m and velocity_sigma_m_s must have as many values: got 2 and 1",
+        ),
         ({"position_sigma_m": (-1.0,), "velocity_sigma_m_s": (1.0,)}, "position_sigma_m must be at least 0"),
         ({"matrix_m2": ((1.0, 0.5), (0.4, 1.0))}, "must be symmetric"),
-        ({"matrix_m2": ((1.0, 2.0), (2.0, 1.0))}, "have a negative eigenvalue, -1: check"),
+        ({"matrix_m2": ((1.0, 2.0), (2.0, 1.0))}, "correlation of components 1 and 2 is 2, and must be from -1 to 1"),
+        (
+            {"matrix_m2": ((1.0, 0.9, -0.9), (0.9, 1.0, 0.9), (-0.9, 0.9, 1.0))},
+            "have a negative eigenvalue, -0.8: check",
+        ),
         ({"matrix_m2": ((1.0,), (0.0, -1.0))}, "variances must not be negative"),
         ({"matrix_m2": ((1.0, 0.0), (0.0,))}, "square matrix or its lower triangle"),
         ({"position_sigma_m": (1.0,), "velocity_sigma_m_s": (1.0,), "correlations": ((1,),)}, "must have 2 rows"),

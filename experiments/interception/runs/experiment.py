@@ -180,8 +180,7 @@ def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, S
     if started := redrawn_text(curves[0].results.redrawn_share):
         yield started
     yield from set_warnings(scenario.information_set.model, counts)
-    *others, game = noise_notes(scenario, dict.fromkeys(curve.noise for curve in curves))
-    yield from (*others, f"{game}; infoset compare shows the worst of all tie rules")
+    yield from noise_notes(scenario, dict.fromkeys(curve.noise for curve in curves))
     if allowed := allowance(scenario):
         yield allowed
     yield from quantile_notes(runs, [*QUANTILES.values()])

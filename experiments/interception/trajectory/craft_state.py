@@ -23,6 +23,8 @@ MODEL_SHARE = 0.01
 
 Perturbations of an orbit change it by less (the Earth's oblateness by 0.1 %), wrong units and manoeuvres by more.
 """
+MAX_SPANS = 3
+"""Number of the spans of segments that a message lists: a line has room for them."""
 ALONG_RADIUS = ("RTN", "RSW", "RIC", "QSW")
 ALONG_VELOCITY = ("TNW",)
 """Names of local axes: radius, transverse, normal; and velocity, in-plane normal, normal of the orbit."""
@@ -40,6 +42,8 @@ class CraftState:
         None for vectors of the trajectory file.
     covariance : array of shape (6, 6) or None
         Of position and velocity, in the axes of the state.
+    covariance_frame : str
+        The axes in which the file gives it.
     origin : str
         How the state was found, for the comments of the scenario.
     error : array of shape (2,)
@@ -53,6 +57,7 @@ class CraftState:
     centre: str | None = None
     frame: Frame | None = None
     covariance: Floats | None = None
+    covariance_frame: str = ""
     origin: str = "vectors of the trajectory file"
     error: Floats = field(default_factory=lambda: np.zeros(2))
     notes: tuple[str, ...] = ()
@@ -107,8 +112,12 @@ def oem_craft(
 
     centre = centre_name(segment.metadata["CENTER_NAME"])
     covariance = None
+    covariance_frame = ""
     if with_covariance and segment.covariances:
-        covariance = _covariance_at(segment, where, seconds, frame, found.state)
+        given = _covariance_at(segment, where, seconds)
+        axes = np.kron(np.eye(2), _axes_of(given, where, segment, frame, found.state))
+        covariance = axes.T @ given.matrix @ axes
+        covariance_frame = given.frame or f"{frame.name}, as the states"
 
     notes = []
     if found.method not in ("TABULATED", "LINEAR") and found.degree < segment.degree:
@@ -122,6 +131,7 @@ def oem_craft(
         centre=centre,
         frame=frame,
         covariance=covariance,
+        covariance_frame=covariance_frame,
         origin=f"segment {segment.number} of {source}, {_method_text(found)}",
         error=found.error,
         notes=tuple(notes),
@@ -171,16 +181,23 @@ def _segment_at(segments: Sequence[OemSegment], source: str, epoch: Epoch, scale
             holding.append((segment, seconds))
 
     if not holding:
-        first, last = segments[0].metadata, segments[-1].metadata
+        spans = ", ".join(map(_usable_span, segments[:MAX_SPANS]))
+        more = f" and {len(segments) - MAX_SPANS} more" if len(segments) > MAX_SPANS else ""
         raise InputError(
-            f"{source}: no segment holds the epoch: their states or usable spans are "
-            f"from {first.get('START_TIME', 'the first state')} to {last.get('STOP_TIME', 'the last state')} "
-            f"{segments[0].scale}; take an epoch between them"
+            f"{source}: no segment holds the epoch: the usable spans are {spans}{more}; take an epoch within one"
         )
     inside = [segment for segment, seconds in holding if segment.start < seconds < segment.stop]
     if len(inside) > 1:
         raise InputError(f"{source}: segments {inside[0].number} and {inside[1].number} both hold the epoch")
     return inside[0] if inside else holding[-1][0]
+
+
+def _usable_span(segment: OemSegment) -> str:
+    """Return the span of a segment in which its states may be interpolated, as text."""
+    known = segment.metadata
+    start = known.get("USEABLE_START_TIME", known.get("START_TIME", "the first state"))
+    stop = known.get("USEABLE_STOP_TIME", known.get("STOP_TIME", "the last state"))
+    return f"from {start} to {stop} {segment.scale}"
 
 
 def _method_text(found: Interpolated) -> str:
@@ -220,16 +237,15 @@ def _two_body_difference(found: Interpolated, parameter_m3_s2: float) -> float:
     return float(np.linalg.norm(moved[0] - found.state[0]))
 
 
-def _covariance_at(segment: OemSegment, where: str, seconds: Fraction, frame: Frame, state: Floats) -> Floats:
-    """Return the covariance of a segment at an epoch, in the axes of its states."""
+def _covariance_at(segment: OemSegment, where: str, seconds: Fraction) -> OemCovariance:
+    """Return the covariance of a segment at an epoch."""
     nearest = min(segment.covariances, key=lambda each: abs(each.seconds - seconds))
     if abs(nearest.seconds - seconds) > SAME_EPOCH_S:
         raise InputError(
             f"{where}: has no covariance of the epoch, the nearest is of {nearest.epoch}; take that epoch, or write "
             "[covariance] in the trajectory file"
         )
-    both = np.kron(np.eye(2), _axes_of(nearest, where, segment, frame, state))
-    return np.asarray(both.T @ nearest.matrix @ both)
+    return nearest
 
 
 def _axes_of(covariance: OemCovariance, where: str, segment: OemSegment, frame: Frame, state: Floats) -> Floats:

@@ -123,7 +123,7 @@ SUN = "gravitational_parameter_km3_s2 = 1.327e11"
     [
         (
             toml(CRAFT, BODY, SIGMAS.replace("km", "m", 1).replace("1.0, ", "", 1), SUN),
-            "2 deviations of position and 3",
+            "must have as many values: got 2 and 3",
         ),
         (toml(CRAFT, BODY, SIGMAS + "\ncorrelations = [[1]]"), "correlations must have 6 rows: got 1"),
         (toml(CRAFT, BODY, "matrix_km2 = [[1.0], [0.0, 1.0]]"), "must have 6 components: got 2"),
@@ -384,7 +384,7 @@ def test_covariance_of_one_file_is_used_and_said(tmp_path: Path) -> None:
 
     notes = scenario_of(file, load_scenario("dart-2022"), 3.0).notes
 
-    assert "covariance: that of spacecraft.oem; the other state is taken as exact" in notes
+    assert "covariance: that of spacecraft.oem (axes: RTN); the other state is taken as exact" in notes
 
 
 def test_covariance_of_the_trajectory_file_wins(tmp_path: Path) -> None:
