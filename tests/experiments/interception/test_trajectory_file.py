@@ -375,7 +375,9 @@ def test_covariances_of_both_files_are_added(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         found.scenario.covariance.matrix, expected.scenario.covariance.matrix, rtol=1e-9, atol=1e-9
     )
-    assert "covariance: the sum of those of spacecraft.oem and object.oem, taken as independent" in found.notes
+    own = "spacecraft.oem (axes: ECLIPJ2000, as the states)"
+    other = "object.oem (axes: ECLIPJ2000, as the states)"
+    assert f"covariance: the sum of those of {own} and {other}, taken as independent" in found.notes
 
 
 def test_covariance_of_one_file_is_used_and_said(tmp_path: Path) -> None:
@@ -384,7 +386,10 @@ def test_covariance_of_one_file_is_used_and_said(tmp_path: Path) -> None:
 
     notes = scenario_of(file, load_scenario("dart-2022"), 3.0).notes
 
-    assert "covariance: that of spacecraft.oem (axes: RTN); the other state is taken as exact" in notes
+    assert (
+        "covariance: that of spacecraft.oem (axes: ECLIPJ2000, as the states); the other state is taken as exact"
+        in notes
+    )
 
 
 def test_covariance_of_the_trajectory_file_wins(tmp_path: Path) -> None:
