@@ -31,7 +31,7 @@ ATTEMPTS = (SolverSettings(3e-8, False), SolverSettings(1e-8, False), SolverSett
 """Settings that are tried in turn until a solution passes the check.
 
 Rounding, and so the machine, decides in which programs with cones the last iterations fail; each setting fails in
-others. Of 300 random problems, half of them at the edge of feasibility, the first alone leaves up to four without a
+others. Of 300 random problems, half of them at the edge of feasibility, the first alone leaves up to three without a
 solution and all together one. With rescaling, the solver's default, some gaps are 3e-2 in place of 1e-7: rows are in
 units of their limits already. Programs without cones are always rescaled."""
 
