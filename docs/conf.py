@@ -64,6 +64,8 @@ nitpick_ignore = [
         "experiments.reachability.system_file": ("ReachableSystem",),
         "guidance.predictive": ("ManoeuvreState",),
         "guidance.proportional_navigation": ("PulseState",),
+        "infoset.geometry.polytope.nearest": ("NearestPair",),
+        "sim.scenario": ("_Speed",),
         "infoset.observer.sets": ("Polygons", "Polytopes", "Motion"),
         "infoset.observer.steps": ("Strips",),
         "rendezvous.relative_motion.time_varying": ("HeldSegment",),
@@ -89,6 +91,7 @@ nitpick_ignore = [
     }.items()
     for name in names
 ]
+nitpick_ignore.append(("py:class", "0.0"))  # the limit in the type of a speed
 
 # --- text
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
