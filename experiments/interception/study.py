@@ -262,7 +262,7 @@ def outlook_text(hits: HitEstimate | None) -> str:
     requirement = HitRequirement(share)
     text = (
         f"for {percent(share)} with {percent(CONFIDENCE)} confidence: at least {needed} runs {allowed}; "
-        f'infoset sweep --require "{requirement}" --until decided decides it'
+        f'infoset sweep --vary KEY=FROM:TO:COUNT --require "{requirement}" --until decided decides it'
     )
     until_decided = runs_needed(hits.hits, hits.runs, share)
     return f"{text}, after about {until_decided} runs" if until_decided is not None else text

@@ -97,7 +97,7 @@ def test_what_shows_a_greater_probability_is_said(hits: int, runs: int, text: st
     outlook = outlook_text(estimate_hits(hits, runs))
     assert outlook.startswith(text)
     share = "0.999" if "99.9" in text else "0.99"
-    assert f'infoset sweep --require "hit>={share}" --until decided decides it' in outlook
+    assert f'infoset sweep --vary KEY=FROM:TO:COUNT --require "hit>={share}" --until decided decides it' in outlook
 
 
 @pytest.mark.parametrize(("hits", "runs"), [(50, 100), (0, 10), (1900, 2000)])
