@@ -6,9 +6,9 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 
-from experiments import load_scenario
 from infoset import Model
-from sim import Scenario
+from infoset.experiments import load_scenario
+from infoset.sim import Scenario
 
 
 def asked_scenario(

@@ -12,12 +12,12 @@ import math
 import sys
 from dataclasses import replace
 
-from experiments import load_scenario
-from guidance import Thruster
 from infoset import Camera, InitialSet, Model, SetModel, StateBox
-from sim import Scenario, Sun
-from sim.bound.lower_bound import lower_bound
-from sim.scenario import of_model
+from infoset.experiments import load_scenario
+from infoset.guidance import Thruster
+from infoset.sim import Scenario, Sun
+from infoset.sim.bound.lower_bound import lower_bound
+from infoset.sim.scenario import of_model
 
 RANGES_KM = (60e3, 140e3, 190e3, 200e3, 300e3, 400e3)
 SUN = Sun(1.324948e20, 60e9, 0.5 * math.pi)

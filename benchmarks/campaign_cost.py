@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments import load_scenario
-from experiments.common.figure_style import CURVE_LOOKS, legend_below, letters, style, subplots
-from experiments.common.output import Output
-from guidance import NoiseKind
-from sim import Campaign, Scenario, simulate
-from sim.scenario import of_model
+from infoset.experiments import load_scenario
+from infoset.experiments.common.figure_style import CURVE_LOOKS, legend_below, letters, style, subplots
+from infoset.experiments.common.output import Output
+from infoset.guidance import NoiseKind
+from infoset.sim import Campaign, Scenario, simulate
+from infoset.sim.scenario import of_model
 
 RUNS = (128, 256, 512, 1024, 2048)
 SECTIONS = (15, 29, 58, 116, 232)

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from experiments import load_scenario
-from guidance import NoiseKind
-from sim import Scenario
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Scenario
 
 Check = Callable[[str, float, float, str], None]
 

@@ -20,15 +20,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.interception.scenario_file import load_scenario
-from guidance import make_strategy
 from infoset import InformationSet, InitialSet, Model, RateSensor
 from infoset.engine.section_law import section_laws
-from sim import Results, Scenario
-from sim.adversary import Objective, _Search
-from sim.engagement import Engagements, Step
-from sim.gravity import on_board_model
-from sim.scenario import of_model
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import make_strategy
+from infoset.sim import Results, Scenario
+from infoset.sim.adversary import Objective, _Search
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.gravity import on_board_model
+from infoset.sim.scenario import of_model
 
 Floats = NDArray[np.float64]
 LABELS = 200

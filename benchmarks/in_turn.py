@@ -17,18 +17,18 @@ from pathlib import Path
 _BATCHES = """
 import sys, time
 from dataclasses import replace
-from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind
-from sim import simulate
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim.simulate import simulate_runs
 
 scenario = replace(load_scenario("asteroid-1997"), noise=NoiseKind(sys.argv[2]))
 if sys.argv[1] == "without":
     scenario = replace(scenario, range_sensor=None)
-simulate(scenario, 200)
+simulate_runs(scenario, 200)
 print("ready", flush=True)
 for _ in sys.stdin:
     start = time.process_time()
-    simulate(scenario, 200)
+    simulate_runs(scenario, 200)
     print(1e3 * (time.process_time() - start), flush=True)
 """
 

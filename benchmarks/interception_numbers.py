@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments import load_scenario
-from experiments.interception.study import curve_scenarios
-from guidance import NoiseKind, TieRule
 from infoset import AngleSensor, InitialSet
-from sim import Results, Scenario, simulate
-from sim.scenario import of_model
+from infoset.experiments import load_scenario
+from infoset.experiments.interception.study import curve_scenarios
+from infoset.guidance import NoiseKind, TieRule
+from infoset.sim import Results, Scenario, simulate
+from infoset.sim.scenario import of_model
 
 SINGLE_LEVELS = (0.05, 0.5, 0.95, 1.0)
 CURVE_LEVELS = (0.1, 0.5, 0.9, 0.99)

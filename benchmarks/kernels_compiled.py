@@ -33,14 +33,13 @@ COMMANDS = (
 _COUNTED = """
 import sys
 from numba.core import event
-from experiments.cli import main
-from infoset.kernels import PACKAGES
+from infoset.experiments.cli import main
 
 class Count(event.Listener):
     kernels = []
     def on_start(self, event):
         function = event.data["dispatcher"].py_func
-        if function.__module__.startswith(PACKAGES):
+        if function.__module__.startswith("infoset."):
             self.kernels.append(f"{function.__module__}.{function.__qualname__}")
     def on_end(self, event):
         pass

@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments import load_scenario
 from infoset import RateSensor
-from sim import Scenario, simulate
-from sim.draws import draw
-from sim.engagement import Engagements
-from sim.scenario import of_model
+from infoset.experiments import load_scenario
+from infoset.sim import Scenario, simulate
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.scenario import of_model
 
 STEPS = (100, 1000, 10_000)
 ACCELERATION_M_S2 = 0.006

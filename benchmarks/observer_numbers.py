@@ -22,9 +22,9 @@ import shapely
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from experiments.common.input_file import load_problem
-from experiments.observer.file import ObserverProblem
 from infoset import LinearObserver, Zonotope
+from infoset.experiments.common.input_file import load_problem
+from infoset.experiments.observer.file import ObserverProblem
 from tests.infoset.observer.test_random_observers import System
 
 Floats = NDArray[np.float64]

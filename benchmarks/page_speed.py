@@ -57,7 +57,7 @@ def main() -> None:
 
 def infoset(folder: Path, *arguments: str) -> None:
     """Run a command."""
-    code = "from experiments.cli import main; main()"
+    code = "from infoset.experiments.cli import main; main()"
     subprocess.run([sys.executable, "-c", code, *arguments], cwd=folder, check=True)
 
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.asked_scenario import asked_scenario
-from experiments.interception.study import scenario_title
-from guidance import NoiseKind, Patient, Strategy, SymmetricMiss, TieRule
-from sim import Scenario, simulate
+from infoset.experiments.interception.study import scenario_title
+from infoset.guidance import NoiseKind, Patient, Strategy, SymmetricMiss, TieRule
+from infoset.sim import Scenario, simulate
 
 SHARES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 

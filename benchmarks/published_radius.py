@@ -15,11 +15,11 @@ import sys
 import numpy as np
 from scipy.optimize import least_squares
 
-from experiments.common.hill_axes import to_paper
-from experiments.common.input_file import load_problem
-from experiments.reachability.published import PROBLEM, flown_controls, printed_tables, published_motion
 from infoset.arrays import Floats
-from rendezvous.reachability import minimum_energy, solve
+from infoset.experiments.common.hill_axes import to_paper
+from infoset.experiments.common.input_file import load_problem
+from infoset.experiments.reachability.published import PROBLEM, flown_controls, printed_tables, published_motion
+from infoset.rendezvous.reachability import minimum_energy, solve
 
 ROUNDING = np.array([0.1, 0.1, 0.1, 0.01, 0.01, 0.01])
 """Largest error of a difference of two rounded states, m and m/s."""

@@ -15,9 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.common.errors import InputError
-from experiments.common.input_file import read_text, to_toml
-from guidance import NoiseKind, Thruster, TieRule
 from infoset import (
     AngleSensor,
     Bias,
@@ -29,9 +26,12 @@ from infoset import (
     SetModel,
     StateBox,
 )
-from sim import Manoeuvre, Scenario, Sun, Target
-from sim.gravity import on_board_model
-from sim.scenario import of_model
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import read_text, to_toml
+from infoset.guidance import NoiseKind, Thruster, TieRule
+from infoset.sim import Manoeuvre, Scenario, Sun, Target
+from infoset.sim.gravity import on_board_model
+from infoset.sim.scenario import of_model
 
 SOLAR_PARAMETER_M3_S2 = 1.324948e20
 STRATEGIES = ("symmetric-miss", "patient")

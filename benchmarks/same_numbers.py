@@ -52,7 +52,7 @@ def numbers_of(checkout: Path, command: str) -> object:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "numbers.json"
         arguments = [str(Path(folder) / "out") if word == "DIR" else word for word in command.split()]
-        line = [sys.executable, "-m", "experiments", *arguments, "--json", str(file), "--quiet"]
+        line = [sys.executable, "-m", "infoset", *arguments, "--json", str(file), "--quiet"]
         done = subprocess.run(
             line,
             cwd=folder,

@@ -28,14 +28,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.random_scenarios import camera_scenario, gravity_scenario, random_scenario, scheduled
-from experiments.interception.scenario_file import load_scenario
-from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor
-from sim import Manoeuvre, Outcome, Scenario, Target
-from sim.bound.pair_flight import middle
-from sim.draws import Draws, draw
-from sim.engagement import Engagements
-from sim.scenario import of_model
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
+from infoset.sim import Manoeuvre, Outcome, Scenario, Target
+from infoset.sim.bound.pair_flight import middle
+from infoset.sim.draws import Draws, draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.scenario import of_model
 
 Floats = NDArray[np.float64]
 BATCH, SPACE_BATCH = 80, 160

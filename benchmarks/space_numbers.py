@@ -18,12 +18,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments import load_scenario
-from guidance import NoiseKind, TieRule
 from infoset import InitialSet, Model
-from sim import Results, Scenario, simulate
-from sim.results import join
-from sim.scenario import of_model
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind, TieRule
+from infoset.sim import Results, Scenario, simulate
+from infoset.sim.results import join
+from infoset.sim.scenario import of_model
 
 Floats = NDArray[np.float64]
 SEEDS = (1, 2, 3)

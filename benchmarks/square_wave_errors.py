@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.asked_scenario import asked_scenario
-from experiments.interception.study import scenario_title
-from guidance import make_strategy, strategy_names
-from guidance.scripted_noise import ScriptedNoise
-from sim import Scenario
-from sim.draws import draw
-from sim.engagement import Engagements
+from infoset.experiments.interception.study import scenario_title
+from infoset.guidance import make_strategy, strategy_names
+from infoset.guidance.scripted_noise import ScriptedNoise
+from infoset.sim import Scenario
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
 
 HALF_PERIODS = (1, 2, 3, 4, 6, 10, 20, 40, 80, 1000)
 """Half-periods in steps; the last one is a constant bias."""

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from guidance import NoiseKind
-from sim import Campaign, Scenario, simulate
-from sim.parallel import worker_processes
+from infoset.guidance import NoiseKind
+from infoset.sim import Campaign, Scenario, simulate
+from infoset.sim.parallel import worker_processes
 
 Check = Callable[[str, float, float, str], None]
 Work = Callable[[Path], object]
@@ -28,10 +28,10 @@ _SHORT_FLIGHTS = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from experiments import load_scenario
-from experiments.campaigns.run_tables import COLUMNS, summary
+from infoset.experiments import load_scenario
+from infoset.experiments.campaigns.run_tables import COLUMNS, summary
 from infoset import StateBox
-from sim import Campaign, CampaignNoise
+from infoset.sim import Campaign, CampaignNoise
 
 # The last seconds of the interception with three sections: a million of these engagements take minutes.
 whole = load_scenario('asteroid-1997')
@@ -48,7 +48,7 @@ assert summary(result, result.runs(COLUMNS))["runs"].sum() == runs
 
 _COMMAND = """
 import sys
-from experiments.cli import main
+from infoset.experiments.cli import main
 try:
     main(sys.argv[1:])
 except SystemExit as left:

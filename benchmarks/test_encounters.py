@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from experiments.common.input_file import load_problem
-from rendezvous.multipoint import Nodes, best_order, best_times, solve_segments
-from rendezvous.pareto import analyse_coalitions, solve_encounter
-from rendezvous.relative_motion import ClohessyWiltshire
+from infoset.experiments.common.input_file import load_problem
+from infoset.rendezvous.multipoint import Nodes, best_order, best_times, solve_segments
+from infoset.rendezvous.pareto import analyse_coalitions, solve_encounter
+from infoset.rendezvous.relative_motion import ClohessyWiltshire
 from tests.rendezvous.multipoint.dense import solve_dense
 
 Floats = NDArray[np.float64]

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from guidance import NoiseKind
 from infoset import InitialSet, Model
-from sim import Scenario, simulate
-from sim.scenario import of_model
+from infoset.guidance import NoiseKind
+from infoset.sim import Scenario, simulate
+from infoset.sim.scenario import of_model
 
 Check = Callable[[str, float, float, str], None]
 
@@ -38,7 +38,7 @@ class Process:
 def infoset(*arguments: str, cache: Path | None = None) -> Process:
     """Run the command `infoset` in a new process, with another compile cache if `cache` is not None."""
     environment = dict(os.environ) if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    command = [sys.executable, "-m", "experiments", *arguments]
+    command = [sys.executable, "-m", "infoset", *arguments]
     began = time.perf_counter()
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True

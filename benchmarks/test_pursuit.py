@@ -16,9 +16,9 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from experiments.common.input_file import load_problem
-from rendezvous.pursuit_evasion import Game, Solution, solve
-from rendezvous.pursuit_evasion.game import scaled_craft, units_of
+from infoset.experiments.common.input_file import load_problem
+from infoset.rendezvous.pursuit_evasion import Game, Solution, solve
+from infoset.rendezvous.pursuit_evasion.game import scaled_craft, units_of
 
 Floats = NDArray[np.float64]
 Check = Callable[[str, float, float, str], None]

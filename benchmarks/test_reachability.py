@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from benchmarks.conftest import LINES
-from experiments.reachability.command import Reach
-from experiments.reachability.run import COMMAND
+from infoset.experiments.reachability.command import Reach
+from infoset.experiments.reachability.run import COMMAND
 from infoset.geometry.polytope import Polytope
-from rendezvous.reachability import (
+from infoset.rendezvous.reachability import (
     MotionModel,
     ReachabilityProblem,
     SetKind,
@@ -26,8 +26,8 @@ from rendezvous.reachability import (
     motion_of,
     solve,
 )
-from rendezvous.reachability.problem import Block
-from rendezvous.relative_motion import EllipticOrbit
+from infoset.rendezvous.reachability.problem import Block
+from infoset.rendezvous.relative_motion import EllipticOrbit
 from tests.rendezvous.reachability.rationals import rational_sets
 
 Floats = NDArray[np.float64]

@@ -20,9 +20,9 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from shapely.geometry import LineString, Polygon
 
 from infoset import InformationSet, SetModel
-from sim import Scenario, simulate
-from sim.draws import draw
-from sim.engagement import Engagements, Step
+from infoset.sim import Scenario, simulate
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements, Step
 
 Floats = NDArray[np.float64]
 Check = Callable[[str, float, float, str], None]

@@ -27,10 +27,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from experiments import load_scenario
-from experiments.common.errors import InputError
-from experiments.interception.trajectory_file import scenario_of
 from infoset.arrays import Floats
+from infoset.experiments import load_scenario
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.trajectory_file import scenario_of
 
 SUN_M3_S2 = 1.32712440018e20
 DAY_S = 86_400

@@ -19,10 +19,10 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.random_scenarios import random_scenario
-from experiments import load_scenario
-from guidance import NoiseKind
 from infoset import Model
-from sim import NothingCountsError, Scenario, find_worst, lower_bound, simulate
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import NothingCountsError, Scenario, find_worst, lower_bound, simulate
 
 BUILT_IN = ("asteroid-1997", "comet-fast", "asteroid-1997-space", "dart-2022", "deep-impact-2005", "haiv-2013")
 STRATEGIES = ("symmetric-miss", "least-effort", "patient")

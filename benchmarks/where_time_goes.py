@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments import load_scenario
-from guidance import NoiseKind
 from infoset.engine import replays, section_passes, set_state
-from sim import Scenario
-from sim.draws import draw
-from sim.engagement import Engagements
-from sim.kepler import KeplerMotion
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Scenario
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.kepler import KeplerMotion
 
 ROUNDS = 8
 SECTION_STEPS = "prediction, cut and summary of the sections"

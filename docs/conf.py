@@ -12,11 +12,10 @@ from types import ModuleType
 from numpydoc import xref
 from sphinx.application import Sphinx
 
-import guidance
 import infoset
-import sim
+from infoset import guidance, sim
 from infoset.geometry import polytope
-from rendezvous import multipoint, pareto, pursuit_evasion, reachability, relative_motion
+from infoset.rendezvous import multipoint, pareto, pursuit_evasion, reachability, relative_motion
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "_extensions"))
@@ -56,38 +55,38 @@ nitpick_ignore_regex = [
 nitpick_ignore = [
     ("py:class", f"{module}.{name}")
     for module, names in {
-        "experiments.multipoint.file": ("MultipointProblem",),
-        "experiments.observer.file": ("ObserverProblem",),
-        "experiments.pareto.file": ("ParetoProblem",),
-        "experiments.pursuit.file": ("PursuitProblem",),
-        "experiments.reachability.file": ("Rendezvous",),
-        "experiments.reachability.system_file": ("ReachableSystem",),
-        "guidance.predictive": ("ManoeuvreState",),
-        "guidance.proportional_navigation": ("PulseState",),
+        "infoset.experiments.multipoint.file": ("MultipointProblem",),
+        "infoset.experiments.observer.file": ("ObserverProblem",),
+        "infoset.experiments.pareto.file": ("ParetoProblem",),
+        "infoset.experiments.pursuit.file": ("PursuitProblem",),
+        "infoset.experiments.reachability.file": ("Rendezvous",),
+        "infoset.experiments.reachability.system_file": ("ReachableSystem",),
+        "infoset.guidance.predictive": ("ManoeuvreState",),
+        "infoset.guidance.proportional_navigation": ("PulseState",),
         "infoset.geometry.polytope.nearest": ("NearestPair",),
-        "sim.scenario": ("_Speed",),
+        "infoset.sim.scenario": ("_Speed",),
         "infoset.observer.sets": ("Polygons", "Polytopes", "Motion"),
         "infoset.observer.steps": ("Strips",),
-        "rendezvous.relative_motion.time_varying": ("HeldSegment",),
+        "infoset.rendezvous.relative_motion.time_varying": ("HeldSegment",),
         "infoset.limits": ("Line",),
         "infoset.sensors.sensor": ("Measurements", "Geometry", "Apart", "Cuttable"),
         "infoset.sensors.bearing": ("RangeOrRanges",),
         "infoset.set_queries": ("SetQueries",),
         "infoset.engine.set_state": ("SetState",),
-        "rendezvous.multipoint._shooting": ("ShotPath",),
-        "rendezvous.multipoint.segments": ("LinearPath",),
-        "sim.covariance": ("Covariance",),
-        "sim.engagement": ("Step",),
-        "rendezvous.pursuit_evasion._pair": ("Node",),
-        "rendezvous.pursuit_evasion.paths": ("SteeredPath",),
-        "rendezvous.reachability.sets": ("ExactSets", "LiftedSets"),
-        "rendezvous.reachability.problem": ("Block",),
-        "rendezvous.reachability.admissible": ("Lifted",),
-        "rendezvous.reachability.optimum": ("BlockOptimum",),
-        "sim.bound.pair_of_motions": ("TruthPair",),
-        "sim.parallel": ("Task",),
-        "sim.storage.campaign_folder": ("CampaignFolder",),
-        "sim.storage.manifest": ("Manifest",),
+        "infoset.rendezvous.multipoint._shooting": ("ShotPath",),
+        "infoset.rendezvous.multipoint.segments": ("LinearPath",),
+        "infoset.sim.covariance": ("Covariance",),
+        "infoset.sim.engagement": ("Step",),
+        "infoset.rendezvous.pursuit_evasion._pair": ("Node",),
+        "infoset.rendezvous.pursuit_evasion.paths": ("SteeredPath",),
+        "infoset.rendezvous.reachability.sets": ("ExactSets", "LiftedSets"),
+        "infoset.rendezvous.reachability.problem": ("Block",),
+        "infoset.rendezvous.reachability.admissible": ("Lifted",),
+        "infoset.rendezvous.reachability.optimum": ("BlockOptimum",),
+        "infoset.sim.bound.pair_of_motions": ("TruthPair",),
+        "infoset.sim.parallel": ("Task",),
+        "infoset.sim.storage.campaign_folder": ("CampaignFolder",),
+        "infoset.sim.storage.manifest": ("Manifest",),
     }.items()
     for name in names
 ]

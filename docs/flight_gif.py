@@ -8,9 +8,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from experiments import load_scenario
-from experiments.interception.figures.animation import animate
-from sim import fly_one
+from infoset import fly_one, load_scenario
+from infoset.experiments.interception.figures.animation import animate
 
 FRAMES = 18
 

@@ -14,16 +14,16 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from experiments.campaigns.command import Campaign, Report, Sweep
-from experiments.common.errors import InputError, on_a_screen
-from experiments.file_commands import problems, scenarios
-from experiments.interception.command import Adversary, Bound, Compare, Engage, Experiment, Replay
-from experiments.multipoint.command import Multipoint
-from experiments.observer.command import Observe
-from experiments.pareto.command import Pareto
-from experiments.pursuit.command import Pursuit, PursuitMap
-from experiments.reachability.command import Reach
-from experiments.reproduce import Reproduce
+from infoset.experiments.campaigns.command import Campaign, Report, Sweep
+from infoset.experiments.common.errors import InputError, on_a_screen
+from infoset.experiments.file_commands import problems, scenarios
+from infoset.experiments.interception.command import Adversary, Bound, Compare, Engage, Experiment, Replay
+from infoset.experiments.multipoint.command import Multipoint
+from infoset.experiments.observer.command import Observe
+from infoset.experiments.pareto.command import Pareto
+from infoset.experiments.pursuit.command import Pursuit, PursuitMap
+from infoset.experiments.reachability.command import Reach
+from infoset.experiments.reproduce import Reproduce
 
 app = typer.Typer(
     name="infoset",
@@ -41,7 +41,7 @@ EXTRAS = {
 BACKEND = "MPLBACKEND"
 """Environment variable with the backend of Matplotlib."""
 RUNS: dict[type, str] = {}
-"""The module in `experiments` whose function ``run`` takes the options, by the class of the options."""
+"""The module in `infoset.experiments` whose function ``run`` takes the options, by the class of the options."""
 
 
 def _add(name: str, options: type, run: str, *, example: str) -> None:
@@ -51,7 +51,7 @@ def _add(name: str, options: type, run: str, *, example: str) -> None:
     arguments, and its docstring is the help; the first sentence stands in the list of commands. The module `run` is
     imported when the command runs, so that ``--help`` does not wait for it.
     """
-    RUNS[options] = f"experiments.{run}"
+    RUNS[options] = f"infoset.experiments.{run}"
     hints = get_type_hints(options, include_extras=True)
 
     def command(**values: Any) -> None:

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from experiments.common.built_in_files import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files
-from experiments.common.options import AsJson, Overwrite, Quiet, Settings
+from infoset.experiments.common.built_in_files import PROBLEMS, SCENARIO, BuiltIn, built_in, built_in_files
+from infoset.experiments.common.options import AsJson, Overwrite, Quiet, Settings
 
 BuiltInName = Annotated[str, typer.Argument(metavar="NAME", help="A built-in name.")]
 FileName = Annotated[str, typer.Argument(metavar="FILE", help="A file, or a built-in name.")]
@@ -105,7 +105,7 @@ def _named(text: str, name: str, like: str) -> str:
 
 def _write(file: Path, text: str, note: str, overwrite: bool, quiet: bool) -> None:
     """Write a new file, and print a note about it on stderr; - is stdout."""
-    from experiments.common.output import STDOUT, write_file
+    from infoset.experiments.common.output import STDOUT, write_file
 
     if str(file) == STDOUT:
         typer.echo(text, nl=False)
@@ -116,7 +116,7 @@ def _write(file: Path, text: str, note: str, overwrite: bool, quiet: bool) -> No
 
 
 def _print_list(files: Sequence[BuiltIn]) -> None:
-    from experiments.common.screen import number_table, show
+    from infoset.experiments.common.screen import number_table, show
 
     names = ("name", "kind", "description")
     table = number_table(*names, left=len(names))
@@ -127,18 +127,18 @@ def _print_list(files: Sequence[BuiltIn]) -> None:
 
 def _print_check(file: str, settings: Sequence[str] | None, kinds: Sequence[str], json: bool, quiet: bool) -> None:
     """Check a file of one of these kinds; print its name, fingerprint, schedule and warnings."""
-    from experiments.common.input_file import load_problem
-    from experiments.common.output import to_json
-    from experiments.common.screen import say_warnings
-    from experiments.interception.scenario_file import (
+    from infoset.experiments.common.input_file import load_problem
+    from infoset.experiments.common.output import to_json
+    from infoset.experiments.common.screen import say_warnings
+    from infoset.experiments.interception.scenario_file import (
         all_warnings,
         flight_facts,
         load_scenario,
         possible_miss_json,
         schedule_json,
     )
-    from sim.storage.codec import fingerprint
-    from sim.versions import versions
+    from infoset.sim.storage.codec import fingerprint
+    from infoset.sim.versions import versions
 
     read: Any
     if SCENARIO in kinds:
@@ -174,9 +174,9 @@ def from_states(
     quiet: Quiet = False,
 ) -> None:
     """Make a scenario from the states of a spacecraft and an object, and their covariance."""
-    from experiments.common.screen import say_warnings
-    from experiments.interception.scenario_file import all_warnings, load_scenario
-    from experiments.interception.trajectory_file import KnownTarget, scenario_of
+    from infoset.experiments.common.screen import say_warnings
+    from infoset.experiments.interception.scenario_file import all_warnings, load_scenario
+    from infoset.experiments.interception.trajectory_file import KnownTarget, scenario_of
 
     model = load_scenario(like)
     found = scenario_of(file, model, sigma, KnownTarget(body_radius_m, disturbance), files_in or ())

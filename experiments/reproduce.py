@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import Json, Overwrite, Quiet
+from infoset.experiments.common.options import Json, Overwrite, Quiet
 
 
 @dataclass(frozen=True)

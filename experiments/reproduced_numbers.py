@@ -12,13 +12,13 @@ from typing import Any
 import typer
 from rich.text import Text
 
-from experiments.common.output import output_of, to_json
-from experiments.common.printed_numbers import Comparison, Paper, PrintedNumber, Progress, Verdict, read_paper
-from experiments.common.screen import Part, progress_bar, show
-from experiments.multipoint.command import Multipoint
-from experiments.pursuit.command import Pursuit
-from experiments.reproduce import Reproduce
-from sim.versions import versions
+from infoset.experiments.common.output import output_of, to_json
+from infoset.experiments.common.printed_numbers import Comparison, Paper, PrintedNumber, Progress, Verdict, read_paper
+from infoset.experiments.common.screen import Part, progress_bar, show
+from infoset.experiments.multipoint.command import Multipoint
+from infoset.experiments.pursuit.command import Pursuit
+from infoset.experiments.reproduce import Reproduce
+from infoset.sim.versions import versions
 
 PAPERS = ("interception", "pareto", "multipoint", "reachability", "pursuit")
 COMMANDS: Mapping[str, type] = {"multipoint": Multipoint, "pursuit": Pursuit}
@@ -30,9 +30,9 @@ DISAGREED = 1
 def reproduce_paper(paper: Paper, progress: Progress) -> tuple[Comparison, ...]:
     """Compute and compare the numbers of a paper; `progress` receives the fraction done."""
     if paper.name not in COMMANDS:
-        ours = import_module(f"experiments.{paper.name}.published").compute(progress)
+        ours = import_module(f"infoset.experiments.{paper.name}.published").compute(progress)
     else:
-        command, ours = import_module(f"experiments.{paper.name}.run").COMMAND, {}
+        command, ours = import_module(f"infoset.experiments.{paper.name}.run").COMMAND, {}
         for done, (source, numbers) in enumerate(paper.tables.items(), start=1):
             report = command.report(COMMANDS[paper.name](**paper.options[source]))
             results = json.loads(to_json(command.to_json(report)))

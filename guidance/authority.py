@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from guidance.situation import Situation
-from guidance.symmetric_impulse import range_at_impulse
-from guidance.thruster import Thruster
 from infoset.arrays import Floats, Integers
+from infoset.guidance.situation import Situation
+from infoset.guidance.symmetric_impulse import range_at_impulse
+from infoset.guidance.thruster import Thruster
 
 
 def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guidance.noise import LineOfSight, TieRule, draws_of_step, need_draws
-from infoset import BearingSensor, InformationSetView, PredictedMiss, RangeSensor
 from infoset.arrays import Flags, Floats
-from infoset.sensors import Measurements
+from infoset.engine.predicted_miss import PredictedMiss
+from infoset.guidance.noise import LineOfSight, TieRule, draws_of_step, need_draws
+from infoset.information_set import InformationSetView
+from infoset.sensors import BearingSensor, Measurements, RangeSensor
 
 TIE_TOLERANCE = 1e-6
 
@@ -41,7 +42,7 @@ class GameNoise:
     -----
     The errors that keep an extreme have one sign in most steps, so that the true state stays near the middle of a wide
     set. Before a cut-off, errors that change from one bound to the other are worse: the true state is then at an end of
-    the set (`sim.closed_form.worst_shift_m`).
+    the set (`infoset.sim.closed_form.worst_shift_m`).
 
     Each axis has its own extremes and its own worse one; the measured angles are chosen for each axis. In space, the
     range has the rule of the plane, for the corner (worse extreme of y, worse extreme of z) of the rectangle of

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from guidance.scripted_noise import RandomNoise
 from infoset.arrays import Floats
+from infoset.guidance.scripted_noise import RandomNoise
 
 _SMALLEST = 2.0**-54
 """Half of the smallest distance of a random number from an end of [0, 1]: the quantile of a Gaussian is finite."""

@@ -7,11 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from guidance.estimate import MissEstimate
-from guidance.situation import Situation
-from infoset import BearingSensor, RangeSensor, SetModel
 from infoset.arrays import Flags, Floats
+from infoset.guidance.estimate import MissEstimate
+from infoset.guidance.situation import Situation
 from infoset.limits import Checked, NotNegative
+from infoset.model import SetModel
+from infoset.sensors import BearingSensor, RangeSensor
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a state: lateral offset, its rate, range, closing speed and lateral acceleration."""

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from guidance.authority import correctable_later_m
-from guidance.situation import Situation
-from guidance.symmetric_impulse import range_at_impulse
 from infoset._compile import entry
 from infoset.arrays import Floats
+from infoset.guidance.authority import correctable_later_m
+from infoset.guidance.situation import Situation
+from infoset.guidance.symmetric_impulse import range_at_impulse
 
 PARTS = 4
 """Parts of the labels between two sections: the deciding time to go is often between sections."""

@@ -9,8 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from infoset import InformationSetView
 from infoset.arrays import Floats
+from infoset.information_set import InformationSetView
 from infoset.limits import real_array, real_values, shown
 from infoset.sensors import Measurements, Sensor
 

@@ -7,10 +7,10 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from guidance.authority import correctable_later_m
-from guidance.situation import Situation
-from guidance.symmetric_impulse import range_at_impulse, symmetric_impulse
 from infoset.arrays import Floats
+from infoset.guidance.authority import correctable_later_m
+from infoset.guidance.situation import Situation
+from infoset.guidance.symmetric_impulse import range_at_impulse, symmetric_impulse
 from infoset.limits import Checked, Limits
 
 LAST_SECONDS_S = 3.0

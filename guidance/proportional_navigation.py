@@ -7,9 +7,9 @@ from typing import Annotated
 
 import numpy as np
 
-from guidance.kalman import KalmanBank
-from guidance.situation import Situation
 from infoset.arrays import Floats
+from infoset.guidance.kalman import KalmanBank
+from infoset.guidance.situation import Situation
 from infoset.limits import Checked, Limits, NotNegative
 
 

@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
 
-from guidance.kalman import Kalman
-from guidance.least_effort import LeastEffort
-from guidance.patient import Patient
-from guidance.predictive import Predictive
-from guidance.proportional_navigation import ProportionalNavigation
-from guidance.strategy import Strategy
-from guidance.symmetric_miss import SymmetricMiss
-from guidance.zero_effort import ZeroEffortMiss
+from infoset.guidance.kalman import Kalman
+from infoset.guidance.least_effort import LeastEffort
+from infoset.guidance.patient import Patient
+from infoset.guidance.predictive import Predictive
+from infoset.guidance.proportional_navigation import ProportionalNavigation
+from infoset.guidance.strategy import Strategy
+from infoset.guidance.symmetric_miss import SymmetricMiss
+from infoset.guidance.zero_effort import ZeroEffortMiss
 
 _STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType(
     {kind.name: kind for kind in (SymmetricMiss, LeastEffort, Patient, ZeroEffortMiss, Kalman)}

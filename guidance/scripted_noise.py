@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from guidance.noise import LineOfSight, draws_of_step, need_draws
-from infoset import Camera, InformationSetView
 from infoset.arrays import Floats
-from infoset.sensors import Measurements
+from infoset.guidance.noise import LineOfSight, draws_of_step, need_draws
+from infoset.information_set import InformationSetView
+from infoset.sensors import Camera, Measurements
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from guidance.thruster import Thruster
-from infoset import InformationSetView, PredictedMiss
 from infoset.arrays import Flags, Floats
+from infoset.engine.predicted_miss import PredictedMiss
+from infoset.guidance.thruster import Thruster
+from infoset.information_set import InformationSetView
 from infoset.sensors import Measurements, Sensor
 
 

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from guidance.situation import Situation
 from infoset.arrays import Flags, Floats
+from infoset.guidance.situation import Situation
 from infoset.limits import shown
 
 

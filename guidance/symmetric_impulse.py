@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from infoset import PredictedMiss
 from infoset.arrays import Floats
+from infoset.engine.predicted_miss import PredictedMiss
 from infoset.limits import POSITIVE
 
 

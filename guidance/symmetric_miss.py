@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from guidance.situation import Situation
-from guidance.symmetric_impulse import symmetric_impulse
 from infoset.arrays import Floats
+from infoset.guidance.situation import Situation
+from infoset.guidance.symmetric_impulse import symmetric_impulse
 
 
 class SymmetricMiss:

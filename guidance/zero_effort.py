@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from guidance.situation import Situation
-from guidance.symmetric_impulse import range_at_impulse
 from infoset.arrays import Floats
+from infoset.guidance.situation import Situation
+from infoset.guidance.symmetric_impulse import range_at_impulse
 
 
 class ZeroEffortMiss:

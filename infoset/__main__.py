@@ -1,7 +1,19 @@
-"""The command `infoset` as ``python -m infoset``."""
+"""The command `infoset`, and ``python -m infoset``."""
 
-import runpy
+from __future__ import annotations
+
+import sys
+
+
+def main() -> None:
+    """Run the command `infoset`; an interrupt while its modules are loaded ends it with code 130 too."""
+    try:
+        from infoset.experiments.cli import main as run
+
+        run()
+    except KeyboardInterrupt:
+        sys.exit(130)
+
 
 if __name__ == "__main__":
-    # By name: the command line is in `experiments`, a layer that no module of `infoset` imports.
-    runpy.run_module("experiments", run_name="__main__", alter_sys=True)
+    main()

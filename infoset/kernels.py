@@ -26,12 +26,14 @@ F = TypeVar("F", bound=Callable[..., object])
 JIT: Any = njit
 CONFIG: Any = config
 """Numba's decorator and configuration, with the options that their types leave out."""
-PACKAGES = ("infoset", "guidance", "sim", "rendezvous")
+HERE = Path(__file__).parent
+BESIDE = ("guidance", "sim", "rendezvous", "experiments")
+"""Packages of the project whose folders are beside this one in a checkout, and inside it in an installation."""
 VARIABLE = "NUMBA_CACHE_DIR"
 LOGGER = logging.getLogger("infoset.kernels")
 """Logger of the notice; without any configuration of logging it is printed on stderr."""
 
-_IMPORT = re.compile(rf"^\s*from ((?:{'|'.join(PACKAGES)})[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+_IMPORT = re.compile(r"^\s*from (infoset(?:\.\w+)*) import (\([^)]*\)|.*)", re.MULTILINE)
 
 
 class Kernels:
@@ -99,9 +101,9 @@ def cache_folder(kernel: Callable[..., object]) -> Path | None:
     module, file = kernel.__module__, Path(kernel.__code__.co_filename)
     try:
         root = Path(os.environ.get(VARIABLE) or _user_folder())
-        folder = root / f"{module}-{_hash_of_sources(file.parents[module.count('.')], file)}"
+        folder = root / f"{module}-{_hash_of_sources(file)}"
         folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError, IndexError):  # a read-only folder, a user without a home, code without a file
+    except (OSError, RuntimeError):  # a read-only folder, a user without a home, code without a file
         return None
     return folder if os.access(folder, os.W_OK) else None
 
@@ -110,24 +112,32 @@ def _user_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "infoset"
 
 
-def _hash_of_sources(root: Path, file: Path) -> str:
-    """Return a hash of a source file and of all files of the project that it imports, directly or not."""
+def _hash_of_sources(file: Path) -> str:
+    """Return a hash of a source file and of all files of the project that it imports, directly or not.
+
+    The texts are in the order of their contents, so that it does not depend on the folder of the project.
+    """
     files = [file]
     for source in files:
-        files += [path for path in _imports(root, source) if path not in files]
-    return hashlib.sha256("".join(map(_text, sorted(files))).encode()).hexdigest()[:16]
+        files += [path for path in _imports(source) if path not in files]
+    return hashlib.sha256("".join(sorted(map(_text, files))).encode()).hexdigest()[:16]
 
 
 @cache
-def _imports(root: Path, file: Path) -> tuple[Path, ...]:
+def _imports(file: Path) -> tuple[Path, ...]:
     """Return the files of the project that a source file imports."""
     return tuple(
         dict.fromkeys(
-            path
-            for package, names in _IMPORT.findall(_text(file))
-            for path in _modules(root / package.replace(".", "/"), names)
+            path for package, names in _IMPORT.findall(_text(file)) for path in _modules(_path_of(package), names)
         )
     )
+
+
+def _path_of(module: str) -> Path:
+    """Return the folder of a package, or the file of a module without its suffix."""
+    _, *names = module.split(".")
+    beside = bool(names) and names[0] in BESIDE and not (HERE / names[0]).is_dir()
+    return (HERE.parent if beside else HERE).joinpath(*names)
 
 
 def _modules(package: Path, names: str) -> Iterator[Path]:
@@ -174,7 +184,7 @@ class CompileNotice(event.Listener):
     def on_start(self, event: Any) -> None:
         """Count a kernel that is compiled; give the notice at the first one."""
         function = event.data["dispatcher"].py_func
-        if not function.__module__.startswith(PACKAGES):
+        if not function.__module__.startswith("infoset."):
             return
         if self._depth == 0:
             self._began_s = time.perf_counter()
@@ -186,7 +196,7 @@ class CompileNotice(event.Listener):
     def on_end(self, event: Any) -> None:
         """Add the time of a kernel that Python called; it contains that of the kernels within it."""
         function = event.data["dispatcher"].py_func
-        if not function.__module__.startswith(PACKAGES):
+        if not function.__module__.startswith("infoset."):
             return
         self._depth -= 1
         if self._depth == 0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rendezvous._arrays import Floats
+from infoset.rendezvous._arrays import Floats
 
 
 def halton(dimension: int, count: int) -> Floats:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853
 
-from rendezvous._arrays import Floats
-from rendezvous._compile import allocation_free
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous._compile import allocation_free
 
 STAGES = 12
 _NODES = np.ascontiguousarray(DOP853.C[:STAGES])

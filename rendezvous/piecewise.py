@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rendezvous._arrays import Floats
+from infoset.rendezvous._arrays import Floats
 
 NODES = 12
 RESOLVED = 1e-11

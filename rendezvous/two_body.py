@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous._arrays import Floats
+from infoset.rendezvous._arrays import Floats
 
 _STRAIGHT = 1e-15
 """A motion is straight if the square of its transverse speed is below this share of that of its speed: rounding."""

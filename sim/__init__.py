@@ -1,19 +1,19 @@
 """The simulator: scenarios, true motion, closed loop, records, campaigns, bounds and statistics."""
 
-from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
-from sim.bound.linear_program import BoundError
-from sim.bound.lower_bound import LowerBound, lower_bound
-from sim.campaign import Campaign
-from sim.closed_form import possible_miss_of
-from sim.covariance import Covariance
-from sim.miss_cause import MissCause
-from sim.parallel import CampaignNoise
-from sim.record import Inconsistency, Record, fly_one
-from sim.requirement import HitRequirement, Requirement
-from sim.results import GuaranteeWarning, Outcome, Results
-from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
-from sim.simulate import simulate
-from sim.statistics import (
+from infoset.sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
+from infoset.sim.bound.linear_program import BoundError
+from infoset.sim.bound.lower_bound import LowerBound, lower_bound
+from infoset.sim.campaign import Campaign
+from infoset.sim.closed_form import possible_miss_of
+from infoset.sim.covariance import Covariance
+from infoset.sim.miss_cause import MissCause
+from infoset.sim.parallel import CampaignNoise
+from infoset.sim.record import Record, RecordedInconsistency, fly_one
+from infoset.sim.requirement import HitRequirement, Requirement
+from infoset.sim.results import GuaranteeWarning, Outcome, Results
+from infoset.sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
+from infoset.sim.simulate import simulate
+from infoset.sim.statistics import (
     Distribution,
     HitEstimate,
     QuantileEstimate,
@@ -21,8 +21,8 @@ from sim.statistics import (
     estimate_hits,
     estimate_quantiles,
 )
-from sim.stopping_rule import QuantileName, StoppingRule
-from sim.storage import Axis
+from infoset.sim.stopping_rule import QuantileName, StoppingRule
+from infoset.sim.storage import Axis
 
 __all__ = [
     "Axis",
@@ -35,7 +35,6 @@ __all__ = [
     "GuaranteeWarning",
     "HitEstimate",
     "HitRequirement",
-    "Inconsistency",
     "LowerBound",
     "Manoeuvre",
     "MissCause",
@@ -45,6 +44,7 @@ __all__ = [
     "QuantileEstimate",
     "QuantileName",
     "Record",
+    "RecordedInconsistency",
     "Requirement",
     "Results",
     "Scenario",

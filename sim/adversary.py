@@ -14,20 +14,21 @@ from enum import Enum
 
 import numpy as np
 
-from guidance import GameNoise, LineOfSight, MeasurementNoise, Strategy, make_strategy
-from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
-from infoset import InformationSetView, StateBox
 from infoset.arrays import Floats
+from infoset.guidance import GameNoise, LineOfSight, MeasurementNoise, Strategy, make_strategy
+from infoset.guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
+from infoset.information_set import InformationSetView
 from infoset.limits import COUNT, WHOLE
+from infoset.model import StateBox
 from infoset.sensors import Measurements, Sensor
-from sim.adversary_plans import ANGLE, Game, Planner, Plans, by_axis
-from sim.closed_form import worst_shift_m
-from sim.draws import draw
-from sim.engagement import Engagements
-from sim.record import Record, fly_one
-from sim.results import Results
-from sim.scenario import Scenario, with_strategy
-from sim.target import constant_side
+from infoset.sim.adversary_plans import ANGLE, Game, Planner, Plans, by_axis
+from infoset.sim.closed_form import worst_shift_m
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.record import Record, fly_one
+from infoset.sim.results import Results
+from infoset.sim.scenario import Scenario, with_strategy
+from infoset.sim.target import constant_side
 
 WORST_FOUND = "worst-found"
 """Name of the noise with the errors that a search found, in records."""
@@ -49,7 +50,7 @@ class Objective(Enum):
     """What a search maximises: the value of an engagement."""
 
     ANY_STATE = "any-state"
-    """The maximum miss of a state that the set contained when control ended for its label (`sim.label_ends`).
+    """The maximum miss of a state that the set contained when control ended for its label (`infoset.sim.label_ends`).
 
     All these states agree with what was measured until then, so that the truth can be chosen among them afterwards. The
     sections contain at least all states that agree with the measurements. Where the set became empty, the miss of the

@@ -8,13 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from guidance import GameNoise, TieRule
-from guidance.game_noise import SwitchingNoise
-from infoset import BearingSensor
 from infoset.arrays import Floats, Integers
-from infoset.sensors import Sensor
-from sim.scenario import Manoeuvre, Scenario, corners
-from sim.target import amplitudes_m_s2
+from infoset.guidance import GameNoise, TieRule
+from infoset.guidance.game_noise import SwitchingNoise
+from infoset.sensors import BearingSensor, Sensor
+from infoset.sim.scenario import Manoeuvre, Scenario, corners
+from infoset.sim.target import amplitudes_m_s2
 
 MAX_CHANGES = 3
 """Maximum number of changes from a plan to the next."""

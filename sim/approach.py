@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from infoset import StateBox
 from infoset.arrays import Floats
-from sim.covariance import Covariance, covariance_of
-from sim.results import b_plane
-from sim.scenario import Sun
+from infoset.model import StateBox
+from infoset.sim.covariance import Covariance, covariance_of
+from infoset.sim.results import b_plane
+from infoset.sim.scenario import Sun
 
 TOLERANCE = 1e-12
 """Relative error of a step of the integration."""

@@ -10,17 +10,17 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from guidance import Strategy
-from guidance.noise import NoiseSource
+from infoset.guidance import Strategy
+from infoset.guidance.noise import NoiseSource
 from infoset.limits import COUNT, WHOLE, Limits
-from sim.parallel import CampaignNoise, Task, simulate_tasks
-from sim.requirement import AnyRequirement
-from sim.scenario import Scenario, noise_name, strategy_name
-from sim.simulate import ENGAGEMENTS_AT_ONCE
-from sim.stopping_rule import StoppingRule
-from sim.storage import MANIFEST, Axis, CampaignFolder, Manifest, fingerprint, read_manifest
-from sim.undecided_cells import UndecidedCells
-from sim.versions import versions
+from infoset.sim.parallel import CampaignNoise, Task, simulate_tasks
+from infoset.sim.requirement import AnyRequirement
+from infoset.sim.scenario import Scenario, noise_name, strategy_name
+from infoset.sim.simulate import ENGAGEMENTS_AT_ONCE
+from infoset.sim.stopping_rule import StoppingRule
+from infoset.sim.storage import MANIFEST, Axis, CampaignFolder, Manifest, fingerprint, read_manifest
+from infoset.sim.undecided_cells import UndecidedCells
+from infoset.sim.versions import versions
 
 FEWEST_CHUNKS = 256
 MAX_CHUNK = 4096

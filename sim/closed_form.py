@@ -8,10 +8,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from infoset import Camera, SetModel
 from infoset.arrays import Floats
-from sim.scenario import Scenario
-from sim.schedule import image_times_s
+from infoset.model import SetModel
+from infoset.sensors import Camera
+from infoset.sim.scenario import Scenario
+from infoset.sim.schedule import image_times_s
 
 FloatOrFloats = TypeVar("FloatOrFloats", float, Floats)
 

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import csv
 import inspect
+import io
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum
 from functools import cache
 from typing import Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset.limits import MAXIMUM
+
+Cell = str | int | float | bool | None
+"""A cell of a table; None is unknown."""
 
 _Owner = TypeVar("_Owner")
 
@@ -88,6 +99,73 @@ def values_of(owner: object, column: Column) -> list[Any]:
         values = values[:, column.component]
     plain: list[Any] = values.tolist()
     return plain
+
+
+def fields_of(owner: Any, table: Mapping[str, Sequence[Cell]]) -> dict[str, Any]:
+    """Return the arguments of a dataclass from its columns by name: the inverse of `values_of`.
+
+    Optional columns may be missing. `ValueError` if another column is missing or unknown, if the columns differ in
+    length, or if a value is not of the column's kind.
+    """
+    declared = {column.name: column for column in columns_of(owner)}
+    unknown = [name for name in table if name not in declared]
+    if unknown:
+        raise ValueError(f"column {unknown[0]!r} is not known")
+    missing = [name for name, column in declared.items() if name not in table and not column.optional]
+    if missing:
+        raise ValueError(f"column {missing[0]!r} is missing")
+    if not all(isinstance(cells, list) for cells in table.values()):
+        raise ValueError("a column is no list")
+    if len({len(cells) for cells in table.values()}) != 1:
+        raise ValueError("its columns differ in length")
+
+    arguments: dict[str, Any] = {}
+    for column in declared.values():
+        if column.derived:
+            continue
+        if column.name not in table:
+            arguments.setdefault(column.field, None)
+            continue
+        values = _array_of(column, table[column.name])
+        if column.component is None:
+            arguments[column.field] = values
+        elif arguments.get(column.field) is None:
+            arguments[column.field] = values[:, None]
+        else:
+            arguments[column.field] = np.column_stack([arguments[column.field], values])
+    return arguments
+
+
+def _array_of(column: Column, cells: Sequence[Cell]) -> Any:
+    """Return the values of a column: a tuple of members of an enumeration, or an array, masked if it is nullable."""
+    is_known = np.array([cell is not None for cell in cells], dtype=bool)
+    if not column.nullable and not is_known.all():
+        raise ValueError(f"column {column.name!r} has an unknown value")
+    if issubclass(column.kind, Enum):
+        return tuple(None if cell is None else column.kind(cell) for cell in cells)
+
+    accepted = (int, float) if column.kind is float else column.kind
+    for cell in cells:
+        is_flag_as_number = isinstance(cell, bool) and column.kind is not bool
+        if cell is not None and (is_flag_as_number or not isinstance(cell, accepted)):
+            raise ValueError(f"column {column.name!r} has a value that is no {column.kind.__name__}")
+        if isinstance(cell, int | float) and not abs(cell) <= MAXIMUM:
+            raise ValueError(f"column {column.name!r} has a number beyond {MAXIMUM:g}")
+    values: NDArray[Any] = np.array([0 if cell is None else cell for cell in cells], dtype=column.kind)
+    return np.ma.MaskedArray(values, mask=~is_known) if column.nullable else values
+
+
+def csv_text(names: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
+    """Return a table as comma-separated values, the names of the columns in the first line.
+
+    None is an empty cell, True and False are ``true`` and ``false``, numbers have all their digits.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    for row in rows:
+        writer.writerow([str(cell).lower() if isinstance(cell, bool) else cell for cell in row])
+    return text.getvalue()
 
 
 def documented(owner: type[_Owner]) -> type[_Owner]:

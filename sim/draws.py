@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guidance import NoiseKind, TieRule
 from infoset.arrays import Floats, Integers
-from sim.covariance import Covariance
-from sim.gravity import max_impulses_m_s, with_gravity
-from sim.scenario import Scenario, corners
+from infoset.guidance import NoiseKind, TieRule
+from infoset.sim.covariance import Covariance
+from infoset.sim.gravity import max_impulses_m_s, with_gravity
+from infoset.sim.scenario import Scenario, corners
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
 """Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance import (
+from infoset.arrays import Flags, Floats, some
+from infoset.engine.predicted_miss import PredictedMiss
+from infoset.guidance import (
     GameNoise,
     LineOfSight,
     MeasurementNoise,
@@ -19,24 +21,23 @@ from guidance import (
     Strategy,
     make_strategy,
 )
-from guidance.gaussian_noise import gaussian_noise
-from guidance.noise import NoiseSource, checked_measurements
-from guidance.strategy import checked_impulses
-from guidance.thruster import MIN_FLOAT, modulus
-from infoset import BearingSensor, InformationSet, InformationSetView, PredictedMiss
-from infoset.arrays import Flags, Floats, some
-from infoset.sensors import Measurements
+from infoset.guidance.gaussian_noise import gaussian_noise
+from infoset.guidance.noise import NoiseSource, checked_measurements
+from infoset.guidance.strategy import checked_impulses
+from infoset.guidance.thruster import MIN_FLOAT, modulus
+from infoset.information_set import InformationSet, InformationSetView
+from infoset.sensors import BearingSensor, Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
-from sim.closed_form import worst_shift_m
-from sim.draws import Draws
-from sim.gravity import on_board_model
-from sim.kepler import KeplerMotion, Sight
-from sim.label_ends import LabelEnds
-from sim.miss_cause import DecisionLog
-from sim.results import Outcome, Results
-from sim.scenario import Scenario
-from sim.target import acceleration_m_s2, constant_side
-from sim.truth_section import TruthSection
+from infoset.sim.closed_form import worst_shift_m
+from infoset.sim.draws import Draws
+from infoset.sim.gravity import on_board_model
+from infoset.sim.kepler import KeplerMotion, Sight
+from infoset.sim.label_ends import LabelEnds
+from infoset.sim.miss_cause import DecisionLog
+from infoset.sim.results import Outcome, Results
+from infoset.sim.scenario import Scenario
+from infoset.sim.target import acceleration_m_s2, constant_side
+from infoset.sim.truth_section import TruthSection
 
 Pending = tuple[tuple[float, Floats], ...]
 """Impulses that are decided and not given yet: times from now, s, and impulses, m/s."""

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guidance.authority import max_correctable_m
-from sim.closed_form import PossibleMiss, possible_miss
-from sim.draws import draw_starts
-from sim.scenario import MAX_STEPS, Scenario
-from sim.schedule import image_times_s
+from infoset.guidance.authority import max_correctable_m
+from infoset.sim.closed_form import PossibleMiss, possible_miss
+from infoset.sim.draws import draw_starts
+from infoset.sim.scenario import MAX_STEPS, Scenario
+from infoset.sim.schedule import image_times_s
 
 STARTS = 400
 """Number of starts: those of the first runs of seed 0."""

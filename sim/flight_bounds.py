@@ -7,10 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from infoset import StateBox
 from infoset.arrays import Floats
-from sim.kepler import KeplerMotion, X
-from sim.scenario import Sun
+from infoset.model import StateBox
+from infoset.sim.kepler import KeplerMotion, X
+from infoset.sim.scenario import Sun
 
 INSTANTS = 500
 """Number of times at which a flight is bounded."""

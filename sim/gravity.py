@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from guidance import Thruster
-from infoset import SetModel
 from infoset.arrays import Floats
-from sim.flight_bounds import flight_bounds, greater_of_neighbours, no_bound
-from sim.scenario import Scenario, Sun
+from infoset.guidance import Thruster
+from infoset.model import SetModel
+from infoset.sim.flight_bounds import flight_bounds, greater_of_neighbours, no_bound
+from infoset.sim.scenario import Scenario, Sun
 
 MIN_SPEED_CHANGE = 1e-8
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from infoset._compile import allocation_free, entry, inlined
 from infoset.arrays import Flags, Floats
-from sim.scenario import Sun
+from infoset.sim.scenario import Sun
 
 POSITION_ERROR_M = 1e-5
 """Error of the position at arrival for which the length of a leap is chosen, m. The leap of a step is shorter than the

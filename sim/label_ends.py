@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from infoset import SetModel
 from infoset.arrays import Flags, Floats, some
 from infoset.engine.section_law import impulse_doubts, section_laws
-from sim.results import Results
+from infoset.model import SetModel
+from infoset.sim.results import Results
 
 
 class LabelEnds:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.authority import max_correctable_m
-from guidance.thruster import modulus
-from infoset import PredictedMiss
 from infoset.arrays import Flags, Floats, Integers
-from sim.scenario import Scenario
+from infoset.engine.predicted_miss import PredictedMiss
+from infoset.guidance.authority import max_correctable_m
+from infoset.guidance.thruster import modulus
+from infoset.sim.scenario import Scenario
 
 
 class MissCause(Enum):

@@ -19,14 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from guidance import NoiseKind, Strategy
-from guidance.noise import NoiseSource
+from infoset.guidance import NoiseKind, Strategy
+from infoset.guidance.noise import NoiseSource
 from infoset.kernels import LOGGER, NOTICE
-from sim.engagement import Step
-from sim.results import Results, join
-from sim.scenario import Scenario
-from sim.simulate import simulate_runs
-from sim.versions import need_versions, versions
+from infoset.sim.engagement import Step
+from infoset.sim.results import Results, join
+from infoset.sim.scenario import Scenario
+from infoset.sim.simulate import simulate_runs
+from infoset.sim.versions import need_versions, versions
 
 _PARENT_CHECK_S = 0.5
 

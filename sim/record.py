@@ -8,21 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from guidance import Strategy
-from guidance.noise import NoiseSource
-from infoset import PredictedMiss, Section
 from infoset.arrays import Flags, Floats
+from infoset.engine.predicted_miss import PredictedMiss
+from infoset.guidance import Strategy
+from infoset.guidance.noise import NoiseSource
 from infoset.limits import WHOLE
 from infoset.sensors import Measurements, Sensor
-from sim.draws import draw
-from sim.engagement import Engagements, Step
-from sim.results import Results, ending
-from sim.scenario import Scenario, noise_name, strategy_name, with_noise, with_strategy
-from sim.versions import versions
+from infoset.set_queries import Section
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.results import Results, ending
+from infoset.sim.scenario import Scenario, noise_name, strategy_name, with_noise, with_strategy
+from infoset.sim.versions import versions
 
 
 @dataclass(frozen=True)
-class Inconsistency:
+class RecordedInconsistency:
     """The first measurement that contradicts all states of the set.
 
     Parameters
@@ -64,7 +65,7 @@ class Record:
         Sections after the measurement of each step, in ascending order of range.
     noise : str or None
         Name of the noise that replaced that of the scenario; None if none did.
-    inconsistency : Inconsistency or None
+    inconsistency : RecordedInconsistency or None
         First measurement that contradicts the model; None without one.
     versions : mapping of str to str
         Versions of the packages and of Python that simulated it.
@@ -85,7 +86,7 @@ class Record:
     truth_margin_m: Floats
     sections: tuple[tuple[Section, ...], ...]
     noise: str | None = None
-    inconsistency: Inconsistency | None = None
+    inconsistency: RecordedInconsistency | None = None
     versions: Mapping[str, str] = field(default_factory=versions)
 
     @property
@@ -136,7 +137,7 @@ def fly_one(
     Parameters
     ----------
     scenario : Scenario
-        Scenario to simulate. `experiments.fly_one` also accepts the name of a built-in scenario.
+        Scenario to simulate; `infoset.load_scenario` reads one.
     run, seed : int
         Run `run` of `simulate(..., seed=seed)` is the same engagement, number for number.
     strategy : Strategy, str or None
@@ -199,5 +200,5 @@ def fly_one(
         truth_margin_m=np.array([margin.filled(np.nan)[0] for margin in flight.truth_margins_m()]),
         sections=tuple(sections),
         noise=None if own_noise is None else noise_name(own_noise),
-        inconsistency=Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None,
+        inconsistency=RecordedInconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None,
     )

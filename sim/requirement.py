@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import Checked, Fraction, Positive
-from sim.miss_cause import MissCause
-from sim.statistics import estimate_hits, number_text, order_statistics, shows
-from sim.stopping_rule import DIGITS, QUANTITIES, QuantileName
+from infoset.sim.miss_cause import MissCause
+from infoset.sim.statistics import estimate_hits, number_text, order_statistics, shows
+from infoset.sim.stopping_rule import DIGITS, QUANTITIES, QuantileName
 
 CONFIDENCE = 0.95
 MAX_RUNS_NEEDED = 1_000_000
@@ -156,7 +156,7 @@ class Verdict:
         Met if the interval is on the right side of the bound, not met if it is on the wrong side.
     value : float or None
         The required quantile of the sample, in its unit, or the share of hits; None if the sample does not show it
-        (`sim.statistics.shows`), or if too many runs have no value.
+        (`infoset.sim.statistics.shows`), or if too many runs have no value.
     lower, upper : float or None
         Ends of its 95 % confidence interval; None if the sample is too small to bound that side.
     runs_needed : int or None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
 from functools import partial
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from infoset.arrays import Flags, Floats, Integers
 from infoset.set_queries import MaskedFloats
-from sim.columns import Column, columns, columns_with_values, documented, values_of
-from sim.miss_cause import MissCause, count_causes
-from sim.statistics import HitEstimate, estimate_hits
+from infoset.sim.columns import Cell, Column, columns, columns_with_values, csv_text, documented, fields_of, values_of
+from infoset.sim.miss_cause import MissCause, count_causes
+from infoset.sim.statistics import HitEstimate, estimate_hits
 
 MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
 
@@ -148,7 +148,7 @@ class Results:
 
     @property
     def missed(self) -> dict[str, Any]:
-        """Number of misses of each cause, and what explains them (`sim.miss_cause.count_causes`)."""
+        """Number of misses of each cause, and what explains them (`infoset.sim.miss_cause.count_causes`)."""
         causes = np.array([cause and cause.value for cause in self.causes], dtype=object)
         return count_causes(causes, self.unguided_miss_m, self.engine_corrects_m, self.last_possible_m.filled(0.0))
 
@@ -173,6 +173,14 @@ class Results:
         """Return the columns by name as plain values, one per run: texts for outcomes, None if unknown."""
         return {column.name: values_of(self, column) for column in columns_with_values(self)}
 
+    def to_csv(self) -> str:
+        """Return the columns as comma-separated values, one row per run; `infoset.save` writes them to a file.
+
+        An unknown value is an empty cell; numbers have all their digits.
+        """
+        table = self.to_dict()
+        return csv_text(list(table), list(zip(*table.values(), strict=True)))
+
     def to_pandas(self) -> Any:
         """Return the columns as a pandas `DataFrame`, one row per run, with the units in ``frame.attrs["units"]``."""
         import pandas as pd  # of the extra `campaign`
@@ -196,6 +204,28 @@ class Results:
         hits = "" if self.hits is None else f", {self.hits.hits} hit"
         failures = f"; {self.failures}" if self.failures else ""
         return f"<{len(self)} engagements{hits}: median miss {miss:.3g} m for {fuel:.4g} m/s{failures}>"
+
+
+def from_columns(
+    table: Mapping[str, Sequence[Cell]],
+    *,
+    guarantees: bool,
+    burns_m_s: Sequence[Sequence[float]] | None,
+    b_plane_t_rad: float | None,
+) -> Results:
+    """Return results from the columns of `Results.to_dict` and the values that are no columns.
+
+    `ValueError` if they do not agree.
+    """
+    if not isinstance(table, Mapping) or not isinstance(guarantees, bool):
+        raise ValueError("columns must be a table, and guarantees true or false")
+    arguments = fields_of(Results, table)
+    burns = None if burns_m_s is None else np.array(burns_m_s, dtype=float)
+    if burns is not None and (burns.ndim != 2 or len(burns) != len(arguments["runs"]) or not np.isfinite(burns).all()):
+        raise ValueError("burns_m_s must have one row of numbers for each run")
+    if b_plane_t_rad is not None and not np.isfinite(float(b_plane_t_rad)):
+        raise ValueError("b_plane_t_rad must be a number")
+    return Results(**arguments, guarantees=guarantees, burns_m_s=burns, b_plane_t_rad=b_plane_t_rad)
 
 
 def ending(outcome: str, hit: bool | None, cause: str | None) -> str:

@@ -11,14 +11,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from guidance.noise import NoiseKind, NoiseSource, TieRule
-from guidance.strategy import Strategy
-from guidance.thruster import Thruster
 from infoset.arrays import Floats
+from infoset.guidance.noise import NoiseKind, NoiseSource, TieRule
+from infoset.guidance.strategy import Strategy
+from infoset.guidance.thruster import Thruster
 from infoset.limits import NUMBER, Checked, Description, Limits, Name, NotNegative, Positive, check_fields, shown
 from infoset.model import SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, BearingSensor, Camera, RangeSensor, RateSensor, Sensor
-from sim.covariance import Covariance
+from infoset.sim.covariance import Covariance
 
 LIGHT_M_S = 299_792_458.0
 
@@ -219,7 +219,7 @@ class Scenario:
 
     @cached_property
     def set_model(self) -> SetModel:
-        """Knowledge and assumptions on board, without gravity and the errors of the engine (`sim.gravity`)."""
+        """Knowledge and assumptions on board, without gravity and the errors of the engine (`infoset.sim.gravity`)."""
         return SetModel(
             closing_speed_m_s=self.closing_speed_m_s,
             step_s=self.step_s,
@@ -344,11 +344,10 @@ def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
 
 
 def need_scenario(scenario: object) -> None:
-    """Raise TypeError, with the functions that take a name, if an argument is no scenario."""
+    """Raise TypeError, with the function that reads a scenario, if an argument is no scenario."""
     if not isinstance(scenario, Scenario):
         raise TypeError(
-            f"scenario must be a Scenario: got {shown(scenario)}; experiments.simulate and the other functions of "
-            "experiments take names and files, and experiments.load_scenario reads them"
+            f"scenario must be a Scenario: got {shown(scenario)}; infoset.load_scenario returns it for a name or a file"
         )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from infoset.clock import steps_between
-from sim.scenario import MAX_STEPS, Scenario
+from infoset.sim.scenario import MAX_STEPS, Scenario
 
 SAID_FROM = 0.1
 """Part of a step from which a difference between a time of the file and its step is reported."""

@@ -9,13 +9,13 @@ from functools import partial
 
 import numpy as np
 
-from guidance import Strategy
-from guidance.noise import NoiseSource
+from infoset.guidance import Strategy
+from infoset.guidance.noise import NoiseSource
 from infoset.limits import WHOLE, shown
-from sim.draws import draw, max_number_of_steps
-from sim.engagement import Engagements, Step
-from sim.results import GuaranteeWarning, Results, join
-from sim.scenario import Scenario, with_noise, with_strategy
+from infoset.sim.draws import draw, max_number_of_steps
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.results import GuaranteeWarning, Results, join
+from infoset.sim.scenario import Scenario, with_noise, with_strategy
 
 ENGAGEMENTS_AT_ONCE = 200
 SECTIONS_AT_ONCE = 6000
@@ -43,7 +43,7 @@ def simulate(
     Parameters
     ----------
     scenario : Scenario
-        Scenario to simulate. `experiments.simulate` also accepts the name of a built-in scenario.
+        Scenario to simulate; `infoset.load_scenario` reads one.
     runs : int or sequence of int
         Number of runs, or the run numbers. Run k of a seed is the same engagement in every call.
     strategy : Strategy, str or None
@@ -101,10 +101,10 @@ def warn_of_failures(scenario: Scenario, results: Results) -> None:
 
 
 def _level_of_user() -> int:
-    """Return the level of the first caller outside the simulator and its commands, for `warnings.warn` there."""
+    """Return the level of the first caller outside the project, for `warnings.warn` there."""
     frame = inspect.currentframe()
     level = 0
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("sim", "experiments"):
+    while frame is not None and frame.f_globals.get("__name__", "").startswith("infoset."):
         frame = frame.f_back
         level += 1
     return level

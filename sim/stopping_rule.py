@@ -11,7 +11,7 @@ import numpy as np
 
 from infoset.arrays import Floats
 from infoset.limits import Checked, Fraction, Positive, check_fields
-from sim.statistics import estimate_quantiles, level_name, number_text
+from infoset.sim.statistics import estimate_quantiles, level_name, number_text
 
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from infoset.arrays import Floats
-from sim.scenario import Manoeuvre, Target
+from infoset.sim.scenario import Manoeuvre, Target
 
 ROUNDING = 1e-12
 

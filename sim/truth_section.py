@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset import SetModel
 from infoset.arrays import Flags, Floats, some
 from infoset.engine.history import ANGLE, IMPULSE, PREDICTION, RATE, History
 from infoset.engine.replays import margins_along
 from infoset.engine.section_law import BOUND_SLACK, law_table, section_laws
+from infoset.model import SetModel
 from infoset.set_queries import MaskedFloats
-from sim.kepler import Sight
+from infoset.sim.kepler import Sight
 
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 """Rounding error of a margin, relative to the terms of z: a quarter of that for which each cut widens the set."""

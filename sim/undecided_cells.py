@@ -11,10 +11,10 @@ from functools import partial
 import numpy as np
 
 from infoset.arrays import Floats
-from sim.requirement import AnyRequirement, decides
-from sim.results import Results
-from sim.stopping_rule import StoppingRule
-from sim.storage import CampaignFolder
+from infoset.sim.requirement import AnyRequirement, decides
+from infoset.sim.results import Results
+from infoset.sim.stopping_rule import StoppingRule
+from infoset.sim.storage import CampaignFolder
 
 GROWTH = 1.05
 """A sample grows by at least this factor between two checks of a quantile: one after each chunk would cost O(N^2)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.common.built_in_files import PROBLEMS, SCENARIO, built_in, built_in_names
+from infoset.experiments.common.built_in_files import PROBLEMS, SCENARIO, built_in, built_in_names
 
 
 def scenario_names() -> tuple[str, ...]:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import HealthCheck, is_hypothesis_test, settings
 
-from sim.scenario import of_model
+from infoset.sim.scenario import of_model
 
 if TYPE_CHECKING:
-    from sim import Scenario
+    from infoset.sim import Scenario
 
 OF_THE_CHECKOUT = ["docs", "test_architecture.py", "test_readme.py"]
 """Tests of files that the wheel does not contain. They are skipped outside a checkout, where the wheel is tested."""
@@ -86,7 +86,7 @@ def figures_are_small() -> Iterator[None]:
 
     `experiments/common/test_figure_style.py` tests those of the style.
     """
-    from experiments.common import figure_style
+    from infoset.experiments.common import figure_style
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figure_style, "STYLE", [*figure_style.STYLE, {"pdf.fonttype": 3, "savefig.dpi": 50}])
@@ -104,8 +104,8 @@ def files_are_not_flushed() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def brief() -> Scenario:
     """A short scenario with few sections: the last ten seconds of an approach with a known range."""
-    from experiments.interception.scenario_file import load_scenario
     from infoset import StateBox
+    from infoset.experiments.interception.scenario_file import load_scenario
     from tests.sensors import linear
 
     published = load_scenario("asteroid-1997")
@@ -118,7 +118,7 @@ def brief() -> Scenario:
 @pytest.fixture(scope="session")
 def brief_file(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file of the scenario `brief`, in a separate folder."""
-    from experiments.common.input_file import to_toml
+    from infoset.experiments.common.input_file import to_toml
 
     file = tmp_path_factory.mktemp("scenario") / "brief.toml"
     file.write_text(to_toml(brief))

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from infoset import InitialSet, Model
-from sim import Scenario
+from infoset.sim import Scenario
 
 
 def guaranteed(scenario: Scenario, **settings: Any) -> Scenario:

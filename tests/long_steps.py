@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sim import Scenario
-from sim.scenario import of_model
+from infoset.sim import Scenario
+from infoset.sim.scenario import of_model
 
 
 def with_long_steps(scenario: Scenario, times: int = 2) -> Scenario:

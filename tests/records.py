@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sim import Record
+from infoset.sim import Record
 
 
 def first_steps(record: Record, count: int) -> Record:

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from infoset import StateBox
-from sim import Scenario
-from sim.scenario import of_model
+from infoset.sim import Scenario
+from infoset.sim.scenario import of_model
 
 
 def in_space(scenario: Scenario, **sensor: Any) -> Scenario:

@@ -13,11 +13,6 @@ import numpy as np
 import pytest
 
 import infoset
-from experiments import load_scenario
-from guidance import (
-    SymmetricMiss,
-    Thruster,
-)
 from infoset import (
     AngleSensor,
     Camera,
@@ -31,7 +26,12 @@ from infoset import (
     SetSettings,
     StateBox,
 )
-from sim import (
+from infoset.experiments import load_scenario
+from infoset.guidance import (
+    SymmetricMiss,
+    Thruster,
+)
+from infoset.sim import (
     Body,
     Campaign,
     HitRequirement,
@@ -45,7 +45,7 @@ from sim import (
     fly_one,
     simulate,
 )
-from sim.adversary import find_worst
+from infoset.sim.adversary import find_worst
 
 REFUSALS = (TypeError, ValueError)
 NO_NUMBERS: tuple[Any, ...] = (

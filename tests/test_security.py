@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from experiments.interception.page import interception_page
-from experiments.interception.record_file import load_record, write_record
-from experiments.interception.scenario_file import load_scenario
-from sim import Record, fly_one
+from infoset.experiments.cli import main
+from infoset.experiments.interception.page import interception_page
+from infoset.experiments.interception.record_file import load_record, write_record
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim import Record, fly_one
 from tests.built_in import scenario_text
 from tests.records import first_steps
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 PACKAGES = {
     name: Path(spec.origin).parent
-    for name in ("infoset", "guidance", "sim", "rendezvous", "experiments")
+    for name in ("infoset", "infoset.guidance", "infoset.sim", "infoset.rendezvous", "infoset.experiments")
     if (spec := find_spec(name)) is not None and spec.origin is not None
 } | ({"benchmarks": BENCHMARKS} if BENCHMARKS.is_dir() else {})
 """Where the packages are installed, and in a checkout the benchmarks."""

@@ -15,13 +15,13 @@ class CommandHelp(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Return the sections, in the order of ``infoset --help``."""
-        from experiments.cli import commands
+        from infoset.experiments.cli import commands
 
         return [self._section(name, command) for name, command in commands().commands.items()]
 
     def _section(self, name: str, command: Any) -> nodes.section:
         """Return the section of a command; those of its subcommands are inside it."""
-        from experiments.cli import app
+        from infoset.experiments.cli import app
 
         environment = {"COLUMNS": "88", "TERMINAL_WIDTH": "88", "NO_COLOR": "1"}
         done = CliRunner().invoke(app, [*name.split(), "--help"], env=environment)

@@ -13,9 +13,8 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 
-from experiments import load_scenario
-from guidance import NoiseKind
-from sim import fly_one
+from infoset import fly_one, load_scenario
+from infoset.guidance import NoiseKind
 
 scenario = replace(load_scenario("asteroid-1997-single"), range_sensor=None)
 flights = {
@@ -54,6 +53,6 @@ for title, record in flights.items():
 # The sets 0.5 s, 4 s and 8 s after the start are figure 3 of the paper, drawn with the function that ``infoset engage``
 # uses. Crosses are the true state, which is inside; squares are the measured angles.
 
-from experiments.interception.figures.sets import draw_sets
+from infoset.experiments.interception.figures.sets import draw_sets
 
 library_figure = draw_sets(list(flights.values()))

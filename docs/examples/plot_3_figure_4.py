@@ -11,11 +11,10 @@ paper prints; they start elsewhere, and spend more (`why is not known <../interc
 
 import numpy as np
 
-from experiments import load_scenario
-from experiments.interception.figures.distributions import draw_distributions
-from experiments.interception.published import printed_single_runs
-from experiments.interception.study import Curve, curve_scenarios
-from sim import simulate
+from infoset import load_scenario, simulate
+from infoset.experiments.interception.figures.distributions import draw_distributions
+from infoset.experiments.interception.published import printed_single_runs
+from infoset.experiments.interception.study import Curve, curve_scenarios
 
 curves = [
     Curve(number, scenario.noise.value, scenario.range_sensor is not None, simulate(scenario, runs=50))

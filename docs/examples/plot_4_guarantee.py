@@ -10,8 +10,7 @@ computed from the sets alone, without the true state.
 
 import matplotlib.pyplot as plt
 
-from experiments import load_scenario
-from sim import simulate
+from infoset import load_scenario, simulate
 
 guaranteed = load_scenario("asteroid-1997", ["information_set.model=guaranteed", "noise=game"])
 results = simulate(guaranteed, runs=60)

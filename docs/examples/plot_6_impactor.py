@@ -11,7 +11,7 @@ of a pixel. All runs of both missions have the same starts.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from experiments import load_scenario, simulate
+from infoset import load_scenario, simulate
 
 PIXELS_RAD = (5.4e-6, 5.4e-4)
 missions = [load_scenario("dart-2022", [f"camera.pixel_error_rad={pixel}"]) for pixel in PIXELS_RAD]

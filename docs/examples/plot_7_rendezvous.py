@@ -11,9 +11,10 @@ motion, z along the orbit's normal).
 import matplotlib.pyplot as plt
 import numpy as np
 
-from experiments import draw_trajectories, load_problem
-from rendezvous.multipoint import TimeLimits, best_times
-from rendezvous.pareto import solve_encounter
+from infoset import load_problem
+from infoset.experiments import draw_trajectories
+from infoset.rendezvous.multipoint import TimeLimits, best_times
+from infoset.rendezvous.pareto import solve_encounter
 
 meeting = solve_encounter(load_problem("pareto-2008").encounter)
 print("meeting at", meeting.meeting_state()[:3].round(1), "m")

@@ -10,8 +10,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.campaigns.run_tables import groups
-from experiments.common.figure_style import (
+from infoset.arrays import Floats
+from infoset.experiments.campaigns.run_tables import groups
+from infoset.experiments.common.figure_style import (
     CURVE_LOOKS,
     HALO,
     INK,
@@ -22,13 +23,12 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.screen import some_runs
-from experiments.interception.figures.b_plane import Cloud, draw_b_plane
-from experiments.interception.figures.distributions import MAX_POINTS, Sample, axis_limit, draw_samples
-from infoset.arrays import Floats
-from sim import estimate_quantiles
-from sim.statistics import level_name, shows
-from sim.storage import CampaignFolder
+from infoset.experiments.common.screen import some_runs
+from infoset.experiments.interception.figures.b_plane import Cloud, draw_b_plane
+from infoset.experiments.interception.figures.distributions import MAX_POINTS, Sample, axis_limit, draw_samples
+from infoset.sim import estimate_quantiles
+from infoset.sim.statistics import level_name, shows
+from infoset.sim.storage import CampaignFolder
 
 CONVERGING = {0.5: "-", 0.9: (0, (5, 1.5)), 0.99: (0, (1.5, 1.2))}
 """Levels of the quantiles over the number of runs, with their lines."""
@@ -72,7 +72,7 @@ def draw_all(folder: CampaignFolder, runs: pd.DataFrame) -> Iterator[Figure]:
 def draw_convergence(by_noise: dict[str, pd.DataFrame]) -> Figure:
     """Draw quantiles of the miss and the impulse of the first n runs over n, with their confidence intervals.
 
-    A quantile is drawn from the number of runs on that shows it (`sim.statistics.shows`). Each noise has a row.
+    A quantile is drawn from the number of runs on that shows it (`infoset.sim.statistics.shows`). Each noise has a row.
     """
     figure, panels = subplots(62.0 * len(by_noise) + 14.0, len(by_noise), 2)
     for row, (noise, runs) in zip(panels, by_noise.items(), strict=True):

@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from urllib.parse import urlsplit
 
-from experiments.campaigns.command import Flight
-from experiments.common.errors import InputError
-from sim.parallel import worker_processes
+from infoset.experiments.campaigns.command import Flight
+from infoset.experiments.common.errors import InputError
+from infoset.sim.parallel import worker_processes
 
 PATIENCE_S = 8.0
 """Time limit for the scheduler's answer, and then for its workers, s."""

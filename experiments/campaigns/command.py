@@ -8,8 +8,15 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Json, Overwrite, Quiet, Seed, Settings
-from experiments.interception.command import MAX_RUNS, ModelName, NoiseName, RangeSensor, ScenarioName, StrategyName
+from infoset.experiments.common.options import Csv, FileOptions, Json, Overwrite, Quiet, Seed, Settings
+from infoset.experiments.interception.command import (
+    MAX_RUNS,
+    ModelName,
+    NoiseName,
+    RangeSensor,
+    ScenarioName,
+    StrategyName,
+)
 
 MAX_WORKERS = 1024
 MAX_AT_ONCE = 1_000_000

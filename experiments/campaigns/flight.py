@@ -8,16 +8,16 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
 from functools import partial
 
-from experiments.campaigns.cluster import workers_of
-from experiments.campaigns.command import Flight
-from experiments.common.errors import InputError
-from experiments.common.output import need_writable
-from experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
-from experiments.interception.scenario_file import feasibility_warnings, scenario_warnings, study_scenario
-from experiments.interception.strategies import OwnNoise, chosen_noise, own_code_errors
-from sim import Campaign, CampaignNoise, Scenario
-from sim.storage import MANIFEST, CampaignFolder, StorageError, need_free, read_manifest
-from sim.versions import VersionError
+from infoset.experiments.campaigns.cluster import workers_of
+from infoset.experiments.campaigns.command import Flight
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.output import need_writable
+from infoset.experiments.common.screen import NOT_FINITE, progress_bar, say, say_warnings
+from infoset.experiments.interception.scenario_file import feasibility_warnings, scenario_warnings, study_scenario
+from infoset.experiments.interception.strategies import OwnNoise, chosen_noise, own_code_errors
+from infoset.sim import Campaign, CampaignNoise, Scenario
+from infoset.sim.storage import MANIFEST, CampaignFolder, StorageError, need_free, read_manifest
+from infoset.sim.versions import VersionError
 
 SCENARIO_FILE = "scenario.toml"
 """Name of the scenario file in the folder of a campaign."""

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from experiments.campaigns.command import Campaign as Options
-from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
-from experiments.campaigns.run_tables import COLUMNS, heading, records, summary, summary_parts
-from experiments.common.errors import input_errors
-from experiments.common.input_file import to_toml
-from experiments.common.output import output_of, to_json
-from experiments.common.screen import show, some_runs
-from experiments.common.units import duration_text
-from experiments.interception.strategies import own_strategy
-from experiments.interception.study import study_title
-from sim import Campaign, StoppingRule
+from infoset.experiments.campaigns.command import Campaign as Options
+from infoset.experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
+from infoset.experiments.campaigns.run_tables import COLUMNS, heading, records, summary, summary_parts
+from infoset.experiments.common.errors import input_errors
+from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.common.output import output_of, to_json
+from infoset.experiments.common.screen import show, some_runs
+from infoset.experiments.common.units import duration_text
+from infoset.experiments.interception.strategies import own_strategy
+from infoset.experiments.interception.study import study_title
+from infoset.sim import Campaign, StoppingRule
 
 SUMMARY = "summary.json"
 

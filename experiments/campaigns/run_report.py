@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from experiments.campaigns.command import Report
-from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
-from experiments.campaigns.run_tables import (
+from infoset.experiments.campaigns.command import Report
+from infoset.experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
+from infoset.experiments.campaigns.run_tables import (
     correlations,
     heading,
     noises_of,
@@ -19,12 +19,12 @@ from experiments.campaigns.run_tables import (
     summary_parts,
     worst_runs,
 )
-from experiments.campaigns.sweep_report import TABLE, SweepReport, figure_names, read_requirement
-from experiments.campaigns.sweep_table import sweep_table
-from experiments.common.errors import InputError
-from experiments.common.input_file import to_toml
-from experiments.common.output import Output, output_of, to_json
-from experiments.common.screen import (
+from infoset.experiments.campaigns.sweep_report import TABLE, SweepReport, figure_names, read_requirement
+from infoset.experiments.campaigns.sweep_table import sweep_table
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.common.output import Output, output_of, to_json
+from infoset.experiments.common.screen import (
     Part,
     figure_files,
     number,
@@ -33,9 +33,9 @@ from experiments.common.screen import (
     show,
     some_runs,
 )
-from experiments.interception.study import study_title
-from sim.results import ending
-from sim.storage import CampaignFolder
+from infoset.experiments.interception.study import study_title
+from infoset.sim.results import ending
+from infoset.sim.storage import CampaignFolder
 
 
 def run(options: Report) -> None:
@@ -100,7 +100,7 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output) -
     written.save("report.json", to_json(report), "--json")
     written.deliver("--csv", table.drop(columns="cell").to_csv(index=False))
     if options.out is not None:
-        from experiments.campaigns.campaign_figures import draw_all
+        from infoset.experiments.campaigns.campaign_figures import draw_all
 
         with progress_bar(options.quiet) as begin:
             written.draw(_figures(folder), draw_all(folder, runs), begin("figures"))

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from experiments.campaigns.command import Sweep as Options
-from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
-from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_report import SweepReport, read_requirement
-from experiments.campaigns.sweep_table import sweep_table
-from experiments.common.errors import InputError
-from experiments.common.input_file import to_toml
-from experiments.common.output import output_of, to_json
-from experiments.common.screen import say, show
-from experiments.interception.strategies import own_strategy
-from sim import Campaign
+from infoset.experiments.campaigns.command import Sweep as Options
+from infoset.experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
+from infoset.experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
+from infoset.experiments.campaigns.sweep_report import SweepReport, read_requirement
+from infoset.experiments.campaigns.sweep_table import sweep_table
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.common.output import output_of, to_json
+from infoset.experiments.common.screen import say, show
+from infoset.experiments.interception.strategies import own_strategy
+from infoset.sim import Campaign
 
 MAX_RUNS_A_CELL = 2000
 """Default limit of the runs of a cell that is undecided."""

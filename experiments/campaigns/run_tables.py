@@ -12,16 +12,23 @@ import numpy as np
 import pandas as pd
 from rich.table import Table
 
-from experiments.campaigns.sweep_axes import tied_keys
-from experiments.common.screen import Part, number, number_table, quantile_notes
-from experiments.interception.runs.shared import bound_name, certificate
-from experiments.interception.study import SetCounts, hit_text, miss_text, noise_notes, redrawn_text, set_warnings
-from sim import CampaignNoise, HitEstimate, Outcome, estimate_hits, estimate_quantiles
-from sim.miss_cause import count_causes
-from sim.statistics import correlation_interval, level_name, shows
-from sim.stopping_rule import QUANTITIES
-from sim.storage import CampaignFolder, fingerprint
-from sim.versions import versions
+from infoset.experiments.campaigns.sweep_axes import tied_keys
+from infoset.experiments.common.screen import Part, number, number_table, quantile_notes
+from infoset.experiments.interception.runs.shared import bound_name, certificate
+from infoset.experiments.interception.study import (
+    SetCounts,
+    hit_text,
+    miss_text,
+    noise_notes,
+    redrawn_text,
+    set_warnings,
+)
+from infoset.sim import CampaignNoise, HitEstimate, Outcome, estimate_hits, estimate_quantiles
+from infoset.sim.miss_cause import count_causes
+from infoset.sim.statistics import correlation_interval, level_name, shows
+from infoset.sim.stopping_rule import QUANTITIES
+from infoset.sim.storage import CampaignFolder, fingerprint
+from infoset.sim.versions import versions
 
 LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
 WORST = 10

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.common.errors import InputError, input_errors, shown
-from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
-from experiments.common.units import split_unit
-from sim.scenario import Scenario
-from sim.storage import MAX_CELLS, Axis
+from infoset.experiments.common.errors import InputError, input_errors, shown
+from infoset.experiments.common.input_file import changed, keys_of, numeric_key, similar_key
+from infoset.experiments.common.units import split_unit
+from infoset.sim.scenario import Scenario
+from infoset.sim.storage import MAX_CELLS, Axis
 
 MAX_AXES = 4
 MAX_VALUES = 1000

@@ -18,9 +18,10 @@ from matplotlib.axis import Axis as MatplotlibAxis
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from experiments.campaigns.sweep_axes import key_label
-from experiments.campaigns.sweep_table import SweepTable, above_bound, spans_decades
-from experiments.common.figure_style import (
+from infoset.arrays import Floats
+from infoset.experiments.campaigns.sweep_axes import key_label
+from infoset.experiments.campaigns.sweep_table import SweepTable, above_bound, spans_decades
+from infoset.experiments.common.figure_style import (
     GUARANTEED,
     HALO,
     IMPULSE,
@@ -36,11 +37,10 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from infoset.arrays import Floats
-from sim import QuantileName, Requirement
-from sim.requirement import AnyRequirement, Decision
-from sim.statistics import level_name, number_text
-from sim.storage import Axis
+from infoset.sim import QuantileName, Requirement
+from infoset.sim.requirement import AnyRequirement, Decision
+from infoset.sim.statistics import level_name, number_text
+from infoset.sim.storage import Axis
 
 DECISION_COLOURS = {Decision.MET: "#7fb0d6", Decision.UNDECIDED: "#ececec", Decision.NOT_MET: "#f2a65a"}
 """Colours that differ in grey too, and for colour-blind readers."""

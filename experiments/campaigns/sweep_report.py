@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import pandas as pd
 from rich.table import Table
 
-from experiments.campaigns.run_tables import CI, campaign_notes, heading, records, screen_table
-from experiments.campaigns.sweep_axes import unit_of
-from experiments.campaigns.sweep_table import SweepTable, limits
-from experiments.common.errors import InputError, input_errors
-from experiments.common.output import Output
-from experiments.common.screen import Part, some_runs
-from experiments.interception.study import SetCounts, random_note, set_warnings, study_title
-from guidance import NoiseKind
-from sim import QuantileName, Requirement
-from sim.requirement import CONFIDENCE, MAX_RUNS_NEEDED, AnyRequirement, Decision, parse_requirement
-from sim.storage import CampaignFolder
+from infoset.experiments.campaigns.run_tables import CI, campaign_notes, heading, records, screen_table
+from infoset.experiments.campaigns.sweep_axes import unit_of
+from infoset.experiments.campaigns.sweep_table import SweepTable, limits
+from infoset.experiments.common.errors import InputError, input_errors
+from infoset.experiments.common.output import Output
+from infoset.experiments.common.screen import Part, some_runs
+from infoset.experiments.interception.study import SetCounts, random_note, set_warnings, study_title
+from infoset.guidance import NoiseKind
+from infoset.sim import QuantileName, Requirement
+from infoset.sim.requirement import CONFIDENCE, MAX_RUNS_NEEDED, AnyRequirement, Decision, parse_requirement
+from infoset.sim.storage import CampaignFolder
 
 TABLE = "sweep.parquet"
 SHOWN = tuple(QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99))
@@ -73,7 +73,7 @@ class SweepReport:
         """Write the table, and for one or two axes a figure of each noise, into the output's folder."""
         written.save(TABLE, self.table.rows.to_parquet(index=False))
         if self.is_drawn and written.folder is not None:
-            from experiments.campaigns.sweep_figures import draw_sweep
+            from infoset.experiments.campaigns.sweep_figures import draw_sweep
 
             required = self.table.required
             shown = [*SHOWN[:2], SHOWN[3]]

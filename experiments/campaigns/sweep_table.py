@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.campaigns.run_tables import COLUMNS, LEVELS, groups, noises_of, or_nan, summary
-from experiments.campaigns.sweep_axes import sweep_cells, tied_keys
 from infoset.arrays import Floats
-from sim import Requirement
-from sim.closed_form import possible_miss_of
-from sim.requirement import AnyRequirement, Decision, judge
-from sim.statistics import shows
-from sim.storage import Axis, CampaignFolder
+from infoset.experiments.campaigns.run_tables import COLUMNS, LEVELS, groups, noises_of, or_nan, summary
+from infoset.experiments.campaigns.sweep_axes import sweep_cells, tied_keys
+from infoset.sim import Requirement
+from infoset.sim.closed_form import possible_miss_of
+from infoset.sim.requirement import AnyRequirement, Decision, judge
+from infoset.sim.statistics import shows
+from infoset.sim.storage import Axis, CampaignFolder
 
 _LOG_FROM = 30.0
 """Ratio of the maximum to the minimum value from which the values have a logarithmic axis."""
@@ -35,9 +35,9 @@ class SweepTable:
         `run_tables.summary` and those of the decision: `requirement` (a value of `Decision`; none without runs), the
         required estimate with its interval, `required_value`, `_lower` and `_upper`, the runs with a value of the
         quantity, `required_known`, and the runs of all noises that would decide, `runs_needed` (NaN if more than
-        `sim.requirement.MAX_RUNS_NEEDED`). `limit_quantile` and `limit_bound` are compared by interpolation: the
+        `requirement.MAX_RUNS_NEEDED`). `limit_quantile` and `limit_bound` are compared by interpolation: the
         required quantile and its bound; for hits, the quantile of the miss and the radius of the body.
-        `closed_form_m` is the guaranteed miss by the closed form of a camera (`sim.closed_form`), if the requirement is
+        `closed_form_m` is the guaranteed miss by the closed form of a camera (`closed_form.py`), if the requirement is
         about it.
     """
 

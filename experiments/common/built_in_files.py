@@ -8,14 +8,14 @@ from functools import cache
 from importlib import resources
 from typing import Any, NamedTuple
 
-from experiments.common.errors import InputError
-from experiments.common.options import choice
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.options import choice
 
 SCENARIO = "scenario"
 
 
 class ProblemKind(NamedTuple):
-    """Command of a kind of problem, and the module in `experiments` and the name of its dataclass."""
+    """Command of a kind of problem, and the module in `infoset.experiments` and the name of its dataclass."""
 
     command: str
     module: str
@@ -46,7 +46,7 @@ class BuiltIn(NamedTuple):
 @cache
 def built_in_files() -> Mapping[str, BuiltIn]:
     """Return the built-in files of all kinds by name, in alphabetical order."""
-    package = resources.files("experiments")
+    package = resources.files("infoset.experiments")
     found = []
     for folder in ("scenarios", "problems"):
         for file in package.joinpath(folder).iterdir():

@@ -1,6 +1,6 @@
 """Files of the user: the tables and keys of a TOML file are the fields of a frozen dataclass.
 
-Every kind of file is read here. A key may be written in any unit of its quantity (`experiments.common.units`), a number
+Every kind of file is read here. A key may be written in any unit of its quantity (`units.py`), a number
 is rounded once, and an interval may be written as one number, which is both of its ends. The dataclass declares types,
 limits and defaults; pydantic walks through it and finds all errors at once.
 """
@@ -23,11 +23,11 @@ from typing import Annotated, Any, NamedTuple, TypeVar, Union, cast, get_args, g
 
 from pydantic import ValidationError
 
-from experiments.common.built_in_files import PROBLEMS, SCENARIO, built_in, built_in_names, kind_of, taken_by
-from experiments.common.errors import InputError, nearest, shown
-from experiments.common.units import quantity_and_unit, si_factor, units_like
+from infoset.experiments.common.built_in_files import PROBLEMS, SCENARIO, built_in, built_in_names, kind_of, taken_by
+from infoset.experiments.common.errors import InputError, nearest, shown
+from infoset.experiments.common.units import quantity_and_unit, si_factor, units_like
 from infoset.limits import LONGEST_DESCRIPTION, plain_number
-from sim.storage.codec import adapter
+from infoset.sim.storage.codec import adapter
 
 ENDS = ("min", "max")
 """Ends of an interval, after the name of its key."""
@@ -101,7 +101,7 @@ def load_problem(name_or_path: str | os.PathLike[str], settings: Sequence[str] |
         raise InputError(f"{source}: kind: must be one of {', '.join(PROBLEMS)}; write it above the first table")
     if kind == SCENARIO:
         raise InputError(f"{source}: {taken_by(kind)}")
-    owner: type = getattr(import_module(f"experiments.{PROBLEMS[kind].module}"), PROBLEMS[kind].owner)
+    owner: type = getattr(import_module(f"infoset.experiments.{PROBLEMS[kind].module}"), PROBLEMS[kind].owner)
     return read_file(owner, name_or_path, settings)
 
 

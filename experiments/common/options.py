@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.errors import InputError, nearest, shown
+from infoset.experiments.common.errors import InputError, nearest, shown
 
 
 def _silence_the_compile_notice(quiet: bool) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Floats
-from rendezvous.two_body import OrbitalElements, flight_fault, orbit_fault
+from infoset.rendezvous.two_body import OrbitalElements, flight_fault, orbit_fault
 
 MAX_RADIANS, MIN_RADIANS = 1000.0, 1e-9
 """Angles of the orbit during a problem, within which linear motion is meaningful."""

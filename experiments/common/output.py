@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-import io
 import json
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from experiments.common.errors import InputError
-from experiments.common.screen import say
-from sim.storage.files import replace_file
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.screen import say
+from infoset.sim.columns import Cell
+from infoset.sim.storage.files import replace_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sim import HitEstimate, Results
+    from infoset.sim import HitEstimate, Results
 
 STDOUT = "-"
 ENDINGS = {"--html": (".html", ".htm"), "--gif": (".gif",), "--record": (".npz",)}
 """Endings of the files of options that other programs open by their endings: browsers, viewers, `infoset replay`."""
-Cell = str | int | float | bool | None
 
 
 class Output:
@@ -68,7 +66,7 @@ class Output:
 
     def figure(self, name: str, figure: Figure) -> None:
         """Write a figure into the folder, as PDF and PNG."""
-        from experiments.common.figure_style import figure_bytes
+        from infoset.experiments.common.figure_style import figure_bytes
 
         if self.folder is not None:
             for kind, content in figure_bytes(figure):
@@ -191,15 +189,3 @@ def json_value(value: Any) -> object:
     if isinstance(value, Enum):
         return value.value
     return vars(value) if is_dataclass(value) else value.tolist()
-
-
-def to_csv(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
-    """Return a table as comma-separated values, the names of the columns in the first line.
-
-    None is an empty cell, True and False are ``true`` and ``false``, numbers have all their digits.
-    """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([str(cell).lower() if isinstance(cell, bool) else cell for cell in row] for row in rows)
-    return text.getvalue()

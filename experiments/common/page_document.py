@@ -16,8 +16,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
 
-from experiments.common.output import json_value
-from sim.versions import versions
+from infoset.experiments.common.output import json_value
+from infoset.sim.versions import versions
 
 BLOCKS = ("dom.js", "chart.js", "scene.js", "player.js")
 """What every page is built from, in this order."""
@@ -30,7 +30,7 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_scr
     """Return a page as HTML; raise ValueError if a number is not finite.
 
     The scripts are those of the folder `assets` after the common blocks, and the text of a script of this page only.
-    The data are values for `experiments.common.output.to_json`; the keys ``heading`` and ``about`` (a list of lines)
+    The data are values for `to_json`; the keys ``heading`` and ``about`` (a list of lines)
     stand at the top of the page.
     """
     style = asset("page.css")
@@ -50,7 +50,7 @@ def embedded_json(value: object) -> str:
     """Return a value as JSON that can stand inside a script element of HTML, and is read as the same value.
 
     It contains no ``<``, ``>`` and ``&``, and no line separators that are not allowed in scripts. The value is one for
-    `experiments.common.output.to_json`.
+    `infoset.experiments.common.output.to_json`.
     """
     text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=json_value)
     # Half of a surrogate pair cannot be stored in a file: it is escaped.
@@ -60,7 +60,7 @@ def embedded_json(value: object) -> str:
 @cache
 def asset(name: str) -> str:
     """Return a file of the folder `assets`."""
-    return (resources.files("experiments.common") / "assets" / name).read_text(encoding="utf-8")
+    return (resources.files("infoset.experiments.common") / "assets" / name).read_text(encoding="utf-8")
 
 
 def _policy(style: str, programs: Sequence[str]) -> str:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from experiments.common.page_document import page
-from experiments.common.units import Unit, time_unit
 from infoset.arrays import Floats
+from infoset.experiments.common.page_document import page
+from infoset.experiments.common.units import Unit, time_unit
 
 _SPEEDS = (5, 30, 60, 120)
 _FLAT = np.cos(np.radians(4.0))

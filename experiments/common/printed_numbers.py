@@ -151,7 +151,7 @@ class Paper:
 
 def read_paper(name: str) -> Paper:
     """Read the numbers of a paper."""
-    text = resources.files("experiments").joinpath("printed", f"{name}.toml").read_text(encoding="utf-8")
+    text = resources.files("infoset.experiments").joinpath("printed", f"{name}.toml").read_text(encoding="utf-8")
     data = tomllib.loads(text)
     tables: dict[str, tuple[PrintedNumber, ...]] = {}
     options: dict[str, Mapping[str, Any]] = {}

@@ -10,13 +10,14 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from experiments.common.errors import input_errors
-from experiments.common.input_file import read_file, to_toml
-from experiments.common.output import output_of, to_csv, to_json
-from experiments.common.screen import BeginProgress, Part, figure_files, progress_bar, show
 from infoset.arrays import Floats
-from sim.storage.codec import fingerprint
-from sim.versions import versions
+from infoset.experiments.common.errors import input_errors
+from infoset.experiments.common.input_file import read_file, to_toml
+from infoset.experiments.common.output import output_of, to_json
+from infoset.experiments.common.screen import BeginProgress, Part, figure_files, progress_bar, show
+from infoset.sim.columns import csv_text
+from infoset.sim.storage.codec import fingerprint
+from infoset.sim.versions import versions
 
 Problem = TypeVar("Problem")
 Report = TypeVar("Report")
@@ -103,4 +104,4 @@ def trajectories_csv(
         for track, arrays in tracks
         for row in np.column_stack(arrays).tolist()
     ]
-    return to_csv([*names, "time_s", *_STATE_COLUMNS, *columns], rows)
+    return csv_text([*names, "time_s", *_STATE_COLUMNS, *columns], rows)

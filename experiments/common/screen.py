@@ -15,9 +15,9 @@ from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextC
 from rich.table import Table
 from rich.text import Text
 
-from experiments.common.errors import on_a_screen
-from experiments.common.units import duration_text
-from sim.statistics import level_name, shows
+from infoset.experiments.common.errors import on_a_screen
+from infoset.experiments.common.units import duration_text
+from infoset.sim.statistics import level_name, shows
 
 BeginProgress = Callable[[str], Callable[[float], None]]
 Clock = Callable[[], float]

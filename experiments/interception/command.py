@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Html, Out, Overwrite, Quiet, Seed, Settings
+from infoset.experiments.common.options import Csv, FileOptions, Html, Out, Overwrite, Quiet, Seed, Settings
 
 MAX_RUNS = 10_000_000
 

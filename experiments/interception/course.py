@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.common.units import duration_text
-from guidance.thruster import modulus
 from infoset.arrays import Floats, Integers
-from sim import Outcome, Record, Scenario
-from sim.adversary import WORST_FOUND
-from sim.engagement import Step
-from sim.results import ending
-from sim.schedule import schedule
+from infoset.experiments.common.units import duration_text
+from infoset.guidance.thruster import modulus
+from infoset.sim import Outcome, Record, Scenario
+from infoset.sim.adversary import WORST_FOUND
+from infoset.sim.engagement import Step
+from infoset.sim.results import ending
+from infoset.sim.schedule import schedule
 
 MAX_STEPS = 400
 """Number of steps above which a flight is long: its time axis is logarithmic in the time before the arrival."""

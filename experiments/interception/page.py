@@ -10,9 +10,10 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from experiments.common.page_document import page
-from experiments.common.units import duration_text
-from experiments.interception.course import (
+from infoset.arrays import Flags, Floats
+from infoset.experiments.common.page_document import page
+from infoset.experiments.common.units import duration_text
+from infoset.experiments.interception.course import (
     Clock,
     complete_steps,
     kept_steps,
@@ -22,14 +23,13 @@ from experiments.interception.course import (
     record_titles,
     true_predicted_misses,
 )
-from experiments.interception.record_file import replayed
-from experiments.interception.study import max_guarantee_m
-from guidance.thruster import modulus
-from infoset import Section
-from infoset.arrays import Flags, Floats
+from infoset.experiments.interception.record_file import replayed
+from infoset.experiments.interception.study import max_guarantee_m
+from infoset.guidance.thruster import modulus
 from infoset.sensors import SENSORS
-from sim import Record
-from sim.gravity import on_board_model
+from infoset.set_queries import Section
+from infoset.sim import Record
+from infoset.sim.gravity import on_board_model
 
 MAX_RECORDS = 2
 TOLERANCE = 5e-4

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.common.printed_numbers import Ours, Progress, read_paper
-from experiments.common.screen import parts_of
-from experiments.interception.runs.shared import simulate_all
-from experiments.interception.scenario_file import load_scenario
-from experiments.interception.study import OF_PAPER, curve_scenarios
-from guidance import NoiseKind, TieRule
-from infoset import Recovery
 from infoset.arrays import Floats
-from sim import Results
-from sim.parallel import Task
+from infoset.experiments.common.printed_numbers import Ours, Progress, read_paper
+from infoset.experiments.common.screen import parts_of
+from infoset.experiments.interception.runs.shared import simulate_all
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.experiments.interception.study import OF_PAPER, curve_scenarios
+from infoset.guidance import NoiseKind, TieRule
+from infoset.model import Recovery
+from infoset.sim import Results
+from infoset.sim.parallel import Task
 
 PAPER = "interception"
 MANY, SINGLE = OF_PAPER

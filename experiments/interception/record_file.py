@@ -20,18 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from experiments.common.errors import InputError, input_errors, on_a_screen
-from experiments.common.input_file import read_input
-from experiments.common.output import write_file
-from infoset import InformationSet
 from infoset.arrays import Floats
+from infoset.experiments.common.errors import InputError, input_errors, on_a_screen
+from infoset.experiments.common.input_file import read_input
+from infoset.experiments.common.output import write_file
+from infoset.information_set import InformationSet
 from infoset.limits import MAXIMUM
 from infoset.sensors import SENSORS, Measurements
-from sim import Inconsistency, MissCause, Outcome, Record, Results, Scenario
-from sim.columns import columns_of
-from sim.gravity import on_board_model
-from sim.scenario import MAX_STEPS
-from sim.storage.codec import from_json, to_json
+from infoset.sim import MissCause, Outcome, Record, RecordedInconsistency, Results, Scenario
+from infoset.sim.columns import columns_of
+from infoset.sim.gravity import on_board_model
+from infoset.sim.scenario import MAX_STEPS
+from infoset.sim.storage.codec import from_json, to_json
 
 MAX_FILE_BYTES, MAX_HEADER_BYTES, MAX_ARRAY_HEADER_BYTES = 1 << 28, 1 << 20, 1 << 8
 LONGEST_REASON = 300
@@ -89,7 +89,7 @@ class Header:
     run: Annotated[int, Field(ge=0, lt=2**63)]
     strategy: str
     noise: str | None
-    inconsistency: Inconsistency | None
+    inconsistency: RecordedInconsistency | None
     outcome: Outcome
     cause: MissCause | None
     format: Literal["infoset-record-3"] = "infoset-record-3"

@@ -8,12 +8,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from experiments.common.input_file import changed
-from experiments.interception.runs.shared import Progress, simulate_all
-from experiments.interception.study import percent
-from sim import HitEstimate, MissCause, Results, Scenario
-from sim.parallel import Task
-from sim.results import join
+from infoset.experiments.common.input_file import changed
+from infoset.experiments.interception.runs.shared import Progress, simulate_all
+from infoset.experiments.interception.study import percent
+from infoset.sim import HitEstimate, MissCause, Results, Scenario
+from infoset.sim.parallel import Task
+from infoset.sim.results import join
 
 IMPULSE, BUDGET, CUT_OFF = "thruster.max_impulse_m_s", "thruster.budget_m_s", "thruster.last_impulse_s"
 PIXEL, SCALE = "camera.pixel_error_rad", "angle_sensor.scale"

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from experiments.common.errors import InputError, input_errors
-from experiments.common.input_file import read_file
-from experiments.common.options import choice
-from experiments.common.units import duration_text, length_text
-from experiments.interception.strategies import is_own
-from experiments.interception.study import percent
-from guidance import strategy_names
+from infoset.experiments.common.errors import InputError, input_errors
+from infoset.experiments.common.input_file import read_file
+from infoset.experiments.common.options import choice
+from infoset.experiments.common.units import duration_text, length_text
+from infoset.experiments.interception.strategies import is_own
+from infoset.experiments.interception.study import percent
+from infoset.guidance import strategy_names
 from infoset.model import Model, SetModel
-from sim.closed_form import PossibleMiss
-from sim.feasibility import feasibility
-from sim.gravity import on_board_model
-from sim.scenario import MAX_STEPS, Scenario, Target
-from sim.schedule import images_until, schedule
+from infoset.sim.closed_form import PossibleMiss
+from infoset.sim.feasibility import feasibility
+from infoset.sim.gravity import on_board_model
+from infoset.sim.scenario import MAX_STEPS, Scenario, Target
+from infoset.sim.schedule import images_until, schedule
 
 FAR = 10.0
 """Ratio of the nominal range to the possible ranges from which `scenario_warnings` reports it."""

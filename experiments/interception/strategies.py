@@ -13,12 +13,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.common.errors import InputError, shown
-from experiments.common.options import choice
-from guidance import MeasurementNoise, NoiseKind, Strategy, strategy_names
-from guidance.noise import NoiseSource
-from sim import Scenario
-from sim.scenario import strategy_name
+from infoset.experiments.common.errors import InputError, shown
+from infoset.experiments.common.options import choice
+from infoset.guidance import MeasurementNoise, NoiseKind, Strategy, strategy_names
+from infoset.guidance.noise import NoiseSource
+from infoset.sim import Scenario
+from infoset.sim.scenario import strategy_name
 
 NOISES = [kind.value for kind in NoiseKind]
 
@@ -146,7 +146,7 @@ def own_code_errors() -> Iterator[None]:
         trace = "".join(traceback.format_exception(error))  # also that of another process
         for (file, name), option in reversed(_LOADED.items()):
             lines = re.findall(rf'File "{re.escape(str(file))}", line (\d+)', trace)
-            # Without a line: the class needs arguments, or returned a value that `sim` refuses.
+            # Without a line: the class needs arguments, or returned a value that `infoset.sim` refuses.
             if lines or re.match(rf"((strategy|noise) )?{name}\b", str(error)):
                 where = f", line {lines[-1]}" if lines else ""
                 raise InputError(

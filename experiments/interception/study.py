@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from experiments.common.screen import some_runs
-from experiments.common.units import length_text
-from guidance import NoiseKind, Strategy, TieRule
-from guidance.gaussian_noise import share_cut
-from guidance.noise import NoiseSource
-from infoset import Model
 from infoset.arrays import Flags, Floats
-from sim import HitEstimate, MissCause, Results, Scenario, estimate_hits
-from sim.requirement import CONFIDENCE, HitRequirement, runs_needed
-from sim.results import join
-from sim.statistics import runs_for_hits, shown_quantiles
+from infoset.experiments.common.screen import some_runs
+from infoset.experiments.common.units import length_text
+from infoset.guidance import NoiseKind, Strategy, TieRule
+from infoset.guidance.gaussian_noise import share_cut
+from infoset.guidance.noise import NoiseSource
+from infoset.model import Model
+from infoset.sim import HitEstimate, MissCause, Results, Scenario, estimate_hits
+from infoset.sim.requirement import CONFIDENCE, HitRequirement, runs_needed
+from infoset.sim.results import join
+from infoset.sim.statistics import runs_for_hits, shown_quantiles
 
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 """Levels of the quantiles in tables and JSON, by name."""
@@ -103,7 +103,7 @@ class Comparison:
 
     @property
     def missed(self) -> dict[str, Any]:
-        """Number of misses of each cause, of each run with its worst tie rule (`sim.miss_cause.count_causes`)."""
+        """Number of misses of each cause (`infoset.sim.miss_cause`), of each run with its worst tie rule."""
         results = [*self.results.values()]
         worst, runs = np.argmax([each.miss_m for each in results], axis=0), len(results[0])
         return join(results).take(worst * runs + np.arange(runs)).missed
@@ -269,7 +269,7 @@ def outlook_text(hits: HitEstimate | None) -> str:
 
 
 def miss_text(missed: Mapping[str, Any], runs: int, scenario: Scenario) -> str:
-    """Return the numbers of misses by cause, from `sim.miss_cause.count_causes`; an empty text without misses."""
+    """Return the numbers of misses by cause (`infoset.sim.miss_cause`) as text, empty without misses."""
     thruster = scenario.thruster
     reasons = {
         MissCause.ENGINE: "by the engine (it corrects {corrected_m}, the starts need up to {needed_m})",

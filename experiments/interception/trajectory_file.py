@@ -10,20 +10,20 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from experiments.common.errors import InputError, input_errors, on_a_screen
-from experiments.common.input_file import read_file, read_input, to_toml
-from experiments.interception.trajectory import craft_state, kernels
-from experiments.interception.trajectory.craft_state import CraftState
-from experiments.interception.trajectory.epochs import Epoch, converted, parse_epoch
-from experiments.interception.trajectory.files import named_file
-from experiments.interception.trajectory.frames import centre_name, frame_of_spice
-from experiments.interception.trajectory.oem import MAX_OEM_BYTES, OemSegment, read_oem
 from infoset.arrays import Floats
+from infoset.experiments.common.errors import InputError, input_errors, on_a_screen
+from infoset.experiments.common.input_file import read_file, read_input, to_toml
+from infoset.experiments.interception.trajectory import craft_state, kernels
+from infoset.experiments.interception.trajectory.craft_state import CraftState
+from infoset.experiments.interception.trajectory.epochs import Epoch, converted, parse_epoch
+from infoset.experiments.interception.trajectory.files import named_file
+from infoset.experiments.interception.trajectory.frames import centre_name, frame_of_spice
+from infoset.experiments.interception.trajectory.oem import MAX_OEM_BYTES, OemSegment, read_oem
 from infoset.limits import NUMBER, Description, Line, Name, Positive, check_fields
-from sim.approach import Approach, find_approach
-from sim.covariance import Covariance
-from sim.gravity import on_board_model
-from sim.scenario import Body, Scenario
+from infoset.sim.approach import Approach, find_approach
+from infoset.sim.covariance import Covariance
+from infoset.sim.gravity import on_board_model
+from infoset.sim.scenario import Body, Scenario
 
 _Text = Line(longest=1000)
 """Names and paths: one line, because they are repeated in messages and in the comments of the scenario."""

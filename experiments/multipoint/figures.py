@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import (
+from infoset.arrays import Floats
+from infoset.experiments.common.figure_style import (
     BOUND,
     EVENT,
     HALO,
@@ -26,9 +27,8 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.units import length_unit
-from experiments.multipoint.report import Report
-from infoset.arrays import Floats
+from infoset.experiments.common.units import length_unit
+from infoset.experiments.multipoint.report import Report
 
 _TRACK_POINTS = 241
 _MAX_NAMED = 12

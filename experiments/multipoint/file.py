@@ -9,12 +9,12 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from experiments.common.orbit_checks import check_angle, check_flight, check_rate
 from infoset.arrays import Floats
+from infoset.experiments.common.orbit_checks import check_angle, check_flight, check_rate
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Part, Positive
-from rendezvous.multipoint import KeplerTour, Meet, Target, TimeLimits, Tour
-from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
-from rendezvous.two_body import OrbitalElements, coast
+from infoset.rendezvous.multipoint import KeplerTour, Meet, Target, TimeLimits, Tour
+from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.two_body import OrbitalElements, coast
 
 Vector = Annotated[tuple[float, float, float], NUMBER]
 

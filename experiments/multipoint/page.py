@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
-from experiments.common.units import length_unit
-from experiments.multipoint.report import Report
+from infoset.experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
+from infoset.experiments.common.units import length_unit
+from infoset.experiments.multipoint.report import Report
 
 MOMENTS = 401
 

@@ -9,13 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
-from experiments.common.problem_command import trajectories_csv
-from experiments.common.screen import Part, number_table
-from experiments.common.units import Unit, time_unit
-from experiments.multipoint.file import MultipointProblem
 from infoset.arrays import Floats
-from rendezvous.multipoint import BestOrder, Path, Tour
+from infoset.experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
+from infoset.experiments.common.problem_command import trajectories_csv
+from infoset.experiments.common.screen import Part, number_table
+from infoset.experiments.common.units import Unit, time_unit
+from infoset.experiments.multipoint.file import MultipointProblem
+from infoset.rendezvous.multipoint import BestOrder, Path, Tour
 
 _POINTS = 1601
 
@@ -113,7 +113,7 @@ class Report:
 
 
 def report_json(report: Report) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`."""
+    """Return the results for `infoset.experiments.common.output.to_json`."""
     path = report.path
     return {
         "units": f"m, s; axes: {report.axes_text}",

@@ -6,15 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from experiments.common.errors import InputError
-from experiments.common.problem_command import ProblemCommand
-from experiments.common.screen import BeginProgress
-from experiments.multipoint.command import Multipoint
-from experiments.multipoint.file import MultipointProblem
-from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.report import Report, report_json, report_lines, trajectories
-from rendezvous.multipoint import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
-from rendezvous.piecewise import max_control
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.problem_command import ProblemCommand
+from infoset.experiments.common.screen import BeginProgress
+from infoset.experiments.multipoint.command import Multipoint
+from infoset.experiments.multipoint.file import MultipointProblem
+from infoset.experiments.multipoint.page import multipoint_page
+from infoset.experiments.multipoint.report import Report, report_json, report_lines, trajectories
+from infoset.rendezvous.multipoint import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
+from infoset.rendezvous.piecewise import max_control
 
 
 def solve(problem: MultipointProblem, options: Multipoint, begin: BeginProgress) -> Report:
@@ -62,7 +62,7 @@ COMMAND = ProblemCommand(
     to_csv=trajectories,
     lines=report_lines,
     to_html=multipoint_page,
-    figures="experiments.multipoint.figures",
+    figures="infoset.experiments.multipoint.figures",
     figure_names=("figure-path", "figure-control"),
 )
 run = COMMAND.run

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings
+from infoset.experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings
 
 MAX_STEPS = 10_000
 

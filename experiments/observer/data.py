@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.common.errors import InputError, shown
-from experiments.common.input_file import read_input
-from experiments.observer.command import MAX_STEPS, Errors, Observe
-from experiments.observer.file import ObserverProblem
-from infoset import Zonotope
 from infoset.arrays import Floats
+from infoset.experiments.common.errors import InputError, shown
+from infoset.experiments.common.input_file import read_input
+from infoset.experiments.observer.command import MAX_STEPS, Errors, Observe
+from infoset.experiments.observer.file import ObserverProblem
+from infoset.geometry.zonotope import Zonotope
 from infoset.limits import MAXIMUM
 from infoset.observer.sets import Set, polytope_of
 

@@ -11,7 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from experiments.common.figure_style import (
+from infoset.experiments.common.figure_style import (
     IMPULSE,
     INK,
     MEASURED,
@@ -23,7 +23,7 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.observer.report import Report, bounds_of, times
+from infoset.experiments.observer.report import Report, bounds_of, times
 
 _MAX_OUTLINES = 60
 

@@ -10,11 +10,13 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from experiments.observer.command import MAX_STEPS
-from infoset import ConvexPolygons, LinearObserver, Zonotope
 from infoset.arrays import Floats
+from infoset.experiments.observer.command import MAX_STEPS
+from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.geometry.polytope import Polytope
+from infoset.geometry.zonotope import Zonotope
 from infoset.limits import NOT_NEGATIVE, NUMBER, WHOLE, Description, Limits, Line, Name, Positive, real_values
+from infoset.observer.linear_observer import LinearObserver
 from infoset.observer.sets import Set
 
 Row = Annotated[tuple[float, ...], NUMBER]

@@ -6,8 +6,8 @@ from importlib import resources
 
 import numpy as np
 
-from experiments.common.page_document import page
-from experiments.observer.report import Report, shown_bounds, times
+from infoset.experiments.common.page_document import page
+from infoset.experiments.observer.report import Report, shown_bounds, times
 
 
 def observer_page(report: Report) -> str:
@@ -47,5 +47,5 @@ def observer_page(report: Report) -> str:
             for index, estimate in enumerate(report.estimates)
         ],
     }
-    script = (resources.files("experiments.observer") / "page.js").read_text(encoding="utf-8")
+    script = (resources.files("infoset.experiments.observer") / "page.js").read_text(encoding="utf-8")
     return page(f"Observer {problem.name}", [], content, script)

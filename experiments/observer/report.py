@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from rich.table import Table
 
-from experiments.common.output import Cell, to_csv
-from experiments.common.screen import Part, number_table
-from experiments.observer.data import Data
-from experiments.observer.file import ObserverProblem
-from infoset import Estimate, Inconsistency
 from infoset.arrays import Floats
+from infoset.experiments.common.screen import Part, number_table
+from infoset.experiments.observer.data import Data
+from infoset.experiments.observer.file import ObserverProblem
+from infoset.observer.linear_observer import Estimate, Inconsistency
+from infoset.sim.columns import Cell, csv_text
 
 _SHOWN_STEPS = 12
 _ROUNDING = 1e-12
@@ -50,7 +50,7 @@ def contains(estimate: Estimate, state: Floats) -> bool:
 
 
 def report_json(report: Report) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`."""
+    """Return the results for `infoset.experiments.common.output.to_json`."""
     where = report.inconsistency
     steps: list[dict[str, object]] = [
         {"k": estimate.step, **_bounds(estimate), "empty": bool(estimate.is_empty)} for estimate in report.estimates
@@ -92,7 +92,7 @@ def report_csv(report: Report) -> str:
         [estimate.step, bool(estimate.is_empty), *(None if np.isnan(value) else value for value in row)]
         for estimate, row in zip(report.estimates, np.hstack(blocks).tolist(), strict=True)
     ]
-    return to_csv(["k", "empty", *columns], rows)
+    return csv_text(["k", "empty", *columns], rows)
 
 
 def times(report: Report) -> tuple[Floats, str]:

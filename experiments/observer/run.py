@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from experiments.common.errors import InputError
-from experiments.common.problem_command import ProblemCommand
-from experiments.common.screen import BeginProgress
-from experiments.observer.command import Observe
-from experiments.observer.data import data_of, need_size
-from experiments.observer.file import ObserverProblem
-from experiments.observer.page import observer_page
-from experiments.observer.report import Report, report_csv, report_json, report_lines
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.problem_command import ProblemCommand
+from infoset.experiments.common.screen import BeginProgress
+from infoset.experiments.observer.command import Observe
+from infoset.experiments.observer.data import data_of, need_size
+from infoset.experiments.observer.file import ObserverProblem
+from infoset.experiments.observer.page import observer_page
+from infoset.experiments.observer.report import Report, report_csv, report_json, report_lines
 
 
 def solve(problem: ObserverProblem, options: Observe, begin: BeginProgress) -> Report:
@@ -38,7 +38,7 @@ COMMAND = ProblemCommand(
     lines=report_lines,
     to_html=observer_page,
     csv_name="bounds.csv",
-    figures="experiments.observer.figures",
+    figures="infoset.experiments.observer.figures",
     figure_names=("figure-bounds", "figure-sets"),
 )
 run = COMMAND.run

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
-from experiments.common.figure_style import (
+from infoset.arrays import Floats
+from infoset.experiments.common.figure_style import (
     BOUND,
     EVENT,
     INK,
@@ -27,11 +28,10 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.hill_axes import AXIS_TITLES, component_titles
-from experiments.common.units import length_unit
-from experiments.pareto.report import CHOICES, Report
-from infoset.arrays import Floats
-from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
+from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
+from infoset.experiments.common.units import length_unit
+from infoset.experiments.pareto.report import CHOICES, Report
+from infoset.rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
 _VIEWS: tuple[tuple[int, ...], ...] = ((1, 0), (0, 1, 2), (1, 2), (0, 2))
 """Axes of the panels: three planes, and space in the second one."""

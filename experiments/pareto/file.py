@@ -9,10 +9,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from experiments.common.orbit_checks import check_angle, check_rate
+from infoset.experiments.common.orbit_checks import check_angle, check_rate
 from infoset.limits import NUMBER, Description, Name, NotNegative, Number, Positive
-from rendezvous.pareto import Component, Craft, Encounter, Meeting
-from rendezvous.relative_motion import ClohessyWiltshire
+from infoset.rendezvous.pareto import Component, Craft, Encounter, Meeting
+from infoset.rendezvous.relative_motion import ClohessyWiltshire
 
 Vector = Annotated[tuple[float, float, float], NUMBER]
 

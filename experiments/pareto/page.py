@@ -6,12 +6,12 @@ from importlib import resources
 
 import numpy as np
 
-from experiments.common.hill_axes import AXES, AXIS_TITLES
-from experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
-from experiments.common.units import length_unit
-from experiments.pareto.report import CHOICES, Report
 from infoset.arrays import Floats
-from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
+from infoset.experiments.common.hill_axes import AXES, AXIS_TITLES
+from infoset.experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
+from infoset.experiments.common.units import length_unit
+from infoset.experiments.pareto.report import CHOICES, Report
+from infoset.rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
 MOMENTS = 121
 _SET_POINTS = 600
@@ -62,7 +62,7 @@ def pareto_page(report: Report) -> str:
         "pareto_hull": faces_of(solution.ideals)[0] if hull else None,
         "pareto_points": [] if hull else pareto_set(solution, simplex_weights(len(tracks), _SET_POINTS)),
     }
-    script = (resources.files("experiments.pareto") / "page.js").read_text(encoding="utf-8")
+    script = (resources.files("infoset.experiments.pareto") / "page.js").read_text(encoding="utf-8")
     return motion_page(f"Encounter {report.problem.name}", about, time_s, views, own_script=script, own_data=data)
 
 

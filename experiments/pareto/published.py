@@ -10,13 +10,13 @@ from itertools import groupby
 
 import numpy as np
 
-from experiments.common.hill_axes import to_paper
-from experiments.common.input_file import read_file
-from experiments.common.printed_numbers import Paper, PrintedNumber, Progress, read_paper
-from experiments.pareto.file import ParetoProblem
 from infoset.arrays import Floats
-from rendezvous.pareto import EncounterSolution, Plan, solve_encounter
-from rendezvous.relative_motion import ClohessyWiltshire
+from infoset.experiments.common.hill_axes import to_paper
+from infoset.experiments.common.input_file import read_file
+from infoset.experiments.common.printed_numbers import Paper, PrintedNumber, Progress, read_paper
+from infoset.experiments.pareto.file import ParetoProblem
+from infoset.rendezvous.pareto import EncounterSolution, Plan, solve_encounter
+from infoset.rendezvous.relative_motion import ClohessyWiltshire
 
 PROBLEM = "pareto-2008"
 STARTS = "section 3, x(0), found from results"

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from experiments.common.hill_axes import AXES
-from experiments.common.problem_command import trajectories_csv
-from experiments.common.screen import Part, number, number_table
-from experiments.pareto.file import TERMINAL, ParetoProblem
 from infoset.arrays import Floats
-from rendezvous.pareto import BoundCheck, Coalitions, EncounterSolution, Feasibility, distances
+from infoset.experiments.common.hill_axes import AXES
+from infoset.experiments.common.problem_command import trajectories_csv
+from infoset.experiments.common.screen import Part, number, number_table
+from infoset.experiments.pareto.file import TERMINAL, ParetoProblem
+from infoset.rendezvous.pareto import BoundCheck, Coalitions, EncounterSolution, Feasibility, distances
 
 SAMPLES = 31
 """Number of times in a trajectory of the CSV file."""
@@ -45,7 +45,7 @@ class Report:
 
 
 def report_json(report: Report) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`."""
+    """Return the results for `infoset.experiments.common.output.to_json`."""
     solution, encounter = report.solution, report.problem.encounter
     return {
         "units": {

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.common.errors import InputError, shown
-from experiments.common.problem_command import ProblemCommand
-from experiments.common.screen import BeginProgress
-from experiments.pareto.command import Pareto
-from experiments.pareto.file import TERMINAL, ParetoProblem
-from experiments.pareto.page import pareto_page
-from experiments.pareto.report import Report, report_json, report_lines, trajectories
 from infoset.arrays import Floats
+from infoset.experiments.common.errors import InputError, shown
+from infoset.experiments.common.problem_command import ProblemCommand
+from infoset.experiments.common.screen import BeginProgress
+from infoset.experiments.pareto.command import Pareto
+from infoset.experiments.pareto.file import TERMINAL, ParetoProblem
+from infoset.experiments.pareto.page import pareto_page
+from infoset.experiments.pareto.report import Report, report_json, report_lines, trajectories
 from infoset.limits import MAXIMUM
-from rendezvous.pareto import (
+from infoset.rendezvous.pareto import (
     BoundCheck,
     EncounterSolution,
     Feasibility,
@@ -28,7 +28,7 @@ from rendezvous.pareto import (
     solve_encounter,
     total_impulse,
 )
-from rendezvous.pareto.coalitions import MAX_CRAFT
+from infoset.rendezvous.pareto.coalitions import MAX_CRAFT
 
 SWEEP = (0.5, 2.0, 31)
 """Smallest and largest duration of the sweep, relative to the duration of the problem, and their number."""
@@ -107,7 +107,7 @@ COMMAND = ProblemCommand(
     to_csv=trajectories,
     lines=report_lines,
     to_html=pareto_page,
-    figures="experiments.pareto.figures",
+    figures="infoset.experiments.pareto.figures",
     figure_names=("figure-trajectories", "figure-controls", "figure-front"),
 )
 run = COMMAND.run

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings
+from infoset.experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings
 
 
 @dataclass(frozen=True)

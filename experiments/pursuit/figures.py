@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from experiments.common.figure_style import (
+from infoset.arrays import Floats
+from infoset.experiments.common.figure_style import (
     BOUND,
     IMPULSE,
     LIMIT,
@@ -23,11 +24,19 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.hill_axes import AXIS_TITLES, INERTIAL_TITLES
-from experiments.common.units import M_PER_KM, length_unit, time_unit
-from experiments.pursuit.report import Report, thrust_angles
-from infoset.arrays import Floats
-from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict, history, orbital_axes
+from infoset.experiments.common.hill_axes import AXIS_TITLES, INERTIAL_TITLES
+from infoset.experiments.common.units import M_PER_KM, length_unit, time_unit
+from infoset.experiments.pursuit.report import Report, thrust_angles
+from infoset.rendezvous.pursuit_evasion import (
+    Ended,
+    Flight,
+    History,
+    PlayerHistory,
+    Solution,
+    Verdict,
+    history,
+    orbital_axes,
+)
 
 PURSUER: dict[str, Any] = {"color": TRUTH, "linestyle": "-", "label": "pursuer"}
 EVADER: dict[str, Any] = {"color": MEASURED, "linestyle": (0, (5, 1.5)), "label": "evader"}

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from infoset.limits import Description, Name, NotNegative, Positive
-from rendezvous.pursuit_evasion import Game, Gravity, Player
-from rendezvous.two_body import OrbitalElements
+from infoset.rendezvous.pursuit_evasion import Game, Gravity, Player
+from infoset.rendezvous.two_body import OrbitalElements
 
 Vector = tuple[float, float, float]
 

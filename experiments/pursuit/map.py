@@ -10,17 +10,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.errors import InputError, shown
-from experiments.common.input_file import changed, keys_of, numeric_key, similar_key
-from experiments.common.output import to_csv
-from experiments.common.problem_command import ProblemCommand
-from experiments.common.screen import BeginProgress
-from experiments.common.units import M_PER_KM, S_PER_HOUR
-from experiments.pursuit.command import PursuitMap
-from experiments.pursuit.file import PursuitProblem
 from infoset.arrays import Floats
-from rendezvous.pursuit_evasion import Game, Verdict, solve
-from rendezvous.two_body import OrbitalElements
+from infoset.experiments.common.errors import InputError, shown
+from infoset.experiments.common.input_file import changed, keys_of, numeric_key, similar_key
+from infoset.experiments.common.problem_command import ProblemCommand
+from infoset.experiments.common.screen import BeginProgress
+from infoset.experiments.common.units import M_PER_KM, S_PER_HOUR
+from infoset.experiments.pursuit.command import PursuitMap
+from infoset.experiments.pursuit.file import PursuitProblem
+from infoset.rendezvous.pursuit_evasion import Game, Verdict, solve
+from infoset.rendezvous.two_body import OrbitalElements
+from infoset.sim.columns import csv_text
 
 Masked = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 
@@ -131,7 +131,7 @@ def read_axis(option: str, text: str) -> Axis:
 
 
 def report_json(report: MapReport) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`."""
+    """Return the results for `infoset.experiments.common.output.to_json`."""
     return {
         "x": report.x,
         "y": report.y,
@@ -147,7 +147,7 @@ def report_csv(report: MapReport) -> str:
     grid = np.meshgrid(report.x.values, report.y.values)
     parts = (*grid, report.capture_s, report.closing_speed_m_s / M_PER_KM, report.verdict)
     columns = [report.x.parameter, report.y.parameter, "capture_time_s", "closing_speed_km_s", "verdict"]
-    return to_csv(columns, [*zip(*(part.ravel().tolist() for part in parts), strict=True)])
+    return csv_text(columns, [*zip(*(part.ravel().tolist() for part in parts), strict=True)])
 
 
 def report_lines(report: MapReport) -> Iterator[str]:
@@ -165,7 +165,7 @@ COMMAND = ProblemCommand(
     to_csv=report_csv,
     lines=report_lines,
     csv_name="map.csv",
-    figures="experiments.pursuit.map_figure",
+    figures="infoset.experiments.pursuit.map_figure",
     figure_names=("figure-map",),
 )
 run = COMMAND.run

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import HALO, INK, legend_below, style, subplots
-from experiments.common.units import S_PER_HOUR, split_unit
-from experiments.pursuit.map import NO_GAME, MapReport
-from rendezvous.pursuit_evasion import Verdict
+from infoset.experiments.common.figure_style import HALO, INK, legend_below, style, subplots
+from infoset.experiments.common.units import S_PER_HOUR, split_unit
+from infoset.experiments.pursuit.map import NO_GAME, MapReport
+from infoset.rendezvous.pursuit_evasion import Verdict
 
 _LEVELS = 8
 _COLOURS = {

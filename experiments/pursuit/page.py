@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.common.errors import InputError
-from experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
-from experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
-from experiments.common.units import length_unit
-from experiments.pursuit.report import INERTIAL_AXES, Report, saddle_point, thrust_angles
-from rendezvous.pursuit_evasion import history, orbital_axes
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.hill_axes import AXES, AXIS_TITLES, INERTIAL_TITLES
+from infoset.experiments.common.page_motion import Curve, Graph, Mark, Track, View, motion_page
+from infoset.experiments.common.units import length_unit
+from infoset.experiments.pursuit.report import INERTIAL_AXES, Report, saddle_point, thrust_angles
+from infoset.rendezvous.pursuit_evasion import history, orbital_axes
 
 MOMENTS = 301
 _DEGREES = ("deg", 180.0 / np.pi)

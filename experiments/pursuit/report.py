@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.common.problem_command import trajectories_csv
-from experiments.common.screen import Part, number, number_table
-from experiments.common.units import M_PER_KM, S_PER_HOUR
-from experiments.pursuit.file import PursuitProblem
 from infoset.arrays import Floats
-from rendezvous.pursuit_evasion import (
+from infoset.experiments.common.problem_command import trajectories_csv
+from infoset.experiments.common.screen import Part, number, number_table
+from infoset.experiments.common.units import M_PER_KM, S_PER_HOUR
+from infoset.experiments.pursuit.file import PursuitProblem
+from infoset.rendezvous.pursuit_evasion import (
     Capture,
     Certificate,
     Ended,
@@ -50,7 +50,7 @@ class Report:
 
 
 def report_json(report: Report) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`; keys are the names of the solution's fields."""
+    """Return the results for `to_json`; keys are the names of the solution's fields."""
     solution, capture, certificate = report.solution, report.solution.capture, report.certificate
     return {
         "axes": INERTIAL_AXES,

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.common.errors import InputError
-from experiments.common.options import choice
-from experiments.common.problem_command import ProblemCommand
-from experiments.common.screen import BeginProgress, say
-from experiments.pursuit.command import Pursuit
-from experiments.pursuit.file import PursuitProblem
-from experiments.pursuit.page import pursuit_page
-from experiments.pursuit.report import Feedback, Report, report_json, report_lines, trajectories
-from rendezvous.pursuit_evasion import (
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.options import choice
+from infoset.experiments.common.problem_command import ProblemCommand
+from infoset.experiments.common.screen import BeginProgress, say
+from infoset.experiments.pursuit.command import Pursuit
+from infoset.experiments.pursuit.file import PursuitProblem
+from infoset.experiments.pursuit.page import pursuit_page
+from infoset.experiments.pursuit.report import Feedback, Report, report_json, report_lines, trajectories
+from infoset.rendezvous.pursuit_evasion import (
     Observation,
     Policy,
     RandomSteering,
@@ -85,7 +85,7 @@ COMMAND = ProblemCommand(
     to_csv=trajectories,
     lines=report_lines,
     to_html=pursuit_page,
-    figures="experiments.pursuit.figures",
+    figures="infoset.experiments.pursuit.figures",
     figure_names=("figure-orbits", "figure-relative", "figure-control", "figure-distance", "figure-feedback"),
 )
 run = COMMAND.run

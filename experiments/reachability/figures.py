@@ -14,7 +14,8 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from scipy.spatial import ConvexHull, QhullError
 
-from experiments.common.figure_style import (
+from infoset.arrays import Floats
+from infoset.experiments.common.figure_style import (
     BOUND,
     INK,
     LINE_LOOKS,
@@ -26,10 +27,9 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.hill_axes import AXIS_TITLES, component_titles
-from experiments.reachability.report import Member, Report
-from infoset.arrays import Floats
-from rendezvous.reachability import SetKind
+from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
+from infoset.experiments.reachability.report import Member, Report
+from infoset.rendezvous.reachability import SetKind
 
 _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
 """Relative error of the drawn sets."""

@@ -10,10 +10,10 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from experiments.common.orbit_checks import check_angle, check_orbit
 from infoset.arrays import Floats
+from infoset.experiments.common.orbit_checks import check_angle, check_orbit
 from infoset.limits import POSITIVE, Description, Limits, Name, Part, Positive
-from rendezvous.reachability import (
+from infoset.rendezvous.reachability import (
     MAX_PERIODS,
     MotionModel,
     NonlinearMotion,
@@ -23,8 +23,8 @@ from rendezvous.reachability import (
     discretised,
     motion_of,
 )
-from rendezvous.relative_motion import CollocatedMotion, EllipticOrbit
-from rendezvous.two_body import OrbitalElements
+from infoset.rendezvous.relative_motion import CollocatedMotion, EllipticOrbit
+from infoset.rendezvous.two_body import OrbitalElements
 
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 _MAX_REACH = 1e4

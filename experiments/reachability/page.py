@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.common.hill_axes import AXES, AXIS_TITLES
-from experiments.common.page_motion import Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
-from experiments.reachability.report import POINTS, Report
 from infoset.arrays import Floats
-from rendezvous.reachability import SetKind
+from infoset.experiments.common.hill_axes import AXES, AXIS_TITLES
+from infoset.experiments.common.page_motion import Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
+from infoset.experiments.reachability.report import POINTS, Report
+from infoset.rendezvous.reachability import SetKind
 
 _TOLERANCE = 1e-2
 _MAX_SETS = 24

@@ -13,15 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.common.hill_axes import from_paper, to_paper
-from experiments.common.input_file import read_file
-from experiments.common.printed_numbers import Ours, PrintedNumber, Progress, read_paper
-from experiments.reachability.file import Rendezvous
-from experiments.reachability.report import Member
-from experiments.reachability.run import fly_members
 from infoset.arrays import Flags, Floats
-from rendezvous.reachability import NonlinearMotion, ReachabilityProblem, minimum_energy, nearest, solve
-from rendezvous.relative_motion import EllipticOrbit
+from infoset.experiments.common.hill_axes import from_paper, to_paper
+from infoset.experiments.common.input_file import read_file
+from infoset.experiments.common.printed_numbers import Ours, PrintedNumber, Progress, read_paper
+from infoset.experiments.reachability.file import Rendezvous
+from infoset.experiments.reachability.report import Member
+from infoset.experiments.reachability.run import fly_members
+from infoset.rendezvous.reachability import NonlinearMotion, ReachabilityProblem, minimum_energy, nearest, solve
+from infoset.rendezvous.relative_motion import EllipticOrbit
 
 PROBLEM = "rendezvous-2021"
 PUBLISHED_RADIUS_M = 90e3

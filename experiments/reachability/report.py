@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 from rich.table import Table
 
-from experiments.common.hill_axes import AXES
-from experiments.common.problem_command import trajectories_csv
-from experiments.common.screen import Part, number, number_table
-from experiments.common.units import Unit, length_unit
-from experiments.reachability.file import Rendezvous
 from infoset.arrays import Floats
-from rendezvous.reachability import FeedbackPlan, Flight, SetKind, Solution, ThrustShape, effort
+from infoset.experiments.common.hill_axes import AXES
+from infoset.experiments.common.problem_command import trajectories_csv
+from infoset.experiments.common.screen import Part, number, number_table
+from infoset.experiments.common.units import Unit, length_unit
+from infoset.experiments.reachability.file import Rendezvous
+from infoset.rendezvous.reachability import FeedbackPlan, Flight, SetKind, Solution, ThrustShape, effort
 
 POINTS = 24
 """Points of a displayed trajectory per period."""
@@ -126,7 +126,7 @@ def trajectories(report: Report) -> str:
 
 
 def report_json(report: Report) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`; key ``units`` has the units of the states."""
+    """Return the results for `infoset.experiments.common.output.to_json`; key ``units`` has the units of the states."""
     solution, rendezvous = report.solution, report.rendezvous
     return {
         "units": {

@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from experiments.common.built_in_files import kind_of
-from experiments.common.errors import InputError
-from experiments.common.input_file import parse, source_of
-from experiments.common.problem_command import ProblemCommand
-from experiments.common.screen import BeginProgress
-from experiments.reachability.command import Reach
-from experiments.reachability.file import Rendezvous
-from experiments.reachability.page import reachability_page
-from experiments.reachability.report import Member, Report, Robustness, report_json, report_lines, trajectories
-from experiments.reachability.selection import select_controls, selection
-from experiments.reachability.system import COMMAND as SYSTEM_COMMAND
-from experiments.reachability.system_file import ReachableSystem
 from infoset.arrays import Floats
-from rendezvous.reachability import (
+from infoset.experiments.common.built_in_files import kind_of
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import parse, source_of
+from infoset.experiments.common.problem_command import ProblemCommand
+from infoset.experiments.common.screen import BeginProgress
+from infoset.experiments.reachability.command import Reach
+from infoset.experiments.reachability.file import Rendezvous
+from infoset.experiments.reachability.page import reachability_page
+from infoset.experiments.reachability.report import Member, Report, Robustness, report_json, report_lines, trajectories
+from infoset.experiments.reachability.selection import select_controls, selection
+from infoset.experiments.reachability.system import COMMAND as SYSTEM_COMMAND
+from infoset.experiments.reachability.system_file import ReachableSystem
+from infoset.rendezvous.reachability import (
     EmptyTubeError,
     Flight,
     NonlinearMotion,
@@ -132,7 +132,7 @@ COMMAND = ProblemCommand(
     to_csv=trajectories,
     lines=report_lines,
     to_html=reachability_page,
-    figures="experiments.reachability.figures",
+    figures="infoset.experiments.reachability.figures",
     figure_names=("figure-positions", "figure-velocities", "figure-planes", "figure-controls"),
 )
 

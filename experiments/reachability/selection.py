@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.common.errors import InputError, input_errors
-from experiments.common.options import choice
-from experiments.reachability.command import Reach
 from infoset.arrays import Floats
+from infoset.experiments.common.errors import InputError, input_errors
+from infoset.experiments.common.options import choice
+from infoset.experiments.reachability.command import Reach
 from infoset.geometry.polytope import UncertainHullError
-from rendezvous.reachability import (
+from infoset.rendezvous.reachability import (
     Solution,
     TooManyVerticesError,
     analytic_centre,

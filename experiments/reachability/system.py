@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.common.errors import InputError
-from experiments.common.output import Cell, to_csv
-from experiments.common.problem_command import ProblemCommand
-from experiments.common.screen import BeginProgress, Part, number, number_table
-from experiments.reachability.command import Reach
-from experiments.reachability.report import solution_json, solution_lines
-from experiments.reachability.selection import select_controls, selection
-from experiments.reachability.system_file import ReachableSystem
 from infoset.arrays import Floats
-from rendezvous.reachability import SetKind, Solution, min_periods, solve
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.problem_command import ProblemCommand
+from infoset.experiments.common.screen import BeginProgress, Part, number, number_table
+from infoset.experiments.reachability.command import Reach
+from infoset.experiments.reachability.report import solution_json, solution_lines
+from infoset.experiments.reachability.selection import select_controls, selection
+from infoset.experiments.reachability.system_file import ReachableSystem
+from infoset.rendezvous.reachability import SetKind, Solution, min_periods, solve
+from infoset.sim.columns import Cell, csv_text
 
 _ZERO = 1e-10
 """Part of a bound below which a state is shown as zero."""
@@ -55,7 +55,7 @@ def solve_system(system: ReachableSystem, options: Reach, begin: BeginProgress) 
 
 
 def report_json(report: Report) -> dict[str, object]:
-    """Return the results for `experiments.common.output.to_json`."""
+    """Return the results for `infoset.experiments.common.output.to_json`."""
     return {
         "states": report.system.names,
         **solution_json(report.solution, report.min_periods, (report.forward, report.tube), report.ranges),
@@ -76,7 +76,7 @@ def motions_csv(report: Report) -> str:
         for states in [report.states[name]]
         for t in range(len(states))
     ]
-    return to_csv(columns, rows)
+    return csv_text(columns, rows)
 
 
 def report_lines(report: Report) -> Iterator[Part]:
@@ -105,6 +105,6 @@ COMMAND = ProblemCommand(
     to_csv=motions_csv,
     lines=report_lines,
     csv_name="motions.csv",
-    figures="experiments.reachability.system_figures",
+    figures="infoset.experiments.reachability.system_figures",
     figure_names=("figure-states", "figure-controls"),
 )

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from experiments.common.figure_style import (
+from infoset.experiments.common.figure_style import (
     LINE_LOOKS,
     REGION_FILL,
     SET_EDGE,
@@ -19,7 +19,7 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.reachability.system import Report
+from infoset.experiments.reachability.system import Report
 
 
 def draw_all(report: Report) -> Iterator[Figure]:

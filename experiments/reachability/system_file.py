@@ -10,7 +10,7 @@ import numpy as np
 
 from infoset.arrays import Floats
 from infoset.limits import NUMBER, POSITIVE, Description, Limits, Line, Name, real_values
-from rendezvous.reachability import MAX_PERIODS, ReachabilityProblem, ThrustShape
+from infoset.rendezvous.reachability import MAX_PERIODS, ReachabilityProblem, ThrustShape
 
 Row = Annotated[tuple[float, ...], NUMBER]
 

@@ -37,7 +37,7 @@ class Geometry(Protocol):
 
 @dataclass(frozen=True)
 class Apart:
-    """Two true motions at n times, for the lower bound of the miss (`sim.lower_bound`).
+    """Two true motions at n times, for the lower bound of the miss (`infoset.sim.lower_bound`).
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Sensor(ABC):
     quantity : str
         What it measures, with the unit: ``measured_<quantity>`` is its column in files.
     stream : int
-        Its stream of random numbers: a number below 16 that no other kind and no stream of `sim.draws` has.
+        Its stream of random numbers: a number below 16 that no other kind and no stream of `infoset.sim.draws` has.
     is_lateral : bool
         Whether it measures one value for each lateral axis: its arrays have the shape (C, B), otherwise (B,).
     """
@@ -127,7 +127,7 @@ class Sensor(ABC):
     def band(
         self, range_m: Floats, closing_speed_m_s: Floats | float, errors: float = 1.0
     ) -> tuple[bool, Floats] | None:
-        """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
+        """Return the band of (V, z) that a measurement leaves, for `infoset.lower_bound`.
 
         The search for two motions uses it. It may neglect terms of second order, because `share` checks what is found.
 

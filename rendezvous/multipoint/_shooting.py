@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous._compile import allocation_free, compiled
-from rendezvous.dormand_prince import STAGES, step_of
-from rendezvous.multipoint.segments import Nodes, Path, time_gradient
-from rendezvous.relative_motion.linear_motion import even_breaks
-from rendezvous.two_body import coast
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous._compile import allocation_free, compiled
+from infoset.rendezvous.dormand_prince import STAGES, step_of
+from infoset.rendezvous.multipoint.segments import Nodes, Path, time_gradient
+from infoset.rendezvous.relative_motion.linear_motion import even_breaks
+from infoset.rendezvous.two_body import coast
 
 R, V, L_R, L_V = 0, 3, 6, 9
 """First rows of the position, the velocity and their costates."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rendezvous._arrays import Floats, Integers
-from rendezvous.multipoint._shooting import ShotPath, blocks_of, shoot
-from rendezvous.multipoint.segments import NotSettledError, Path, check_times
-from rendezvous.multipoint.tour import Target, Visits
-from rendezvous.two_body import coast
+from infoset.rendezvous._arrays import Floats, Integers
+from infoset.rendezvous.multipoint._shooting import ShotPath, blocks_of, shoot
+from infoset.rendezvous.multipoint.segments import NotSettledError, Path, check_times
+from infoset.rendezvous.multipoint.tour import Target, Visits
+from infoset.rendezvous.two_body import coast
 
 MAX_KNOWN = 64
 

@@ -10,9 +10,9 @@ from math import factorial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous._arrays import Flags, Floats
-from rendezvous.multipoint.segments import NotSettledError, Path, check_times
-from rendezvous.multipoint.times import (
+from infoset.rendezvous._arrays import Flags, Floats
+from infoset.rendezvous.multipoint.segments import NotSettledError, Path, check_times
+from infoset.rendezvous.multipoint.times import (
     BestTimes,
     Effort,
     NoRoomError,
@@ -20,7 +20,7 @@ from rendezvous.multipoint.times import (
     TimeSearch,
     optimise_times,
 )
-from rendezvous.multipoint.tour import SMOOTH, Visits
+from infoset.rendezvous.multipoint.tour import SMOOTH, Visits
 
 Report = Callable[[float], None]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from rendezvous._arrays import Flags, Floats, Integers
-from rendezvous.relative_motion import LinearMotion
-from rendezvous.relative_motion.linear_motion import state_scales
+from infoset.rendezvous._arrays import Flags, Floats, Integers
+from infoset.rendezvous.relative_motion import LinearMotion
+from infoset.rendezvous.relative_motion.linear_motion import state_scales
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
-from rendezvous._arrays import Floats
-from rendezvous._halton import halton
-from rendezvous.multipoint.segments import NotSettledError, Path
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous._halton import halton
+from infoset.rendezvous.multipoint.segments import NotSettledError, Path
 
 FlyAt = Callable[[Floats], Path]
 

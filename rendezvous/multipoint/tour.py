@@ -11,9 +11,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous._arrays import Floats, Integers
-from rendezvous.multipoint.segments import Nodes, Path, solve_segments
-from rendezvous.relative_motion import LinearMotion
+from infoset.rendezvous._arrays import Floats, Integers
+from infoset.rendezvous.multipoint.segments import Nodes, Path, solve_segments
+from infoset.rendezvous.relative_motion import LinearMotion
 
 SMOOTH = 4.0 / 3.0
 

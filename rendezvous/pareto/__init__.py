@@ -1,8 +1,8 @@
 """Minimum-energy encounter of several craft, and the choice among its Pareto-optimal meetings."""
 
-from rendezvous.pareto.coalitions import Coalition, Coalitions, Core, analyse_coalitions
-from rendezvous.pareto.encounter import Component, Craft, Encounter, Meeting
-from rendezvous.pareto.feasibility import (
+from infoset.rendezvous.pareto.coalitions import Coalition, Coalitions, Core, analyse_coalitions
+from infoset.rendezvous.pareto.encounter import Component, Craft, Encounter, Meeting
+from infoset.rendezvous.pareto.feasibility import (
     BoundCheck,
     Feasibility,
     check_bound,
@@ -10,9 +10,9 @@ from rendezvous.pareto.feasibility import (
     peak_control,
     total_impulse,
 )
-from rendezvous.pareto.front import distances, pareto_set, simplex_weights
-from rendezvous.pareto.selections import min_sum_of_costs, minimax_excess, nearest_to
-from rendezvous.pareto.solution import (
+from infoset.rendezvous.pareto.front import distances, pareto_set, simplex_weights
+from infoset.rendezvous.pareto.selections import min_sum_of_costs, minimax_excess, nearest_to
+from infoset.rendezvous.pareto.solution import (
     CraftCost,
     EncounterSolution,
     Plan,

@@ -9,8 +9,8 @@ from math import factorial
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous.pareto.solution import EncounterSolution, weighted_point
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pareto.solution import EncounterSolution, weighted_point
 
 MAX_CRAFT = 12
 _ROUNDING = 1e-18

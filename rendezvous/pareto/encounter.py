@@ -7,8 +7,8 @@ from enum import Enum
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous.relative_motion import LinearMotion
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.relative_motion import LinearMotion
 
 
 class Component(Enum):

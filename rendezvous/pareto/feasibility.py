@@ -10,9 +10,9 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 from scipy.optimize import minimize
 
-from rendezvous._arrays import Floats
-from rendezvous.pareto.solution import Plan
-from rendezvous.piecewise import NODES, chebyshev_halves, max_control, resolve
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pareto.solution import Plan
+from infoset.rendezvous.piecewise import NODES, chebyshev_halves, max_control, resolve
 
 _TOLERANCE = 1e-10
 _MIN_SHARE = 1e-3

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous._halton import halton
-from rendezvous.pareto.solution import EncounterSolution
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous._halton import halton
+from infoset.rendezvous.pareto.solution import EncounterSolution
 
 
 def pareto_set(solution: EncounterSolution, weights: Floats) -> Floats:

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from infoset.geometry.polytope import nearest_pair
-from rendezvous._arrays import Floats
-from rendezvous.pareto.solution import EncounterSolution
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pareto.solution import EncounterSolution
 
 _CORNER = 1e-20
 """Square of the radius of the rounded corner of a norm, relative to the distance of the farthest ideal."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous._arrays import Floats
-from rendezvous.pareto.encounter import Craft, Encounter
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pareto.encounter import Craft, Encounter
 
 
 @dataclass(frozen=True, eq=False)

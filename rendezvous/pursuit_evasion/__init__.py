@@ -5,13 +5,13 @@ Control, and Dynamics 41(8), 2018, p. 1823, with misprints corrected. The method
 not from these sources.
 """
 
-from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
-from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, fly
-from rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
-from rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
-from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Solution, Verdict
-from rendezvous.pursuit_evasion.solver import solve
-from rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Steering
+from infoset.rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
+from infoset.rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, fly
+from infoset.rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
+from infoset.rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
+from infoset.rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Solution, Verdict
+from infoset.rendezvous.pursuit_evasion.solver import solve
+from infoset.rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Steering
 
 __all__ = [
     "Capture",

@@ -14,8 +14,8 @@ from enum import Enum
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._pair import COARSE, FINE, MAX_RESIDUAL, ROUGH, Node, Pair
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pursuit_evasion._pair import COARSE, FINE, MAX_RESIDUAL, ROUGH, Node, Pair
 
 _LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
 _PREDICTED_WITHIN = 3e-3

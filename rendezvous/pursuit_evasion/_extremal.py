@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous._compile import allocation_free, compiled
-from rendezvous.dormand_prince import STAGES, error_of_step, step_of
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous._compile import allocation_free, compiled
+from infoset.rendezvous.dormand_prince import STAGES, error_of_step, step_of
 
 STATES, COLUMNS = 12, 9
 """Position, velocity and costate; what they are differentiated by: end state (6), nu in its plane (2), end mass."""

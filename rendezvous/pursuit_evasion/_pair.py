@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, end_of, flow_back, rate, shoot_back
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, end_of, flow_back, rate, shoot_back
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair, Response, Side, across
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair, Response, Side, across
 
 _DIRECTIONS = 120
 _SEEDS, _MAX_PARTS = 2, 4

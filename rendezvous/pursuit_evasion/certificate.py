@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
-from rendezvous.pursuit_evasion._pair import MAX_RESIDUAL, Craft, KnownPath, Node, Pair, Side
-from rendezvous.pursuit_evasion._scan import greater, scan
-from rendezvous.pursuit_evasion.game import scaled_game
-from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, extremal_paths, steered_path
-from rendezvous.pursuit_evasion.solution import Solution
-from rendezvous.pursuit_evasion.steering import Policy
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
+from infoset.rendezvous.pursuit_evasion._pair import MAX_RESIDUAL, Craft, KnownPath, Node, Pair, Side
+from infoset.rendezvous.pursuit_evasion._scan import greater, scan
+from infoset.rendezvous.pursuit_evasion.game import scaled_game
+from infoset.rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, extremal_paths, steered_path
+from infoset.rendezvous.pursuit_evasion.solution import Solution
+from infoset.rendezvous.pursuit_evasion.steering import Policy
 
 MAX_HAMILTONIAN_DRIFT = 1e-8
 MAX_INTEGRATOR_GAP = 1e-7

@@ -9,14 +9,14 @@ from enum import Enum
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
-from rendezvous.pursuit_evasion._pair import FINE, Craft, Node, Pair
-from rendezvous.pursuit_evasion.game import Game, Units, scaled_game
-from rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths, steered_path
-from rendezvous.pursuit_evasion.solution import Solution
-from rendezvous.pursuit_evasion.solver import solve
-from rendezvous.pursuit_evasion.steering import Steering
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
+from infoset.rendezvous.pursuit_evasion._pair import FINE, Craft, Node, Pair
+from infoset.rendezvous.pursuit_evasion.game import Game, Units, scaled_game
+from infoset.rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths, steered_path
+from infoset.rendezvous.pursuit_evasion.solution import Solution
+from infoset.rendezvous.pursuit_evasion.solver import solve
+from infoset.rendezvous.pursuit_evasion.steering import Steering
 
 PathNow = Callable[[float], Floats]
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rendezvous.pursuit_evasion._pair import Craft, Pair
-from rendezvous.two_body import orbit_fault, semi_major_axis_m
+from infoset.rendezvous.pursuit_evasion._pair import Craft, Pair
+from infoset.rendezvous.two_body import orbit_fault, semi_major_axis_m
 
 Vector = tuple[float, float, float]
 

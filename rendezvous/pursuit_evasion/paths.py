@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, STATES, end_of, flow_back, rate
-from rendezvous.pursuit_evasion._pair import FINE, Craft, Node
-from rendezvous.pursuit_evasion.game import Units, scaled_game
-from rendezvous.pursuit_evasion.solution import Solution
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, STATES, end_of, flow_back, rate
+from infoset.rendezvous.pursuit_evasion._pair import FINE, Craft, Node
+from infoset.rendezvous.pursuit_evasion.game import Units, scaled_game
+from infoset.rendezvous.pursuit_evasion.solution import Solution
 
 Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._pair import Node
-from rendezvous.pursuit_evasion.game import Game, Units
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pursuit_evasion._pair import Node
+from infoset.rendezvous.pursuit_evasion.game import Game, Units
 
 
 class Verdict(Enum):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
-from rendezvous.pursuit_evasion._pair import Node
-from rendezvous.pursuit_evasion._scan import greater
-from rendezvous.pursuit_evasion.game import Game, Player, Units, horizon_s, scaled_game
-from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Solution, Verdict
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.pursuit_evasion._branch import MAX_WORK, Ending, follow
+from infoset.rendezvous.pursuit_evasion._pair import Node
+from infoset.rendezvous.pursuit_evasion._scan import greater
+from infoset.rendezvous.pursuit_evasion.game import Game, Player, Units, horizon_s, scaled_game
+from infoset.rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Solution, Verdict
 
 _MAX_BRANCHES = 6
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rendezvous._arrays import Floats
+from infoset.rendezvous._arrays import Floats
 
 Steering = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of the time (s) and the evader's state (m, m/s): any length, zero to coast."""

@@ -4,12 +4,17 @@ A problem is built from a motion. Its solution contains the sets of states and t
 selected from this set and simulated.
 """
 
-from rendezvous.reachability.closed_loop import Flight, replan
-from rendezvous.reachability.motion import MotionModel, NonlinearMotion, between_periods, discretised, motion_of
-from rendezvous.reachability.optimum import EmptyTubeError
-from rendezvous.reachability.problem import MAX_PERIODS, InadmissibleStartError, ReachabilityProblem, ThrustShape
-from rendezvous.reachability.robust import FeedbackPlan, NoRobustPlanError, feedback_plan, tightened
-from rendezvous.reachability.selection import (
+from infoset.rendezvous.reachability.closed_loop import Flight, replan
+from infoset.rendezvous.reachability.motion import MotionModel, NonlinearMotion, between_periods, discretised, motion_of
+from infoset.rendezvous.reachability.optimum import EmptyTubeError
+from infoset.rendezvous.reachability.problem import (
+    MAX_PERIODS,
+    InadmissibleStartError,
+    ReachabilityProblem,
+    ThrustShape,
+)
+from infoset.rendezvous.reachability.robust import FeedbackPlan, NoRobustPlanError, feedback_plan, tightened
+from infoset.rendezvous.reachability.selection import (
     Effort,
     analytic_centre,
     chebyshev_centre,
@@ -22,8 +27,8 @@ from rendezvous.reachability.selection import (
     samples,
     vertices,
 )
-from rendezvous.reachability.sets import ReachableSets, SetCounts, SetKind, TooManyVerticesError
-from rendezvous.reachability.solve import OptimalControls, Route, Solution, min_periods, optimal_controls, solve
+from infoset.rendezvous.reachability.sets import ReachableSets, SetCounts, SetKind, TooManyVerticesError
+from infoset.rendezvous.reachability.solve import OptimalControls, Route, Solution, min_periods, optimal_controls, solve
 
 __all__ = [
     "MAX_PERIODS",

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from rendezvous._arrays import Floats, Places
-from rendezvous.reachability.conic import MAX_GAP, ConeProgram, NoSolutionError, Optimum
-from rendezvous.reachability.problem import Block
+from infoset.rendezvous._arrays import Floats, Places
+from infoset.rendezvous.reachability.conic import MAX_GAP, ConeProgram, NoSolutionError, Optimum
+from infoset.rendezvous.reachability.problem import Block
 
 Constraints = tuple[Floats, Floats, Places, Places]
 

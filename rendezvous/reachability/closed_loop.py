@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rendezvous._arrays import Floats
-from rendezvous.reachability.optimum import EmptyTubeError
-from rendezvous.reachability.problem import InadmissibleStartError, ReachabilityProblem
-from rendezvous.reachability.selection import minimum_energy
-from rendezvous.reachability.solve import OptimalControls, optimal_controls
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.reachability.optimum import EmptyTubeError
+from infoset.rendezvous.reachability.problem import InadmissibleStartError, ReachabilityProblem
+from infoset.rendezvous.reachability.selection import minimum_energy
+from infoset.rendezvous.reachability.solve import OptimalControls, optimal_controls
 
 Truth = Callable[[int, Floats, Floats], Floats]
 """A function of the period, the true state and the control that returns the true state one period later."""

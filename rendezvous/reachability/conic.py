@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csc_matrix, issparse, vstack
 
 from infoset.geometry.polytope import HIGHS
-from rendezvous._arrays import Floats
+from infoset.rendezvous._arrays import Floats
 
 MAX_VIOLATION, MAX_GAP, CONE_TOLERANCE = 1e-9, 1e-8, 1e-7
 """The maximum violation of a constraint, and the maximum duality gap, of a solution, relative. The third is both in a

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
-from rendezvous._arrays import Floats
-from rendezvous.relative_motion import CollocatedMotion, EllipticOrbit, TimeVaryingMotion, TschaunerHempel
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.relative_motion import CollocatedMotion, EllipticOrbit, TimeVaryingMotion, TschaunerHempel
 
 _RELATIVE = 1e-12
 _ABSOLUTE = 1e-9

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rendezvous._arrays import Flags, Floats, Places
-from rendezvous.reachability.admissible import Lifted, deep_point, lift, min_relaxation
-from rendezvous.reachability.conic import (
+from infoset.rendezvous._arrays import Flags, Floats, Places
+from infoset.rendezvous.reachability.admissible import Lifted, deep_point, lift, min_relaxation
+from infoset.rendezvous.reachability.conic import (
     ATTEMPTS,
     MAX_GAP,
     MAX_VIOLATION,
@@ -17,8 +17,8 @@ from rendezvous.reachability.conic import (
     NoSolutionError,
     SolverSettings,
 )
-from rendezvous.reachability.problem import Block
-from rendezvous.reachability.relative_interior import null_space_basis, relative_interior
+from infoset.rendezvous.reachability.problem import Block
+from infoset.rendezvous.reachability.relative_interior import null_space_basis, relative_interior
 
 _REACHED = 1e-9
 """Constraints that are broken by less than this, relative to their sizes, count as kept."""

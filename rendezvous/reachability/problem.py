@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from rendezvous._arrays import Floats, Places
+from infoset.rendezvous._arrays import Floats, Places
 
 MAX_PERIODS = 256
 _MAX_GROWTH = 1e10

@@ -12,7 +12,7 @@ from scipy.linalg import null_space
 from scipy.optimize import linprog
 
 from infoset.geometry.polytope import HIGHS, UncertainHullError, largest_ball
-from rendezvous._arrays import Floats, Integers
+from infoset.rendezvous._arrays import Floats, Integers
 
 FLAT = 1e-9
 """Relative thickness below which a set is flat."""

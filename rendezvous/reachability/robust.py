@@ -10,9 +10,9 @@ from scipy.optimize import linprog
 from scipy.sparse import block_array, csr_array, eye_array, kron
 
 from infoset.geometry.polytope import HIGHS
-from rendezvous._arrays import Floats, Places
-from rendezvous.reachability.conic import ConeProgram, NoSolutionError
-from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
+from infoset.rendezvous._arrays import Floats, Places
+from infoset.rendezvous.reachability.conic import ConeProgram, NoSolutionError
+from infoset.rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
 MAX_PERIODS_WITH_FEEDBACK = 24
 _TIDY = 1e-7

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from rendezvous._arrays import Floats
-from rendezvous.reachability.admissible import Lifted, min_l1, min_peak, min_sum_of_norms, quadratic
-from rendezvous.reachability.conic import NoSolutionError
-from rendezvous.reachability.relative_interior import relative_interior
-from rendezvous.reachability.sets import TooManyVerticesError, combined, optimal_polytope
-from rendezvous.reachability.solve import OptimalControls
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.reachability.admissible import Lifted, min_l1, min_peak, min_sum_of_norms, quadratic
+from infoset.rendezvous.reachability.conic import NoSolutionError
+from infoset.rendezvous.reachability.relative_interior import relative_interior
+from infoset.rendezvous.reachability.sets import TooManyVerticesError, combined, optimal_polytope
+from infoset.rendezvous.reachability.solve import OptimalControls
 
 MAX_VERTICES = 2000
 _NEWTON_STEPS = 200

@@ -9,11 +9,11 @@ from enum import Enum
 import numpy as np
 
 from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UncertainHullError, polytope_from_support
-from rendezvous._arrays import Floats
-from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
-from rendezvous.reachability.conic import MAX_GAP
-from rendezvous.reachability.optimum import BlockOptimum
-from rendezvous.reachability.problem import ReachabilityProblem
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
+from infoset.rendezvous.reachability.conic import MAX_GAP
+from infoset.rendezvous.reachability.optimum import BlockOptimum
+from infoset.rendezvous.reachability.problem import ReachabilityProblem
 
 MAX_VERTICES = 1000
 """Vertices of an exact set: a step with so many takes seconds."""

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.geometry.polytope import UncertainHullError
-from rendezvous._arrays import Floats
-from rendezvous.reachability.admissible import Lifted, Maximiser, joined
-from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
-from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
-from rendezvous.reachability.sets import (
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.reachability.admissible import Lifted, Maximiser, joined
+from infoset.rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
+from infoset.rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
+from infoset.rendezvous.reachability.sets import (
     BlockSets,
     LiftedSets,
     ReachableSets,

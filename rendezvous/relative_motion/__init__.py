@@ -4,11 +4,11 @@ Motions about a reference orbit are in Hill's axes, which rotate with it: x radi
 along the orbit's normal, so that z = x cross y. The origin follows the reference orbit.
 """
 
-from rendezvous.relative_motion.clohessy_wiltshire import ClohessyWiltshire
-from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
-from rendezvous.relative_motion.linear_motion import LinearMotion, Segment
-from rendezvous.relative_motion.time_varying import CollocatedMotion, TimeVaryingMotion
-from rendezvous.relative_motion.tschauner_hempel import TschaunerHempel
+from infoset.rendezvous.relative_motion.clohessy_wiltshire import ClohessyWiltshire
+from infoset.rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
+from infoset.rendezvous.relative_motion.linear_motion import LinearMotion, Segment
+from infoset.rendezvous.relative_motion.time_varying import CollocatedMotion, TimeVaryingMotion
+from infoset.rendezvous.relative_motion.tschauner_hempel import TschaunerHempel
 
 __all__ = [
     "ClohessyWiltshire",

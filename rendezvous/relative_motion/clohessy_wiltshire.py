@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous._arrays import Floats
-from rendezvous._compile import compiled
-from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, even_breaks
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous._compile import compiled
+from infoset.rendezvous.relative_motion.linear_motion import LinearMotion, Segment, even_breaks
 
 SERIES_BELOW_RAD = 1.0
 QUADRATURE_BELOW_RAD = 2.0

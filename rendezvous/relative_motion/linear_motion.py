@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous._arrays import Floats
+from infoset.rendezvous._arrays import Floats
 
 MAX_PANELS = 200_000
 

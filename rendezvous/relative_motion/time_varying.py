@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous._arrays import Floats
-from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, state_scales
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.relative_motion.linear_motion import LinearMotion, Segment, state_scales
 
 OfTime = Callable[[Floats], Floats]
 WeightsAt = Callable[[Floats], tuple[Floats, Floats]]

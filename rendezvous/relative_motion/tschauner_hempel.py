@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rendezvous._arrays import Floats
-from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
-from rendezvous.relative_motion.linear_motion import even_breaks
-from rendezvous.relative_motion.time_varying import CollocatedMotion, HeldSegment, LinearSystem, collocate
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
+from infoset.rendezvous.relative_motion.linear_motion import even_breaks
+from infoset.rendezvous.relative_motion.time_varying import CollocatedMotion, HeldSegment, LinearSystem, collocate
 
 PANEL_RAD = 1.0
 """Intervals of sigma up to this one are collocated: over a short one the closed form of the transition loses digits,

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from infoset.arrays import Floats
-from sim.approach import pair_rates
-from sim.kepler import sun_and_orbit
-from sim.scenario import Sun
+from infoset.sim.approach import pair_rates
+from infoset.sim.kepler import sun_and_orbit
+from infoset.sim.scenario import Sun
 
 TOLERANCE = 1e-12
 """Relative tolerance of the integrator, in units in which range and flight time are one."""

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from infoset import BearingSensor, InformationSet, StateBox
 from infoset.arrays import Flags, Floats
-from infoset.model import CENTROID_ERRORS_AT_THRESHOLD
-from sim.bound.lower_bound import LowerBound
-from sim.gravity import on_board_model
-from sim.scenario import Scenario
+from infoset.information_set import InformationSet
+from infoset.model import CENTROID_ERRORS_AT_THRESHOLD, StateBox
+from infoset.sensors import BearingSensor
+from infoset.sim.bound.lower_bound import LowerBound
+from infoset.sim.gravity import on_board_model
+from infoset.sim.scenario import Scenario
 
 ROUNDING = 1e-12
 MAX_TRIALS = 100

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guidance import Thruster
 from infoset.arrays import Floats
-from sim.bound.coasting import Coasting
-from sim.scenario import Sun
+from infoset.guidance import Thruster
+from infoset.sim.bound.coasting import Coasting
+from infoset.sim.scenario import Sun
 
 ROUNDING = 1e-12
 """Part of a step by which a time may be before a step and still belong to it."""

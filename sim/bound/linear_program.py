@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from infoset import SetModel
 from infoset.arrays import Flags, Floats, Integers
+from infoset.model import SetModel
 from infoset.sensors import Sensor
-from sim.bound.coasting import Coasting
+from infoset.sim.bound.coasting import Coasting
 
 MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding."""

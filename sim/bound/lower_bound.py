@@ -9,8 +9,8 @@ from operator import attrgetter
 import numpy as np
 
 from infoset.arrays import Floats
-from sim.bound.pair_of_motions import UNLIMITED, Approach, TruthPair
-from sim.scenario import Scenario, need_scenario
+from infoset.sim.bound.pair_of_motions import UNLIMITED, Approach, TruthPair
+from infoset.sim.scenario import Scenario, need_scenario
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
 """The bound oscillates with the label; the period is the distance travelled between two measurements."""

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guidance import Strategy
-from guidance.noise import LineOfSight
-from infoset import InformationSetView
 from infoset.arrays import Floats
+from infoset.guidance import Strategy
+from infoset.guidance.noise import LineOfSight
+from infoset.information_set import InformationSetView
 from infoset.sensors import Measurements
-from sim.bound.pair_of_motions import TruthPair
-from sim.draws import Draws
-from sim.engagement import Engagements
-from sim.results import Results
-from sim.scenario import Scenario
+from infoset.sim.bound.pair_of_motions import TruthPair
+from infoset.sim.draws import Draws
+from infoset.sim.engagement import Engagements
+from infoset.sim.results import Results
+from infoset.sim.scenario import Scenario
 
 STEPS_BEYOND = 2
 """Maximum number of simulated steps after the one in which x = 0."""

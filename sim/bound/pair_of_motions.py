@@ -9,13 +9,12 @@ from operator import attrgetter
 
 import numpy as np
 
-from infoset import BearingSensor
 from infoset.arrays import Floats, Integers
-from infoset.sensors import Apart
-from sim.bound.coasting import NoArrivalError, coasting
-from sim.bound.gravity_reserve import GravityReserve, gravity_reserve
-from sim.bound.linear_program import MARGIN, PairProgram
-from sim.scenario import Scenario
+from infoset.sensors import Apart, BearingSensor
+from infoset.sim.bound.coasting import NoArrivalError, coasting
+from infoset.sim.bound.gravity_reserve import GravityReserve, gravity_reserve
+from infoset.sim.bound.linear_program import MARGIN, PairProgram
+from infoset.sim.scenario import Scenario
 
 FEW_CANDIDATES = 16
 """Number of last common steps up to which all are tried: between few impulses, the bound has several maxima."""

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sim.results import Results
-from sim.storage.files import LOCK, StorageError, is_leftover, locked, reporting, write_whole
-from sim.storage.manifest import MANIFEST, Manifest, read_manifest
+from infoset.sim.results import Results
+from infoset.sim.storage.files import LOCK, StorageError, is_leftover, locked, reporting, write_whole
+from infoset.sim.storage.manifest import MANIFEST, Manifest, read_manifest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,7 +86,7 @@ class CampaignFolder:
         """Return some columns of stored chunks, one after the other; see `runs`."""
         names = [_name(*chunk) for chunk in chunks]
         files = {self.path / SHARDS / name: self._metadata(name) for name in names}
-        from sim.storage import tables
+        from infoset.sim.storage import tables
 
         return tables.read(files, columns)
 
@@ -99,7 +99,7 @@ class CampaignFolder:
         this campaign already. StorageError if the folder contains something else or a campaign with different settings,
         another campaign is running in it, or it cannot be written.
         """
-        from sim.storage import tables  # noqa: F401 (fails at once if a library is missing)
+        from infoset.sim.storage import tables  # noqa: F401 (fails at once if a library is missing)
 
         need_free(path, resume=resume)
         with reporting(path):
@@ -120,7 +120,7 @@ class CampaignFolder:
 
     def write(self, cell: int, runs: Sequence[int], results: Results) -> None:
         """Write the file of a chunk atomically."""
-        from sim.storage import tables
+        from infoset.sim.storage import tables
 
         name = _name(cell, runs)
         content = tables.to_bytes(results, cell, self.manifest.noise, self._metadata(name))

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from infoset.limits import COUNT, WHOLE, Number, check_fields
-from sim.parallel import CampaignNoise
-from sim.scenario import Scenario
-from sim.storage.codec import from_json, to_json
-from sim.storage.files import StorageError, reporting, write_whole
+from infoset.sim.parallel import CampaignNoise
+from infoset.sim.scenario import Scenario
+from infoset.sim.storage.codec import from_json, to_json
+from infoset.sim.storage.files import StorageError, reporting, write_whole
 
 SCHEMA = 1
 MANIFEST = "manifest.json"
@@ -114,7 +114,7 @@ class Manifest:
 
     @property
     def is_watched(self) -> bool:
-        """Whether the number of runs of a sweep may depend on its results (`sim.requirement.judge`)."""
+        """Whether the number of runs of a sweep may depend on its results (`infoset.sim.requirement.judge`)."""
         return bool(self.axes) and (self.extended or self.until is not None)
 
     @property

@@ -12,10 +12,10 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 from pyarrow.fs import LocalFileSystem
 
-from sim.columns import Column, columns_of, values_of
-from sim.parallel import CampaignNoise
-from sim.results import Results
-from sim.storage.files import StorageError
+from infoset.sim.columns import Column, columns_of, values_of
+from infoset.sim.parallel import CampaignNoise
+from infoset.sim.results import Results
+from infoset.sim.storage.files import StorageError
 
 _RUN, *_OTHERS = columns_of(Results)
 _COLUMNS = (

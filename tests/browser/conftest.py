@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind
-from sim import Record, fly_one
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Record, fly_one
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 HERE = Path(__file__).parent

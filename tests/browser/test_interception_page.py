@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.interception.page import interception_page
-from sim import Record
+from infoset.experiments.interception.page import interception_page
+from infoset.sim import Record
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.observer.command import Errors, Observe
-from experiments.observer.page import observer_page
-from experiments.observer.report import Report
-from experiments.observer.run import COMMAND
+from infoset.experiments.observer.command import Errors, Observe
+from infoset.experiments.observer.page import observer_page
+from infoset.experiments.observer.report import Report
+from infoset.experiments.observer.run import COMMAND
 from tests.browser.conftest import Opened
 
 Open = Callable[..., Opened]

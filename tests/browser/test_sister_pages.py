@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.multipoint import run as multipoint
-from experiments.multipoint.command import Multipoint
-from experiments.pareto import run as pareto
-from experiments.pareto.command import Pareto
-from experiments.pursuit import run as pursuit
-from experiments.pursuit.command import Pursuit
-from experiments.reachability import run as reachability
-from experiments.reachability.command import Reach
-from rendezvous.pareto import min_sum_of_costs
-from rendezvous.pursuit_evasion import history, orbital_axes
+from infoset.experiments.multipoint import run as multipoint
+from infoset.experiments.multipoint.command import Multipoint
+from infoset.experiments.pareto import run as pareto
+from infoset.experiments.pareto.command import Pareto
+from infoset.experiments.pursuit import run as pursuit
+from infoset.experiments.pursuit.command import Pursuit
+from infoset.experiments.reachability import run as reachability
+from infoset.experiments.reachability.command import Reach
+from infoset.rendezvous.pareto import min_sum_of_costs
+from infoset.rendezvous.pursuit_evasion import history, orbital_axes
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.interception.course import MAX_STEPS, complete_steps, kept_steps
-from experiments.interception.page import interception_page
-from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind
 from infoset import InitialSet, Model
-from sim import Body, Record, fly_one
-from sim.scenario import of_model
+from infoset.experiments.interception.course import MAX_STEPS, complete_steps, kept_steps
+from infoset.experiments.interception.page import interception_page
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Body, Record, fly_one
+from infoset.sim.scenario import of_model
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]

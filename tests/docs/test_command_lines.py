@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from experiments.cli import commands, main
+from infoset.experiments.cli import commands, main
 
 pytestmark = pytest.mark.docs
 
@@ -130,7 +130,7 @@ def run(line: str, folder: Path) -> None:
         words.append("--overwrite")  # another line of the page wrote there
     printed, complained = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.common.figure_style.figure_bytes", lambda _: [("pdf", b""), ("png", b"")])
+        patch.setattr("infoset.experiments.common.figure_style.figure_bytes", lambda _: [("pdf", b""), ("png", b"")])
         with (
             contextlib.redirect_stdout(printed),
             contextlib.redirect_stderr(complained),
@@ -192,7 +192,7 @@ def test_blocks_that_are_not_run_say_why(pages: list[Page]) -> None:
     left_out = {block.text: block for page in pages for block in page.blocks() if block.not_run}
     assert all(len(block.not_run.split()) >= 4 for block in left_out.values())
     # A further block that is not run must be listed here.
-    names = ["CONTRIBUTING.md", "benchmarks/README.md", *["docs/campaigns.md"] * 4]
+    names = ["CONTRIBUTING.md", "README.md", "benchmarks/README.md", *["docs/campaigns.md"] * 4]
     assert sorted(block.page for block in left_out.values()) == names
 
 

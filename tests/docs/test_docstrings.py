@@ -14,33 +14,40 @@ from typing import Any
 import pytest
 
 PACKAGES = (
-    *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
-    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.geometry.polytope"),
+    *(
+        "infoset",
+        "infoset.guidance",
+        "infoset.sim",
+        "infoset.rendezvous.relative_motion",
+        "infoset.rendezvous.pareto",
+        "infoset.rendezvous.multipoint",
+    ),
+    *("infoset.rendezvous.reachability", "infoset.rendezvous.pursuit_evasion", "infoset.geometry.polytope"),
     "experiments",
 )
 
-RAISES_CHECKED = ("infoset", "guidance", "sim", "rendezvous")
+RAISES_CHECKED = ("infoset", "infoset.guidance", "infoset.sim", "infoset.rendezvous")
 """Packages in which public functions document the exceptions that they raise."""
 
 WITHOUT_UNITS = (
     *("infoset.ConvexPolygons", "infoset.geometry.polytope.", "infoset.Polytope.", "infoset.Zonotope"),
     "infoset.LinearObserver",  # geometry and systems in any unit
     *(
-        "sim.Distribution",
-        "sim.HitEstimate",
-        "sim.QuantileEstimate",
-        "sim.empirical_distribution",
-        "sim.estimate_hits",
-        "sim.estimate_quantiles",
-        "sim.quantiles",
+        "infoset.sim.Distribution",
+        "infoset.sim.HitEstimate",
+        "infoset.sim.QuantileEstimate",
+        "infoset.sim.empirical_distribution",
+        "infoset.sim.estimate_hits",
+        "infoset.sim.estimate_quantiles",
+        "infoset.sim.quantiles",
     ),
 )
 """Geometry and statistics: their results have the units of their arguments."""
 
 CONTRACTS = {
-    "start": "guidance.Strategy",
-    "decide": "guidance.Strategy",
-    "measure": "guidance.MeasurementNoise",
+    "start": "infoset.guidance.Strategy",
+    "decide": "infoset.guidance.Strategy",
+    "measure": "infoset.guidance.MeasurementNoise",
     **dict.fromkeys(("true_value", "bound", "band", "share", "cut", "measured", "error"), "infoset.Sensor"),
 }
 """Methods of a contract that many classes implement; the contract describes their parameters."""

@@ -19,8 +19,15 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = (
-    *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
-    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.geometry.polytope"),
+    *(
+        "infoset",
+        "infoset.guidance",
+        "infoset.sim",
+        "infoset.rendezvous.relative_motion",
+        "infoset.rendezvous.pareto",
+        "infoset.rendezvous.multipoint",
+    ),
+    *("infoset.rendezvous.reachability", "infoset.rendezvous.pursuit_evasion", "infoset.geometry.polytope"),
 )
 LOADED = {"script": "src", "img": "src", "source": "src", "iframe": "src"}
 

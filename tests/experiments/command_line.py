@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from experiments.cli import main
+from infoset.experiments.cli import main
 
 
 class Command:
@@ -20,7 +20,7 @@ class Command:
     @classmethod
     def in_folder(cls, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
         """Commands in a folder, with a clock that stands: stderr has no times, which depend on the machine."""
-        monkeypatch.setattr("experiments.common.screen.progress_clock", lambda: 0.0)
+        monkeypatch.setattr("infoset.experiments.common.screen.progress_clock", lambda: 0.0)
         monkeypatch.setenv("NO_COLOR", "1")
         monkeypatch.setenv("COLUMNS", "100")
         monkeypatch.chdir(folder)

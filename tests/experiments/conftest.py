@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.common.input_file import to_toml
-from sim import Scenario
+from infoset.experiments.common.input_file import to_toml
+from infoset.sim import Scenario
 from tests.experiments.command_line import Command
 from tests.space import in_space
 
@@ -27,7 +27,7 @@ def unrendered(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) 
     """
     if "rendered" not in request.fixturenames:
         empty = [("pdf", b""), ("png", b"")]
-        monkeypatch.setattr("experiments.common.figure_style.figure_bytes", lambda _figure: empty)
+        monkeypatch.setattr("infoset.experiments.common.figure_style.figure_bytes", lambda _figure: empty)
 
 
 @pytest.fixture

@@ -13,13 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from experiments.common import screen
-from experiments.common.errors import on_a_screen
-from experiments.common.output import to_csv, to_json, write_file
-from experiments.interception.scenario_file import load_scenario
-from sim import Scenario, simulate
-from sim.storage.codec import fingerprint
-from sim.versions import versions
+from infoset.experiments.common import screen
+from infoset.experiments.common.errors import on_a_screen
+from infoset.experiments.common.output import to_json, write_file
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim import Scenario, simulate
+from infoset.sim.columns import csv_text
+from infoset.sim.storage.codec import fingerprint
+from infoset.sim.versions import versions
 from tests.built_in import scenario_text
 from tests.experiments.command_line import Command
 
@@ -42,10 +43,10 @@ def test_version(infoset: Command) -> None:
 
 
 def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_draws() -> None:
-    heavy = ["numpy", "numba", "pydantic", "matplotlib", "scipy", "shapely", "rich", "infoset", "sim"]
+    heavy = ["numpy", "numba", "pydantic", "matplotlib", "scipy", "shapely", "rich", "infoset.model", "infoset.sim"]
     drawing = ["matplotlib", "PIL", "scipy.stats"]
     code = (
-        "import importlib, sys; from experiments.cli import RUNS; "
+        "import importlib, sys; from infoset.experiments.cli import RUNS; "
         f"print([name for name in {heavy} if name in sys.modules]); "
         "[importlib.import_module(module) for module in RUNS.values()]; "
         f"print([name for name in {drawing} if name in sys.modules])"
@@ -84,8 +85,8 @@ def test_help_imports_nothing_heavy_and_no_command_imports_what_draws_before_it_
 def test_what_is_wrong_is_one_message_before_the_work(
     line: str, part: str, infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sim.parallel.simulate_runs", lambda *_: pytest.fail("began to work"))
-    monkeypatch.setattr("experiments.interception.runs.engage.fly_one", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("infoset.sim.parallel.simulate_runs", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("infoset.experiments.interception.runs.engage.fly_one", lambda *_: pytest.fail("began to work"))
     assert part in " ".join(infoset.refused(*line.split()).split())
     assert names_in(tmp_path) == []
 
@@ -239,7 +240,9 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_json_and_csv_of_odd_values() -> None:
-    assert to_csv(["a", "b_m"], [[None, 0.1], [True, -1e-300], ['x,"', 3]]) == ('a,b_m\n,0.1\ntrue,-1e-300\n"x,""",3\n')
+    assert csv_text(["a", "b_m"], [[None, 0.1], [True, -1e-300], ['x,"', 3]]) == (
+        'a,b_m\n,0.1\ntrue,-1e-300\n"x,""",3\n'
+    )
     with pytest.raises(ValueError, match="not JSON compliant"):
         to_json({"a": math.nan})
 
@@ -250,7 +253,7 @@ def test_results_that_are_not_finite_are_refused(infoset: Command, monkeypatch: 
         results.miss_m[:] = math.inf
         return results
 
-    monkeypatch.setattr("sim.parallel.simulate_runs", overflowing)
+    monkeypatch.setattr("infoset.sim.parallel.simulate_runs", overflowing)
     assert "not finite" in infoset.refused("experiment", "--runs", 1)
 
 
@@ -258,7 +261,7 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sim.parallel.simulate_runs", interrupt)
+    monkeypatch.setattr("infoset.sim.parallel.simulate_runs", interrupt)
     code, out, err = infoset("experiment", "--out", "out")
     # Before it, perhaps, that kernels are compiled.
     assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")
@@ -269,7 +272,7 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
 def test_a_reader_that_leaves_is_no_error() -> None:
     # Ample output, and a reader that closes at once.
     process = subprocess.Popen(
-        [sys.executable, "-m", "experiments", "engage", "--json", "-", "--quiet"],
+        [sys.executable, "-m", "infoset", "engage", "--json", "-", "--quiet"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
@@ -328,5 +331,5 @@ def test_errors_of_the_system_are_messages(error: Exception, infoset: Command, m
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("experiments.file_commands.built_in", fail)
+    monkeypatch.setattr("infoset.experiments.file_commands.built_in", fail)
     assert infoset.refused("scenarios", "show", "dart-2022") == f"error: {error}\n"

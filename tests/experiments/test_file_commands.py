@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from experiments.common.built_in_files import SCENARIO, built_in_files
-from experiments.common.errors import InputError
-from experiments.common.input_file import read_input, read_text, to_toml
-from sim.storage.codec import fingerprint
+from infoset.experiments.common.built_in_files import SCENARIO, built_in_files
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import read_input, read_text, to_toml
+from infoset.sim.storage.codec import fingerprint
 from tests.experiments.command_line import Command
 from tests.fuzzing.subjects import text_files
 

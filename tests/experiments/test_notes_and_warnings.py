@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from experiments.interception.scenario_file import scenario_warnings
-from experiments.interception.study import outlook_text
-from guidance import Thruster
-from sim import HitRequirement, estimate_hits
-from sim.closed_form import possible_miss_of
-from sim.requirement import Decision, judge
-from sim.scenario import of_model
-from sim.schedule import image_times_s
+from infoset.experiments import load_scenario
+from infoset.experiments.interception.scenario_file import scenario_warnings
+from infoset.experiments.interception.study import outlook_text
+from infoset.guidance import Thruster
+from infoset.sim import HitRequirement, estimate_hits
+from infoset.sim.closed_form import possible_miss_of
+from infoset.sim.requirement import Decision, judge
+from infoset.sim.scenario import of_model
+from infoset.sim.schedule import image_times_s
 from tests.experiments.command_line import Command
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.common.hill_axes import from_paper, to_paper
-from experiments.common.input_file import load_problem
+from infoset.experiments.common.hill_axes import from_paper, to_paper
+from infoset.experiments.common.input_file import load_problem
 from tests.experiments.command_line import Command
 
 

@@ -15,14 +15,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.common.page_document import embedded_json, page
-from experiments.interception.page import STEPS_OF_A_BOX, TOLERANCE, computed_again, interception_page, packed_outlines
-from experiments.interception.record_file import replayed
-from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind
 from infoset import InitialSet, Model, RateSensor, Recovery
-from sim import Outcome, Record, fly_one
-from sim.scenario import of_model
+from infoset.experiments.common.page_document import embedded_json, page
+from infoset.experiments.interception.page import (
+    STEPS_OF_A_BOX,
+    TOLERANCE,
+    computed_again,
+    interception_page,
+    packed_outlines,
+)
+from infoset.experiments.interception.record_file import replayed
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Outcome, Record, fly_one
+from infoset.sim.scenario import of_model
 
 MAX_BYTES = 6_000_000
 

@@ -30,7 +30,7 @@ COMMANDS = {
 @pytest.mark.parametrize("module", COMMANDS)
 @pytest.mark.usefixtures("unrendered")
 def test_the_folder_has_the_problem_the_results_and_the_figures(module: str, infoset: Command, tmp_path: Path) -> None:
-    command, arguments = import_module(f"experiments.{module}").COMMAND, COMMANDS[module]
+    command, arguments = import_module(f"infoset.experiments.{module}").COMMAND, COMMANDS[module]
     pages = () if command.to_html is None else ("--html", "page.html")
     assert infoset(*arguments, "--out", "found", "--json", "x.json", *pages, "-q") == (0, "", "")
     figures = [f"{name}.{kind}" for name in command.figure_names for kind in ("pdf", "png")]

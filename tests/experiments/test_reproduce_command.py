@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.input_file import load_problem
-from experiments.common.printed_numbers import (
+from infoset.experiments.common.input_file import load_problem
+from infoset.experiments.common.printed_numbers import (
     Comparison,
     Ours,
     Paper,
@@ -22,9 +22,9 @@ from experiments.common.printed_numbers import (
     last_digit,
     read_paper,
 )
-from experiments.pareto.published import PROBLEM, STARTS, results
-from experiments.reproduced_numbers import PAPERS, reproduce_paper
-from rendezvous.pareto import solve_encounter
+from infoset.experiments.pareto.published import PROBLEM, STARTS, results
+from infoset.experiments.reproduced_numbers import PAPERS, reproduce_paper
+from infoset.rendezvous.pareto import solve_encounter
 from tests.experiments.command_line import Command, strict
 
 X = PrintedNumber("table 1", "x (m)", "1.25")
@@ -170,7 +170,7 @@ def test_a_number_that_should_agree_and_does_not(
         Comparison(replace(X, name="y (m)"), Ours(ours)),
         Comparison(replace(X, name="z (m)", note="a circle"), Ours(1.9, other=1.2512)),
     )
-    monkeypatch.setattr("experiments.reproduced_numbers.reproduce_paper", only(*numbers))
+    monkeypatch.setattr("infoset.experiments.reproduced_numbers.reproduce_paper", only(*numbers))
     run = partial(infoset, "reproduce", "--paper", "reachability")
     code, out, err = run("--json", "-", "-q")
     assert code == 1

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.common.input_file import to_toml
 from infoset import Model
-from sim import Scenario
-from sim.storage import read_manifest
+from infoset.experiments.common.input_file import to_toml
+from infoset.sim import Scenario
+from infoset.sim.storage import read_manifest
 from tests.experiments.command_line import Command
 
 LINE = "model: guaranteed, the default of studies; to use that of the file, add --model paper\n"

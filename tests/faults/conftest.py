@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.common.input_file import to_toml
-from experiments.interception.record_file import load_record
-from sim import Scenario
-from sim.storage import CampaignFolder
+from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.interception.record_file import load_record
+from infoset.sim import Scenario
+from infoset.sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 
 ENDS = {
@@ -68,7 +68,7 @@ def begin(
 ) -> subprocess.Popen[str]:
     """Begin the command in another process."""
     return subprocess.Popen(
-        [*prefix, sys.executable, "-m", "experiments", *map(str, arguments)],
+        [*prefix, sys.executable, "-m", "infoset", *map(str, arguments)],
         cwd=folder,
         env={**os.environ, "NO_COLOR": "1", **(environment or {})},
         stdout=subprocess.PIPE,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import logging
 import os
@@ -18,11 +19,11 @@ import infoset
 from infoset import _compile
 from infoset.kernels import VARIABLE, cache_folder
 from infoset.limits import shown
-from rendezvous import _compile as _compile_of_rendezvous
+from infoset.rendezvous import _compile as _compile_of_rendezvous
 
 pytestmark = pytest.mark.thorough
 
-PACKAGES = ("infoset", "guidance", "sim", "rendezvous", "experiments")
+PACKAGES = ("infoset", "infoset.guidance", "infoset.sim", "infoset.rendezvous", "infoset.experiments")
 
 
 def twice(value: float) -> float:
@@ -61,44 +62,48 @@ PROGRAM = """
 import importlib, json, pathlib, sys
 for texts in json.load(sys.stdin):
     for name, text in texts.items():
-        pathlib.Path(sys.argv[1], f"{name}.py").write_text(text)
+        path = pathlib.Path(sys.argv[1], name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
     for name in [name for name in sys.modules if name.partition(".")[0] == "infoset"]:
         del sys.modules[name]  # as in a new process, except that Numba is loaded already
+    sys.meta_path[:] = [finder for finder in sys.meta_path if not finder.__module__.startswith("infoset")]
     importlib.invalidate_caches()
     from infoset import caller
     print(caller.call(1.0), sum(caller.call.stats.cache_hits.values()))
 """
 
 
-def test_no_stale_kernel_is_loaded(tmp_path: Path) -> None:
-    """A kernel is compiled again where a function that it calls, or a constant of another module, has changed."""
-    source, package = Path(infoset.__file__).parent, tmp_path / "packages" / "infoset"
-    package.mkdir(parents=True)
-    for name in ("_compile.py", "kernels.py"):
-        shutil.copy(source / name, package)
-    texts = {
-        "__init__": "",
-        "constant": "FACTOR = 2.0\n",
-        "callee": "from infoset._compile import inlined\nfrom infoset.constant import FACTOR\n\n\n"
+@pytest.mark.parametrize("sim", ["infoset/sim", "sim"], ids=["installation", "checkout"])
+def test_kernel_is_compiled_again_if_what_it_uses_has_changed(tmp_path: Path, sim: str) -> None:
+    """Functions that a kernel calls and constants of other modules, of `infoset` and of a package inside it."""
+    source = Path(infoset.__file__).parent
+    texts = {f"infoset/{name}": (source / name).read_text() for name in ("__init__.py", "_compile.py", "kernels.py")}
+    texts |= {
+        f"{sim}/__init__.py": "",
+        f"{sim}/constant.py": "FACTOR = 2.0\n",
+        "infoset/callee.py": "from infoset._compile import inlined\nfrom infoset.sim.constant import FACTOR\n\n\n"
         "@inlined\ndef times(x):\n    return FACTOR * x\n",
-        "caller": "from infoset import callee\nfrom infoset._compile import entry\n\n\n"
+        "infoset/caller.py": "from infoset import callee\nfrom infoset._compile import entry\n\n\n"
         "@entry\ndef call(x):\n    return callee.times(x)\n",
     }
     changes: tuple[dict[str, str], ...] = (
         {},
-        {"constant": "FACTOR = 4.0\n"},
-        {"callee": texts["callee"].replace("FACTOR * x", "x - FACTOR")},
+        {f"{sim}/constant.py": "FACTOR = 4.0\n"},
+        {"infoset/callee.py": texts["infoset/callee.py"].replace("FACTOR * x", "x - FACTOR")},
         {},
     )
+
     done = subprocess.run(
-        [sys.executable, "-B", "-c", PROGRAM, str(package)],
+        [sys.executable, "-B", "-c", PROGRAM, str(tmp_path / "packages")],
         input=json.dumps([texts | changed for changed in changes]),
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(package.parent), VARIABLE: str(tmp_path / "cache")},
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "packages"), VARIABLE: str(tmp_path / "cache")},
         capture_output=True,
         text=True,
         check=True,
     )
+
     assert done.stdout.splitlines() == ["2.0 0", "4.0 0", "-1.0 0", "2.0 1"]  # at last the first one, stored
 
 
@@ -106,9 +111,10 @@ def test_no_stale_kernel_is_loaded(tmp_path: Path) -> None:
 def installation(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The packages, copied without anything compiled, where nobody may write."""
     folder = tmp_path_factory.mktemp("installed")
-    here = Path(infoset.__file__).parents[1]
     for name in PACKAGES:
-        shutil.copytree(here / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        package = Path(str(importlib.import_module(name).__file__)).parent
+        inside, without = folder.joinpath(*name.split(".")), shutil.ignore_patterns("__pycache__")
+        shutil.copytree(package, inside, ignore=without, dirs_exist_ok=True)
     for path in (folder, *folder.rglob("*")):
         path.chmod(0o500 if path.is_dir() else 0o400)
     return folder
@@ -128,7 +134,9 @@ def environment_of(installation: Path, temporary: Path, home: Path) -> dict[str,
 
 def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
     """The library alone, as in a notebook: it works, and one line says what to do."""
-    code = "from rendezvous.relative_motion.clohessy_wiltshire import angle_less_sine; print(angle_less_sine(1.0))"
+    code = (
+        "from infoset.rendezvous.relative_motion.clohessy_wiltshire import angle_less_sine; print(angle_less_sine(1.0))"
+    )
     sealed = tmp_path / "home"
     sealed.mkdir(mode=0o500)
     done = subprocess.run(
@@ -147,9 +155,9 @@ def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: 
 
 WORKERS = """
 import logging, sys
-from experiments import load_scenario
+from infoset.experiments import load_scenario
 from infoset.kernels import LOGGER, NOTICE
-from sim.parallel import Task, simulate_tasks, worker_processes
+from infoset.sim.parallel import Task, simulate_tasks, worker_processes
 
 if __name__ == "__main__":
     LOGGER.setLevel(int(sys.argv[1]))

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.common.figure_style import new_figure
-from experiments.common.output import Output
-from sim import Campaign, Scenario
-from sim.storage import CampaignFolder
+from infoset.experiments.common.figure_style import new_figure
+from infoset.experiments.common.output import Output
+from infoset.sim import Campaign, Scenario
+from infoset.sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 from tests.faults.conftest import begin, ended, need_whole
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from sim import Campaign, CampaignNoise, Scenario
-from sim.storage import CampaignFolder
+from infoset.sim import Campaign, CampaignNoise, Scenario
+from infoset.sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 from tests.faults.conftest import begin, ended, need_whole
 
@@ -101,7 +101,7 @@ def test_a_campaign_stopped_many_times_gives_the_same_bits(
     assert CampaignFolder.read(tmp_path / "runs").runs().equals(expected)
 
 
-@pytest.mark.parametrize("place", ["typer", "numpy", "sim.engagement"])
+@pytest.mark.parametrize("place", ["typer", "numpy", "infoset.sim.engagement"])
 def test_an_interrupt_while_a_module_is_loaded(place: str, file: Path, tmp_path: Path) -> None:
     program = f"""
 import importlib.machinery, os, signal, sys
@@ -114,7 +114,7 @@ class Finder(importlib.machinery.PathFinder):
         return None
 
 sys.meta_path.insert(0, Finder)
-from experiments.__main__ import main
+from infoset.experiments.__main__ import main
 main()
 """
     command = [sys.executable, "-c", program, "engage", file.name, "-q"]

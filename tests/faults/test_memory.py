@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from sim import Campaign, Results, Scenario
-from sim.parallel import Task, simulate_task
-from sim.storage import CampaignFolder
+from infoset.sim import Campaign, Results, Scenario
+from infoset.sim.parallel import Task, simulate_task
+from infoset.sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 from tests.faults.conftest import Left, need_whole
 
@@ -20,9 +20,9 @@ pytestmark = pytest.mark.thorough
 
 LIMITED = (
     "import resource, sys\n"
-    "from experiments.cli import main\n"
-    "import numpy, pyarrow, scipy.linalg, sim.storage.tables, sim.simulate\n"
-    "import experiments.campaigns.run_campaign, experiments.interception.scenario_file\n"
+    "from infoset.experiments.cli import main\n"
+    "import numpy, pyarrow, scipy.linalg, infoset.sim.storage.tables, infoset.sim.simulate\n"
+    "import infoset.experiments.campaigns.run_campaign, infoset.experiments.interception.scenario_file\n"
     "from infoset.engine import location, section_passes\n"
     "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
     "resource.setrlimit(resource.RLIMIT_AS, (used + int(sys.argv[1]),) * 2)\n"
@@ -64,7 +64,7 @@ def test_no_memory_is_a_message_that_says_how_to_go_on(
 
     asked = ("campaign", file, "--runs", 24, "--chunk", 8, "--out", "runs", "--workers", 1)
     with monkeypatch.context() as patched:
-        patched.setattr("sim.parallel.simulate_task", fly)
+        patched.setattr("infoset.sim.parallel.simulate_task", fly)
         code, _, err = infoset(*asked)
     message = err.splitlines()[-1]
     assert code == 2

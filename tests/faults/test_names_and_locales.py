@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.interception.scenario_file import load_scenario
-from sim import Scenario
-from sim.storage import CampaignFolder
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim import Scenario
+from infoset.sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 from tests.faults.conftest import begin, ended, need_whole
 

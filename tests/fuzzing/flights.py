@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from guidance import Strategy, Thruster, TieRule
 from infoset import AngleSensor, Camera, InitialSet, Model, RateSensor, SetModel, StateBox
 from infoset.arrays import Floats
+from infoset.guidance import Strategy, Thruster, TieRule
 from infoset.model import Interval
-from sim import Body, Results, Scenario, Target
-from sim.draws import Draws, max_number_of_steps
-from sim.engagement import Engagements, Step
-from sim.scenario import corners, of_model
+from infoset.sim import Body, Results, Scenario, Target
+from infoset.sim.draws import Draws, max_number_of_steps
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.scenario import corners, of_model
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ _CHILD = """
 import json, sys, time
 from pathlib import Path
 
-from experiments.common.errors import InputError
-from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.record_file import load_record
+from infoset.experiments.interception.scenario_file import load_scenario
 
 def peak():
     # Not `resource`, whose maximum is also that of the process which began this one.

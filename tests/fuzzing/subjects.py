@@ -11,18 +11,18 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from experiments.common.built_in_files import SCENARIO, built_in_files
-from experiments.common.input_file import load_problem, read_text, to_toml
-from experiments.interception import record_file
-from experiments.interception.scenario_file import feasibility_warnings, load_scenario, scenario_warnings
-from experiments.interception.trajectory_file import Trajectory
-from experiments.multipoint.file import MultipointProblem
-from experiments.observer.file import ObserverProblem
-from experiments.pareto.file import ParetoProblem
-from experiments.pursuit.file import PursuitProblem
-from experiments.reachability.file import Rendezvous
-from experiments.reachability.system_file import ReachableSystem
-from sim import Record, Scenario, fly_one
+from infoset.experiments.common.built_in_files import SCENARIO, built_in_files
+from infoset.experiments.common.input_file import load_problem, read_text, to_toml
+from infoset.experiments.interception import record_file
+from infoset.experiments.interception.scenario_file import feasibility_warnings, load_scenario, scenario_warnings
+from infoset.experiments.interception.trajectory_file import Trajectory
+from infoset.experiments.multipoint.file import MultipointProblem
+from infoset.experiments.observer.file import ObserverProblem
+from infoset.experiments.pareto.file import ParetoProblem
+from infoset.experiments.pursuit.file import PursuitProblem
+from infoset.experiments.reachability.file import Rendezvous
+from infoset.experiments.reachability.system_file import ReachableSystem
+from infoset.sim import Record, Scenario, fly_one
 from tests.records import first_steps
 
 Found = TypeVar("Found")

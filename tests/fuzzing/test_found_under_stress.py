@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import NoiseKind, Thruster
 from infoset import AngleSensor, Model, RateSensor, SetModel, StateBox
-from sim import Manoeuvre, Outcome, Scenario, Sun, Target
-from sim.draws import draw
-from sim.engagement import Engagements, Step
-from sim.scenario import of_model
+from infoset.guidance import NoiseKind, Thruster
+from infoset.sim import Manoeuvre, Outcome, Scenario, Sun, Target
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.scenario import of_model
 
 from .flights import engagement, fly, numbers
 

@@ -28,8 +28,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from experiments.common.input_file import read_text, to_toml
-from guidance import (
+from infoset import Model, RangeSensor, RateSensor
+from infoset.experiments.common.input_file import read_text, to_toml
+from infoset.guidance import (
     Kalman,
     NoiseKind,
     Predictive,
@@ -39,10 +40,9 @@ from guidance import (
     TieRule,
     ZeroEffortMiss,
 )
-from infoset import Model, RangeSensor, RateSensor
-from sim import Manoeuvre, Outcome, Scenario, Sun, Target
-from sim.draws import Draws
-from sim.scenario import of_model
+from infoset.sim import Manoeuvre, Outcome, Scenario, Sun, Target
+from infoset.sim.draws import Draws
+from infoset.sim.scenario import of_model
 
 from .flights import Flight, engagement, fly, mirrored, numbers, scaled
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.interception import record_file
-from experiments.interception.record_file import load_record, write_record
-from sim import Record
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception import record_file
+from infoset.experiments.interception.record_file import load_record, write_record
+from infoset.sim import Record
 
 from .measured import Measured, measured
 from .mutations import mutated_bytes

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main
-from experiments.common.built_in_files import PROBLEMS, SCENARIO
-from experiments.common.errors import InputError
-from experiments.common.input_file import MAX_FILE_BYTES, keys_of, read_text
+from infoset.experiments.cli import main
+from infoset.experiments.common.built_in_files import PROBLEMS, SCENARIO
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import MAX_FILE_BYTES, keys_of, read_text
 
 from .mutations import VALUES, mutated_toml
 from .subjects import attempted, text_files

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from guidance import (
+from infoset import BearingSensor, Bias, Camera, InformationSet, Model, SetModel, StateBox
+from infoset.arrays import Flags, Floats
+from infoset.experiments import load_scenario
+from infoset.guidance import (
     Kalman,
     KalmanBank,
     MissEstimate,
@@ -22,12 +24,10 @@ from guidance import (
     make_strategy,
     strategy_names,
 )
-from guidance.scripted_noise import ScriptedNoise
-from infoset import BearingSensor, Bias, Camera, InformationSet, Model, SetModel, StateBox
-from infoset.arrays import Flags, Floats
-from sim.draws import draw
-from sim.engagement import Engagements
-from sim.scenario import of_model
+from infoset.guidance.scripted_noise import ScriptedNoise
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.scenario import of_model
 
 E = 6e3
 """Closing speed, m/s."""

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from guidance.gaussian_noise import correlated_uniform, gaussian_noise, share_cut, truncated_gaussian
+from infoset.guidance.gaussian_noise import correlated_uniform, gaussian_noise, share_cut, truncated_gaussian
 
 SIGMAS = [0.05, 1.0 / 3.0, 1.0, 5.0]
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from guidance import Thruster, symmetric_impulse
-from guidance.game_noise import keep_point
 from infoset import ExtremePoints, PredictedMiss
+from infoset.guidance import Thruster, symmetric_impulse
+from infoset.guidance.game_noise import keep_point
 
 THRUSTER = Thruster(budget_m_s=1000.0, min_impulse_m_s=0.25, max_impulse_m_s=7.5)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from guidance import KalmanBank, NoiseKind, Situation, Thruster, TieRule, strategy_names
-from guidance.kalman import MEMBERS, VZ, X, Z
 from infoset import AngleSensor, InformationSet, RangeSensor, SetModel, SetSettings, StateBox
 from infoset.arrays import Floats
-from sim import Scenario, simulate
+from infoset.guidance import KalmanBank, NoiseKind, Situation, Thruster, TieRule, strategy_names
+from infoset.guidance.kalman import MEMBERS, VZ, X, Z
+from infoset.sim import Scenario, simulate
 from tests.rationals import Fraction
 
 BASELINES = [name for name in strategy_names() if "kalman" in name]

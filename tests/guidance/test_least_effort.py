@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from experiments import load_scenario
-from guidance import NoiseKind, Situation
-from guidance.authority import correctable_later_m
-from guidance.least_effort import LeastEffort, balanced, unavoidable_m
 from infoset import InitialSet, Model
 from infoset.arrays import Floats
-from sim import Scenario, find_worst, lower_bound, simulate
-from sim.scenario import of_model
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind, Situation
+from infoset.guidance.authority import correctable_later_m
+from infoset.guidance.least_effort import LeastEffort, balanced, unavoidable_m
+from infoset.sim import Scenario, find_worst, lower_bound, simulate
+from infoset.sim.scenario import of_model
 
 LINES = st.lists(st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.0, 100.0)), min_size=1, max_size=30)
 

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from guidance import GameNoise, LineOfSight
-from guidance.game_noise import SwitchingNoise
-from guidance.noise import TieRule
-from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
 from infoset import AngleSensor, InformationSet, Model, RangeSensor, RateSensor, SetModel, StateBox
+from infoset.guidance import GameNoise, LineOfSight
+from infoset.guidance.game_noise import SwitchingNoise
+from infoset.guidance.noise import TieRule
+from infoset.guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
 from infoset.sensors import Sensor
 
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)

@@ -9,10 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from guidance import GameNoise, LineOfSight, RandomNoise, ScriptedNoise, TieRule
-from guidance.game_noise import SwitchingNoise
-from guidance.noise import checked_measurements
-from guidance.scripted_noise import errors_made, measure_with_errors
 from infoset import (
     AngleSensor,
     ExtremePoints,
@@ -26,6 +22,10 @@ from infoset import (
     StateBox,
 )
 from infoset.arrays import Floats
+from infoset.guidance import GameNoise, LineOfSight, RandomNoise, ScriptedNoise, TieRule
+from infoset.guidance.game_noise import SwitchingNoise
+from infoset.guidance.noise import checked_measurements
+from infoset.guidance.scripted_noise import errors_made, measure_with_errors
 from infoset.sensors import Sensor
 
 BATCH = 4

@@ -7,8 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from guidance import (
+from infoset import (
+    AngleSensor,
+    InformationSet,
+    Model,
+    RangeSensor,
+    RateSensor,
+    SetModel,
+    StateBox,
+)
+from infoset.arrays import Floats
+from infoset.experiments import load_scenario
+from infoset.guidance import (
     Kalman,
     LeastEffort,
     NoiseKind,
@@ -22,18 +32,8 @@ from guidance import (
     ZeroEffortMiss,
     strategy_names,
 )
-from guidance.strategy import checked_impulses
-from infoset import (
-    AngleSensor,
-    InformationSet,
-    Model,
-    RangeSensor,
-    RateSensor,
-    SetModel,
-    StateBox,
-)
-from infoset.arrays import Floats
-from sim import Scenario, simulate
+from infoset.guidance.strategy import checked_impulses
+from infoset.sim import Scenario, simulate
 
 BATCH = 3
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)

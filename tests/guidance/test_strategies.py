@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from guidance import (
+from infoset import AngleSensor, ExtremePoints, InformationSet, Model, PredictedMiss, RangeSensor, SetModel, StateBox
+from infoset.experiments import load_scenario
+from infoset.guidance import (
     Kalman,
     NoiseKind,
     Patient,
@@ -18,11 +19,10 @@ from guidance import (
     ZeroEffortMiss,
     strategy_names,
 )
-from guidance.authority import correctable_later_m
-from infoset import AngleSensor, ExtremePoints, InformationSet, Model, PredictedMiss, RangeSensor, SetModel, StateBox
-from sim import Results, Scenario, simulate
-from sim.draws import Draws, draw
-from sim.engagement import Engagements
+from infoset.guidance.authority import correctable_later_m
+from infoset.sim import Results, Scenario, simulate
+from infoset.sim.draws import Draws, draw
+from infoset.sim.engagement import Engagements
 from tests.long_steps import with_long_steps
 
 E = 58e3

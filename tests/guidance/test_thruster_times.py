@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import pytest
 
-from guidance import Thruster
+from infoset.guidance import Thruster
 from tests.infoset.test_clock import decimal, nearest_step
 
 ENGINE = Thruster(10.0, 0.0, 1.0)

@@ -43,19 +43,19 @@ def test_kernels_of_several_modules_give_one_notice_and_one_summary(caplog: pyte
     notice = CompileNotice()
     with notice.of("infoset engage"):
         compile_within(notice, "infoset.engine.chains", "infoset.geometry.polygon")
-        compile_within(notice, "sim.kepler")
+        compile_within(notice, "infoset.sim.kepler")
         compile_within(notice, "numba.core")  # not ours
     first, last = caplog.messages
     assert first.startswith("compiling the numerical kernels of infoset engage (up to about 25 s), ")
     assert last.startswith("compiled 3 kernels of infoset engage in ")
-    assert last.endswith(" s (infoset.engine, infoset.geometry, sim.kepler)")
+    assert last.endswith(" s (infoset.engine, infoset.geometry, infoset.sim)")
 
 
 def test_every_command_names_itself(caplog: pytest.LogCaptureFixture) -> None:
     notice = CompileNotice()
     for name in ("infoset engage", "infoset bound"):
         with notice.of(name):
-            compile_within(notice, "sim.kepler")
+            compile_within(notice, "infoset.sim.kepler")
     assert [line.count("infoset engage") for line in caplog.messages] == [1, 1, 0, 0]
     assert [line.count("infoset bound") for line in caplog.messages] == [0, 0, 1, 1]
 
@@ -67,7 +67,7 @@ def test_time_within_nested_kernels_counts_once(
     monkeypatch.setattr("time.perf_counter", lambda: next(times_s))
     notice = CompileNotice()
     with notice.of("infoset pareto"):
-        compile_within(notice, "sim.kepler", "sim.kepler")
+        compile_within(notice, "infoset.sim.kepler", "infoset.sim.kepler")
     assert "compiled 2 kernels of infoset pareto in 5.0 s" in caplog.messages[-1]
 
 
@@ -77,7 +77,7 @@ def test_nothing_is_said_if_nothing_is_compiled_or_the_command_is_quiet(caplog: 
         pass
     caplog.set_level(logging.ERROR, "infoset.kernels")  # as of --quiet
     with notice.of("infoset engage"):
-        compile_within(notice, "sim.kepler")
+        compile_within(notice, "infoset.sim.kepler")
     assert caplog.messages == []
 
 
@@ -85,7 +85,7 @@ def test_a_first_command_says_what_it_compiles_and_the_second_says_nothing(tmp_p
     environment = {**os.environ, VARIABLE: str(tmp_path)}
 
     def said() -> list[str]:
-        command = [sys.executable, "-m", "experiments", "pareto", "--json", "-"]
+        command = [sys.executable, "-m", "infoset", "pareto", "--json", "-"]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         return [line for line in done.stderr.splitlines() if "compil" in line]
 
@@ -93,5 +93,5 @@ def test_a_first_command_says_what_it_compiles_and_the_second_says_nothing(tmp_p
     assert "compiling the numerical kernels of infoset pareto (up to about 25 s), once; later runs load " in first
     assert str(tmp_path) in first
     assert " of infoset pareto in " in last
-    assert "rendezvous." in last
+    assert "(infoset.rendezvous)" in last
     assert said() == []

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from infoset.arrays import Floats
-from rendezvous.two_body import OrbitalElements, closest_approach_m, coast, flight_fault, perigee_m
+from infoset.rendezvous.two_body import OrbitalElements, closest_approach_m, coast, flight_fault, perigee_m
 
 EPSILON = 2.0**-53
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from infoset.arrays import Floats
-from rendezvous.piecewise import max_control
+from infoset.rendezvous.piecewise import max_control
 
 
 @pytest.mark.parametrize("at", [0.0, 0.3, 1.7, 7.123456, 10.0])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rendezvous.two_body import OrbitalElements, perigee_m, semi_major_axis_m
+from infoset.rendezvous.two_body import OrbitalElements, perigee_m, semi_major_axis_m
 
 MU = 398600.4418e9
 ANGLES = st.floats(0.0, 2.0 * math.pi)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import Thruster
 from infoset import AngleSensor, Model, RangeSensor, SetModel, StateBox
-from sim import Scenario, Sun
-from sim.scenario import of_model
+from infoset.guidance import Thruster
+from infoset.sim import Scenario, Sun
+from infoset.sim.scenario import of_model
 from tests.sensors import linear
 
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import GameNoise, NoiseKind, Situation, TieRule
-from guidance.scripted_noise import ScriptedNoise
 from infoset import RateSensor
-from sim import Outcome, Scenario
-from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
-from sim.closed_form import worst_shift_m
-from sim.draws import draw
-from sim.engagement import Engagements
-from sim.scenario import corners, of_model
+from infoset.guidance import GameNoise, NoiseKind, Situation, TieRule
+from infoset.guidance.scripted_noise import ScriptedNoise
+from infoset.sim import Outcome, Scenario
+from infoset.sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
+from infoset.sim.closed_form import worst_shift_m
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.scenario import corners, of_model
 from tests.guaranteed import guaranteed
 
 BUDGET = 40

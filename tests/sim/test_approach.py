@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from infoset.arrays import Floats
-from sim.approach import approach_axes, closest_approach_s, find_approach, propagate
-from sim.kepler import KeplerMotion
-from sim.results import b_plane
+from infoset.sim.approach import approach_axes, closest_approach_s, find_approach, propagate
+from infoset.sim.kepler import KeplerMotion
+from infoset.sim.results import b_plane
 
 SUN, AU, DAY = 1.32712440018e20, 1.495978707e11, 86400.0
 ECLIPTIC = np.array([0.0, 0.0, 1.0])

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from guidance import NoiseKind, Patient, Situation, Strategy, SymmetricMiss, Thruster, TieRule
 from infoset import AngleSensor, ExtremePoints, InformationSet, InitialSet, Model, PredictedMiss, SetModel, StateBox
 from infoset.arrays import Floats
-from sim import Results, Scenario, fly_one, simulate
-from sim.draws import draw
-from sim.engagement import Engagements, Step
-from sim.scenario import of_model
+from infoset.guidance import NoiseKind, Patient, Situation, Strategy, SymmetricMiss, Thruster, TieRule
+from infoset.sim import Results, Scenario, fly_one, simulate
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.scenario import of_model
 from tests.guaranteed import guaranteed
 from tests.space import in_space
 

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from experiments import load_scenario
-from guidance import NoiseKind, Thruster, TieRule
 from infoset import AngleSensor, Bias, Camera, InformationSet, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
-from sim import Record, Results, Scenario, fly_one, simulate
-from sim.bound.lower_bound import lower_bound, pair_at
-from sim.bound.pair_flight import fly_pair
-from sim.closed_form import possible_miss_m, possible_miss_of
-from sim.draws import draw
-from sim.engagement import Engagements, Step
-from sim.scenario import of_model
-from sim.schedule import image_times_s
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind, Thruster, TieRule
+from infoset.sim import Record, Results, Scenario, fly_one, simulate
+from infoset.sim.bound.lower_bound import lower_bound, pair_at
+from infoset.sim.bound.pair_flight import fly_pair
+from infoset.sim.closed_form import possible_miss_m, possible_miss_of
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.scenario import of_model
+from infoset.sim.schedule import image_times_s
 
 SPEED_M_S, PIXEL_RAD, CENTROID_M = 6140.0, 5e-6, 12.0
 FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0

@@ -18,13 +18,13 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from guidance import NoiseKind, TieRule
-from sim import Body, Campaign, CampaignNoise, QuantileName, Scenario, StoppingRule, fly_one, simulate
-from sim.parallel import Task, simulate_task, worker_processes
-from sim.scenario import of_model
-from sim.simulate import ENGAGEMENTS_AT_ONCE
-from sim.storage import Axis, CampaignFolder, StorageError, fingerprint, read_manifest
-from sim.versions import VersionError, versions
+from infoset.guidance import NoiseKind, TieRule
+from infoset.sim import Body, Campaign, CampaignNoise, QuantileName, Scenario, StoppingRule, fly_one, simulate
+from infoset.sim.parallel import Task, simulate_task, worker_processes
+from infoset.sim.scenario import of_model
+from infoset.sim.simulate import ENGAGEMENTS_AT_ONCE
+from infoset.sim.storage import Axis, CampaignFolder, StorageError, fingerprint, read_manifest
+from infoset.sim.versions import VersionError, versions
 from tests.guaranteed import guaranteed
 from tests.sensors import linear
 from tests.sim.shuffled import Shuffled
@@ -285,8 +285,8 @@ def test_versions_of_packages_must_be_the_same(brief: Scenario, tmp_path: Path) 
 
 def test_a_scenario_comes_back_whole(brief: Scenario, ranging: Scenario, comet: Scenario) -> None:
     from infoset import RateSensor
-    from sim import Manoeuvre, Target
-    from sim.storage.codec import from_json, to_json
+    from infoset.sim import Manoeuvre, Target
+    from infoset.sim.storage.codec import from_json, to_json
 
     rich = replace(
         comet,
@@ -329,7 +329,7 @@ def test_two_campaigns_in_one_folder_at_once(brief: Scenario, tmp_path: Path) ->
 
     assert mixed(brief, tmp_path).run(progress=meddle).complete
     script = (
-        "import sys; from pathlib import Path; from sim.storage.files import locked\n"
+        "import sys; from pathlib import Path; from infoset.sim.storage.files import locked\n"
         "lock = locked(Path(sys.argv[1])); lock.__enter__(); print('held', flush=True); sys.stdin.read()"
     )
     with subprocess.Popen(
@@ -385,7 +385,7 @@ def test_results_that_are_not_finite_are_not_stored(
         results = simulate(*arguments, **options)
         return replace(results, miss_m=np.full(len(results), np.inf))
 
-    monkeypatch.setattr("sim.parallel.simulate_runs", overflow)
+    monkeypatch.setattr("infoset.sim.parallel.simulate_runs", overflow)
     with pytest.raises(FloatingPointError, match="not finite"):
         mixed(brief, tmp_path).run()
     assert shards(tmp_path) == []

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from guidance import Thruster
 from infoset import AngleSensor, SetSettings, StateBox
 from infoset.arrays import Floats
-from sim import Manoeuvre, Scenario, Sun, Target, simulate
-from sim.kepler import KeplerMotion, sun_and_orbit
+from infoset.guidance import Thruster
+from infoset.sim import Manoeuvre, Scenario, Sun, Target, simulate
+from infoset.sim.kepler import KeplerMotion, sun_and_orbit
 
 SUN = Sun(1.3e20, 1.5e11, 2.0)
 TOLERANCE_M = 1e-3

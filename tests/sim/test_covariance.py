@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from experiments import load_scenario
 from infoset import StateBox
-from sim import simulate
-from sim.covariance import Covariance
-from sim.draws import draw
-from sim.scenario import Scenario, corners
+from infoset.experiments import load_scenario
+from infoset.sim import simulate
+from infoset.sim.covariance import Covariance
+from infoset.sim.draws import draw
+from infoset.sim.scenario import Scenario, corners
 
 ROWS = ((1.0,), (0.3, 1.0), (0.0, -0.2, 1.0), (0.6, 0.0, 0.1, 1.0), (0.0, -0.5, 0.0, 0.2, 1.0), (0, 0, 0.4, 0, 0, 1.0))
 SIGMA = np.array([800.0, 1200.0, 4000.0, 0.05, 0.08, 0.03])

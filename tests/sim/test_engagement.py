@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import NoiseKind, Situation, TieRule
 from infoset import InitialSet, Model, StateBox
 from infoset.arrays import Floats
-from sim import Outcome, Results, Scenario, simulate
-from sim.draws import Draws, draw
-from sim.engagement import Engagements
-from sim.kepler import Passage, Sight
-from sim.scenario import of_model
+from infoset.guidance import NoiseKind, Situation, TieRule
+from infoset.sim import Outcome, Results, Scenario, simulate
+from infoset.sim.draws import Draws, draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.kepler import Passage, Sight
+from infoset.sim.scenario import of_model
 from tests.long_steps import with_long_steps
 
 

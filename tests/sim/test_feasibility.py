@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments import load_scenario
-from guidance import Thruster
-from sim import Body, Scenario, possible_miss_of, simulate
-from sim.bound.lower_bound import pair_at
-from sim.closed_form import possible_miss
-from sim.feasibility import STARTS, feasibility
+from infoset.experiments import load_scenario
+from infoset.guidance import Thruster
+from infoset.sim import Body, Scenario, possible_miss_of, simulate
+from infoset.sim.bound.lower_bound import pair_at
+from infoset.sim.closed_form import possible_miss
+from infoset.sim.feasibility import STARTS, feasibility
 
 CASES = Path(__file__).parent / "cases"
 

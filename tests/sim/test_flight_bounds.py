@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from guidance import Thruster
 from infoset import AngleSensor, InitialSet, Model, StateBox
 from infoset.arrays import Floats
-from sim import Scenario, Sun, simulate
-from sim.flight_bounds import FlightBounds, flight_bounds
-from sim.gravity import on_board_model, with_gravity
-from sim.kepler import sun_and_orbit
-from sim.scenario import of_model
+from infoset.guidance import Thruster
+from infoset.sim import Scenario, Sun, simulate
+from infoset.sim.flight_bounds import FlightBounds, flight_bounds
+from infoset.sim.gravity import on_board_model, with_gravity
+from infoset.sim.kepler import sun_and_orbit
+from infoset.sim.scenario import of_model
 
 EARTH_M3_S2 = 3.986004418e14
 
@@ -102,7 +102,7 @@ def test_no_motion_leaves_the_bounds_of_a_flight(sun: Sun, range_m: float, speed
 def near_earth(base: Scenario) -> Scenario:
     """A target that starts 29 000 km from the Earth, 10 million km from the spacecraft."""
     box = StateBox((-1e6, 1e6), (9.999e9, 1.0001e10), (-10.0, 10.0), (-30_010.0, -29_990.0))
-    from experiments import load_scenario
+    from infoset.experiments import load_scenario
 
     base = load_scenario("asteroid-1997")
     model = replace(

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from guidance import NoiseKind
-from sim import Scenario, simulate
-from sim.bound.lower_bound import pair_at
-from sim.bound.pair_of_motions import TruthPair
-from sim.closed_form import possible_miss_m, possible_miss_of, worst_shift_m
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Scenario, simulate
+from infoset.sim.bound.lower_bound import pair_at
+from infoset.sim.bound.pair_of_motions import TruthPair
+from infoset.sim.closed_form import possible_miss_m, possible_miss_of, worst_shift_m
 
 RUNS = 10
 

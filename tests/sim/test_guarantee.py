@@ -12,17 +12,17 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from guidance import LineOfSight, NoiseKind, RandomNoise
 from infoset import InformationSet, InformationSetView, InitialSet, Model, RateSensor, StateBox
 from infoset.arrays import Floats
 from infoset.engine.section_law import section_laws
-from sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
-from sim.draws import draw
-from sim.engagement import Engagements
-from sim.gravity import on_board_model, with_gravity
-from sim.kepler import KeplerMotion
-from sim.scenario import of_model
-from sim.target import acceleration_m_s2
+from infoset.guidance import LineOfSight, NoiseKind, RandomNoise
+from infoset.sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.gravity import on_board_model, with_gravity
+from infoset.sim.kepler import KeplerMotion
+from infoset.sim.scenario import of_model
+from infoset.sim.target import acceleration_m_s2
 
 
 def script(name: str) -> ModuleType:

@@ -12,17 +12,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind, RandomNoise, Thruster, TieRule
 from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, SetModel, StateBox
 from infoset.arrays import Floats
 from infoset.engine import section_window as windows
 from infoset.engine.history import LastSight
 from infoset.engine.section_law import BOUND_SLACK, SectionLaw, section_laws
-from sim import Outcome, Results, Scenario, simulate
-from sim.draws import draw
-from sim.engagement import Engagements, Step
-from sim.scenario import of_model
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import NoiseKind, RandomNoise, Thruster, TieRule
+from infoset.sim import Outcome, Results, Scenario, simulate
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.scenario import of_model
 from tests.kernels import callable_kernels
 from tests.sensors import linear
 

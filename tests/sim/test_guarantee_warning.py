@@ -5,17 +5,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-import experiments
-import sim
-from guidance import LineOfSight
-from infoset import Model
+from infoset import Model, sim
 from infoset.arrays import Floats
-from sim import GuaranteeWarning, Results, Scenario, fly_one
+from infoset.guidance import LineOfSight
+from infoset.sim import GuaranteeWarning, Results, Scenario, fly_one
 
 RUNS = 6
 
@@ -42,15 +39,13 @@ def guaranteed(brief: Scenario) -> Scenario:
     )
 
 
-def flown(scenario: Scenario, multiple: float, function: Any = sim.simulate) -> Results:
-    results: Results = function(scenario, RUNS, noise=Beyond(scenario, multiple))
-    return results
+def flown(scenario: Scenario, multiple: float) -> Results:
+    return sim.simulate(scenario, RUNS, noise=Beyond(scenario, multiple))
 
 
-@pytest.mark.parametrize("function", [sim.simulate, experiments.simulate])
-def test_lost_truth_gives_one_warning_at_the_line_of_the_user(guaranteed: Scenario, function: Any) -> None:
+def test_lost_truth_gives_one_warning_at_the_line_of_the_user(guaranteed: Scenario) -> None:
     with pytest.warns(GuaranteeWarning) as caught:
-        results = flown(guaranteed, 3.0, function)
+        results = flown(guaranteed, 3.0)
 
     assert not results.truth_kept.any()
     (warning,) = caught

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from sim import Body, Outcome, Scenario, simulate
+from infoset.experiments import load_scenario
+from infoset.sim import Body, Outcome, Scenario, simulate
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from infoset.arrays import Floats
-from sim.kepler import KeplerMotion, sun_and_orbit
-from sim.scenario import Sun
+from infoset.sim.kepler import KeplerMotion, sun_and_orbit
+from infoset.sim.scenario import Sun
 
 hy = pytest.importorskip("heyoka", reason="needs the extra test: the independent integrator")
 

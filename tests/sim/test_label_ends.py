@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import MeasurementNoise, NoiseKind, TieRule
-from guidance.scripted_noise import ScriptedNoise
 from infoset import AngleSensor, InitialSet, Model, SetModel, StateBox
-from sim import Manoeuvre, Outcome, Results, Scenario, Target
-from sim.draws import draw
-from sim.engagement import Engagements, Step
-from sim.scenario import of_model
+from infoset.guidance import MeasurementNoise, NoiseKind, TieRule
+from infoset.guidance.scripted_noise import ScriptedNoise
+from infoset.sim import Manoeuvre, Outcome, Results, Scenario, Target
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.scenario import of_model
 from tests.guaranteed import guaranteed
 from tests.space import in_space
 

@@ -11,10 +11,10 @@ import pytest
 from infoset import InformationSet, InitialSet, Model
 from infoset.engine import guaranteed_miss
 from infoset.engine.history import IMPULSE
-from sim import Scenario, simulate
-from sim.draws import draw
-from sim.engagement import Engagements
-from sim.scenario import of_model
+from infoset.sim import Scenario, simulate
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.scenario import of_model
 
 
 def of_2000_steps(asteroid: Scenario) -> Scenario:

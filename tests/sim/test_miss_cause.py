@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from guidance import NoiseKind, Situation, Strategy, Thruster, make_strategy
 from infoset import Model
 from infoset.arrays import Floats
-from sim import Body, MissCause, Results, Scenario, simulate
-from sim.draws import draw
-from sim.engagement import Step
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind, Situation, Strategy, Thruster, make_strategy
+from infoset.sim import Body, MissCause, Results, Scenario, simulate
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Step
 from tests.space import in_space
 
 ENGINE, BUDGET, KNOWLEDGE, SATURATED, GUIDANCE = MissCause

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from guidance import NoiseKind, RandomNoise
-from sim import CampaignNoise, Scenario, fly_one, simulate
-from sim.draws import draw
-from sim.parallel import Task, simulate_task
+from infoset.guidance import NoiseKind, RandomNoise
+from infoset.sim import CampaignNoise, Scenario, fly_one, simulate
+from infoset.sim.draws import draw
+from infoset.sim.parallel import Task, simulate_task
 
 OF_THE_BOUND = ("gaussian", "correlated")
 
@@ -68,7 +68,7 @@ def test_wide_gaussian_errors_are_uniform_and_briefly_correlated_ones_independen
 
 def test_a_noise_of_the_user_is_made_for_each_batch(brief: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = simulate(brief, 6, seed=1)
-    monkeypatch.setattr(sys.modules["sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
+    monkeypatch.setattr(sys.modules["infoset.sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
     for own in (Uniform, Uniform()):
         assert np.array_equal(simulate(brief, 6, seed=1, noise=own).miss_m, expected.miss_m)
     assert simulate(brief, 6, noise=Drift).miss_m.shape == (6,)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import NoiseKind
 from infoset import Recovery
-from sim import Scenario, simulate
-from sim.scenario import of_model
+from infoset.guidance import NoiseKind
+from infoset.sim import Scenario, simulate
+from infoset.sim.scenario import of_model
 
 pytestmark = pytest.mark.thorough
 

@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from guidance import LineOfSight, NoiseKind
 from infoset import InformationSetView, RangeSensor, RateSensor, Recovery, Sensor
 from infoset.arrays import Flags, Floats
+from infoset.guidance import LineOfSight, NoiseKind
 from infoset.sensors import Apart, Cuttable, Geometry, Measurements
-from sim import Outcome, Scenario, fly_one, lower_bound, simulate
-from sim.scenario import of_model
+from infoset.sim import Outcome, Scenario, fly_one, lower_bound, simulate
+from infoset.sim.scenario import of_model
 from tests.guaranteed import guaranteed
 from tests.space import in_space
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from infoset.arrays import Flags, Floats
-from sim import QuantileName, Requirement, estimate_hits, estimate_quantiles
-from sim.requirement import (
+from infoset.sim import QuantileName, Requirement, estimate_hits, estimate_quantiles
+from infoset.sim.requirement import (
     Decision,
     HitRequirement,
     decides,
@@ -23,7 +23,7 @@ from sim.requirement import (
     runs_needed,
     share_interval,
 )
-from sim.statistics import shows
+from infoset.sim.statistics import shows
 
 P99 = Requirement(QuantileName("miss_m", 0.99), 10.0)
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from sim import Scenario, fly_one, simulate
-from sim.scenario import of_model
-from sim.schedule import Difference, image_times_s, schedule
+from infoset.experiments import load_scenario
+from infoset.sim import Scenario, fly_one, simulate
+from infoset.sim.scenario import of_model
+from infoset.sim.schedule import Difference, image_times_s, schedule
 
 LATE = Path(__file__).parent / "cases" / "late-cut-off.toml"
 ARRIVAL_S = 124200123.4598 / 11500.03425967

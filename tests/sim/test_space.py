@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guidance import NoiseKind, TieRule
-from guidance.scripted_noise import ScriptedNoise
-from guidance.thruster import modulus
 from infoset import InformationSet, InitialSet, Model, RateSensor, StateBox
-from sim import Results, Scenario, simulate
-from sim.draws import Draws, draw
-from sim.engagement import Engagements, Step
-from sim.scenario import of_model
+from infoset.guidance import NoiseKind, TieRule
+from infoset.guidance.scripted_noise import ScriptedNoise
+from infoset.guidance.thruster import modulus
+from infoset.sim import Results, Scenario, simulate
+from infoset.sim.draws import Draws, draw
+from infoset.sim.engagement import Engagements, Step
+from infoset.sim.scenario import of_model
 from tests.long_steps import with_long_steps
 from tests.sensors import linear
 from tests.space import in_space

@@ -9,12 +9,12 @@ import pytest
 
 from infoset import Model, SetModel
 from infoset.arrays import Floats
-from sim import Manoeuvre, Scenario, Sun, Target
-from sim.draws import Draws, draw
-from sim.gravity import max_impulses_m_s, on_board_model, with_gravity
-from sim.kepler import KeplerMotion, sun_and_orbit
-from sim.scenario import corners
-from sim.target import acceleration_m_s2
+from infoset.sim import Manoeuvre, Scenario, Sun, Target
+from infoset.sim.draws import Draws, draw
+from infoset.sim.gravity import max_impulses_m_s, on_board_model, with_gravity
+from infoset.sim.kepler import KeplerMotion, sun_and_orbit
+from infoset.sim.scenario import corners
+from infoset.sim.target import acceleration_m_s2
 from tests.space import in_space
 
 SUN = Sun(1.324948e20, 150e9, np.pi / 2)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim import empirical_distribution, estimate_hits, estimate_quantiles
-from sim.statistics import order_statistics, runs_for_hits, shown_quantiles, shows
+from infoset.sim import empirical_distribution, estimate_hits, estimate_quantiles
+from infoset.sim.statistics import order_statistics, runs_for_hits, shown_quantiles, shows
 
 
 def test_the_distribution_of_a_small_sample_by_hand() -> None:

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from infoset.arrays import Floats
 from infoset.limits import MAXIMUM, MINIMUM
-from sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
-from sim.requirement import HitRequirement, parse_requirement
-from sim.statistics import level_name
-from sim.undecided_cells import Sample
+from infoset.sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
+from infoset.sim.requirement import HitRequirement, parse_requirement
+from infoset.sim.statistics import level_name
+from infoset.sim.undecided_cells import Sample
 
 RULE = StoppingRule(QuantileName("miss_m", 0.5), 0.5)
 

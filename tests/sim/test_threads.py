@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from infoset import ConvexPolygons, Model, Polytope
-from sim import Scenario, simulate
+from infoset.sim import Scenario, simulate
 
 THREADS = 4
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 2.0) for z in (0.0, 3.0)])

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim import Campaign, CampaignNoise, QuantileName, Requirement, Scenario
-from sim.requirement import Decision, judge
-from sim.scenario import of_model
-from sim.storage import Axis, CampaignFolder, read_manifest
+from infoset.sim import Campaign, CampaignNoise, QuantileName, Requirement, Scenario
+from infoset.sim.requirement import Decision, judge
+from infoset.sim.scenario import of_model
+from infoset.sim.storage import Axis, CampaignFolder, read_manifest
 from tests.sensors import linear
 from tests.sim.shuffled import Shuffled
 

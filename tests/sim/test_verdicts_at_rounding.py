@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.interception.scenario_file import load_scenario
-from guidance import LineOfSight, NoiseKind, Situation
 from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor, Recovery, StateBox
 from infoset.arrays import Floats
-from sim import Outcome, Results, Scenario, simulate
-from sim.draws import draw
-from sim.engagement import Engagements
-from sim.scenario import of_model
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import LineOfSight, NoiseKind, Situation
+from infoset.sim import Outcome, Results, Scenario, simulate
+from infoset.sim.draws import draw
+from infoset.sim.engagement import Engagements
+from infoset.sim.scenario import of_model
 
 CASES = Path(__file__).parent / "cases"
 ULP = 2.0**-52

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from experiments.common.figure_style import INK, plain, style, subplots
-from experiments.interception.course import Clock, evenly
-from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
-from experiments.interception.figures.sets import draw_plane, level_planes, planes_at
-from experiments.interception.figures.shared import count_down
 from infoset.arrays import Floats
-from sim import Record
+from infoset.experiments.common.figure_style import INK, plain, style, subplots
+from infoset.experiments.interception.course import Clock, evenly
+from infoset.experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
+from infoset.experiments.interception.figures.sets import draw_plane, level_planes, planes_at
+from infoset.experiments.interception.figures.shared import count_down
+from infoset.sim import Record
 
 DURATION_S = 8.0
 COLOURS = 16

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from experiments.common.figure_style import (
+from infoset.experiments.common.figure_style import (
     IMPULSE,
     INK,
     SET,
@@ -22,15 +22,15 @@ from experiments.common.figure_style import (
     plain_ticks,
     style,
 )
-from experiments.interception.course import (
+from infoset.experiments.interception.course import (
     Clock,
     complete_steps,
     outcome_title,
     record_titles,
     true_predicted_misses,
 )
-from experiments.interception.figures.b_plane import RADIUS_SHOWN
-from experiments.interception.figures.shared import (
+from infoset.experiments.interception.figures.b_plane import RADIUS_SHOWN
+from infoset.experiments.interception.figures.shared import (
     count_down,
     draw_body,
     draw_end,
@@ -38,9 +38,9 @@ from experiments.interception.figures.shared import (
     draw_levels,
     name_events,
 )
-from experiments.interception.study import max_guarantee_m
-from guidance.thruster import modulus
-from sim import Record
+from infoset.experiments.interception.study import max_guarantee_m
+from infoset.guidance.thruster import modulus
+from infoset.sim import Record
 
 _POSSIBLE = "possible miss without further impulses"
 _TRUE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "label": "miss of the true state without further impulses"}

@@ -12,7 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal
 
-from experiments.common.figure_style import (
+from infoset.arrays import Floats
+from infoset.experiments.common.figure_style import (
     GAME,
     HALO,
     SET_EDGE,
@@ -24,13 +25,12 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.screen import number, some_runs
-from experiments.interception.figures.distributions import axis_limit
-from experiments.interception.figures.shared import MAX_VECTORS, draw_body, ring
-from experiments.interception.study import max_guarantee_m
-from infoset.arrays import Floats
-from sim import Results
-from sim.statistics import shows
+from infoset.experiments.common.screen import number, some_runs
+from infoset.experiments.interception.figures.distributions import axis_limit
+from infoset.experiments.interception.figures.shared import MAX_VECTORS, draw_body, ring
+from infoset.experiments.interception.study import max_guarantee_m
+from infoset.sim import Results
+from infoset.sim.statistics import shows
 
 _MAX_COLUMNS = 3
 _OWN_LIMITS_FROM = 3.0

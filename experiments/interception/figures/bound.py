@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import (
+from infoset.arrays import Floats
+from infoset.experiments.common.figure_style import (
     BOUND,
     CURVE_LOOKS,
     INK,
@@ -20,11 +21,10 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.screen import number
-from infoset.arrays import Floats
-from sim import Scenario
-from sim.bound.lower_bound import LowerBound
-from sim.bound.pair_of_motions import TruthPair, later_impulses
+from infoset.experiments.common.screen import number
+from infoset.sim import Scenario
+from infoset.sim.bound.lower_bound import LowerBound
+from infoset.sim.bound.pair_of_motions import TruthPair, later_impulses
 
 _FIRST, _SECOND = CURVE_LOOKS[3], CURVE_LOOKS[2]
 _LOOKS = tuple(
@@ -44,7 +44,7 @@ def draw_bound(scenario: Scenario, lower: LowerBound, worst_m: Mapping[str, floa
     """Draw the bound in one column: over the label, the true states that prove it, and the misses of strategies.
 
     Panel (a) has one curve per closing speed, (b) the motions of the pair, (c) the maximum misses found, `worst_m`,
-    m, by the name of the strategy; without them it is left out. The bound is the result of `sim.lower_bound` for this
+    m, by the name of the strategy; without them it is left out. The bound is the result of `lower_bound` for this
     scenario. In space, (b) has the offset of the two states along the direction of their difference at x = 0. A bound
     by a single motion has its offset from the x axis.
     """

@@ -7,19 +7,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import CURVE_LOOKS
-from experiments.common.screen import some_runs
-from experiments.interception.course import Clock, Courses
-from experiments.interception.figures.approach import draw_approach
-from experiments.interception.figures.b_plane import cloud, draw_b_plane
-from experiments.interception.figures.comparison import draw_comparison
-from experiments.interception.figures.corridor import draw_corridor
-from experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
-from experiments.interception.figures.process import draw_process
-from experiments.interception.figures.sets import draw_sets
-from experiments.interception.published import printed_single_runs
-from experiments.interception.study import Comparison, Curve, is_of_paper
-from sim import Record, Results, Scenario
+from infoset.experiments.common.figure_style import CURVE_LOOKS
+from infoset.experiments.common.screen import some_runs
+from infoset.experiments.interception.course import Clock, Courses
+from infoset.experiments.interception.figures.approach import draw_approach
+from infoset.experiments.interception.figures.b_plane import cloud, draw_b_plane
+from infoset.experiments.interception.figures.comparison import draw_comparison
+from infoset.experiments.interception.figures.corridor import draw_corridor
+from infoset.experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
+from infoset.experiments.interception.figures.process import draw_process
+from infoset.experiments.interception.figures.sets import draw_sets
+from infoset.experiments.interception.published import printed_single_runs
+from infoset.experiments.interception.study import Comparison, Curve, is_of_paper
+from infoset.sim import Record, Results, Scenario
 
 DEFAULT_TIMES = (0.5, 4.0, 8.0)
 

@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import INK, SET, legend_below, letters, plain_ticks, style, subplots
-from experiments.common.screen import some_runs
-from experiments.interception.figures.distributions import draw_radius
-from experiments.interception.study import Comparison
 from infoset.arrays import Floats
-from sim.statistics import shows
+from infoset.experiments.common.figure_style import INK, SET, legend_below, letters, plain_ticks, style, subplots
+from infoset.experiments.common.screen import some_runs
+from infoset.experiments.interception.figures.distributions import draw_radius
+from infoset.experiments.interception.study import Comparison
+from infoset.sim.statistics import shows
 
 _BINS = 48
 _HILL, _BAR = 0.62, 0.17

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import (
+from infoset.experiments.common.figure_style import (
     IMPULSE,
     SET_EDGE,
     SET_FILL,
@@ -21,11 +21,11 @@ from experiments.common.figure_style import (
     style,
     subplots,
 )
-from experiments.common.screen import some_runs
-from experiments.interception.course import Courses
-from experiments.interception.figures.shared import count_down, draw_end, draw_levels, name_events
-from experiments.interception.study import Curve, max_guarantee_m
-from sim.statistics import shows
+from infoset.experiments.common.screen import some_runs
+from infoset.experiments.interception.course import Courses
+from infoset.experiments.interception.figures.shared import count_down, draw_end, draw_levels, name_events
+from infoset.experiments.interception.study import Curve, max_guarantee_m
+from infoset.sim.statistics import shows
 
 _DECADES = 4.0
 """Maximum extent of the axis of impulses, decades."""

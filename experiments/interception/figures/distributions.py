@@ -10,12 +10,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import CURVE_LOOKS, LIMIT, legend_below, letters, plain_ticks, style, subplots
-from experiments.common.screen import some_runs
-from experiments.interception.figures.shared import RADIUS
-from experiments.interception.study import Curve
 from infoset.arrays import Floats
-from sim import empirical_distribution
+from infoset.experiments.common.figure_style import (
+    CURVE_LOOKS,
+    LIMIT,
+    legend_below,
+    letters,
+    plain_ticks,
+    style,
+    subplots,
+)
+from infoset.experiments.common.screen import some_runs
+from infoset.experiments.interception.figures.shared import RADIUS
+from infoset.experiments.interception.study import Curve
+from infoset.sim import empirical_distribution
 
 MAX_POINTS = 2000
 """Most points of a curve; more would only make the file larger."""

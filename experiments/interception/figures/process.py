@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.common.figure_style import (
+from infoset.arrays import Floats, Integers
+from infoset.experiments.common.figure_style import (
     BOUND,
     IMPULSE,
     LIMIT,
@@ -23,11 +24,10 @@ from experiments.common.figure_style import (
     plain,
     style,
 )
-from experiments.interception.course import Clock, outcome_title, record_titles, true_predicted_misses
-from experiments.interception.figures.shared import MAX_VECTORS, count_down, draw_impulses
-from infoset import BearingSensor
-from infoset.arrays import Floats, Integers
-from sim import Record
+from infoset.experiments.interception.course import Clock, outcome_title, record_titles, true_predicted_misses
+from infoset.experiments.interception.figures.shared import MAX_VECTORS, count_down, draw_impulses
+from infoset.sensors import BearingSensor
+from infoset.sim import Record
 
 RANGE_SHARE = 0.1
 """Share of the first range below which values do not set the limits: angle and rate grow as 1/x and 1/x^2."""

@@ -14,11 +14,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from experiments.common.figure_style import HALO, INK, MEASURED, WIDTH_MM, legend_below, letters, plain, style, subplots
-from experiments.interception.course import Clock, evenly, record_titles
-from infoset import Section
 from infoset.arrays import Floats
-from sim import Record
+from infoset.experiments.common.figure_style import (
+    HALO,
+    INK,
+    MEASURED,
+    WIDTH_MM,
+    legend_below,
+    letters,
+    plain,
+    style,
+    subplots,
+)
+from infoset.experiments.interception.course import Clock, evenly, record_titles
+from infoset.set_queries import Section
+from infoset.sim import Record
 
 TRUTH_MARK = "true (ω, α)"
 MEASUREMENT_MARK = "measured α, drawn at the true ω"

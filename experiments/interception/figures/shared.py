@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullFormatter
 
-from experiments.common.figure_style import BODY_FILL, EVENT, GUARANTEED, HALO, INK
-from experiments.common.units import SECONDS, duration_text, length_unit
-from experiments.interception.course import marks, min_to_go_s
-from sim import Scenario
+from infoset.experiments.common.figure_style import BODY_FILL, EVENT, GUARANTEED, HALO, INK
+from infoset.experiments.common.units import SECONDS, duration_text, length_unit
+from infoset.experiments.interception.course import marks, min_to_go_s
+from infoset.sim import Scenario
 
 RADIUS: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
 """Line of the radius of the body."""

@@ -8,19 +8,19 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.errors import InputError
-from experiments.common.screen import Part, figure_files, number, number_table, show
-from experiments.common.units import M_PER_KM
-from experiments.interception.command import Adversary
-from experiments.interception.record_file import record_bytes
-from experiments.interception.runs.engage import steps_csv
-from experiments.interception.runs.engagement_table import draw_engagements, engagement_figures
-from experiments.interception.runs.shared import WorstMisses, find_worst_misses, work_of
-from experiments.interception.scenario_file import study_scenario
-from experiments.interception.strategies import own_strategy
-from experiments.interception.study import scenario_title
-from sim import Scenario
-from sim.adversary import Objective, WorstEngagement
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.screen import Part, figure_files, number, number_table, show
+from infoset.experiments.common.units import M_PER_KM
+from infoset.experiments.interception.command import Adversary
+from infoset.experiments.interception.record_file import record_bytes
+from infoset.experiments.interception.runs.engage import steps_csv
+from infoset.experiments.interception.runs.engagement_table import draw_engagements, engagement_figures
+from infoset.experiments.interception.runs.shared import WorstMisses, find_worst_misses, work_of
+from infoset.experiments.interception.scenario_file import study_scenario
+from infoset.experiments.interception.strategies import own_strategy
+from infoset.experiments.interception.study import scenario_title
+from infoset.sim import Scenario
+from infoset.sim.adversary import Objective, WorstEngagement
 
 RECORD = "record-worst.npz"
 

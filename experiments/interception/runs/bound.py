@@ -8,21 +8,21 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.errors import InputError
-from experiments.common.screen import Part, figure_files, number, number_table, parts_of, show
-from experiments.common.units import M_PER_KM
-from experiments.interception.command import Bound
-from experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, work_of
-from experiments.interception.scenario_file import study_scenario
-from experiments.interception.strategies import chosen_strategies
-from experiments.interception.study import max_guarantee_m
-from guidance import Strategy
-from sim import BoundError, Record, Results, Scenario
-from sim.bound.game_value import ValueReserve, value_reserve, why_no_value
-from sim.bound.lower_bound import LowerBound, lower_bound, pair_at
-from sim.bound.pair_flight import PairFlight, fly_pair
-from sim.bound.pair_of_motions import TruthPair
-from sim.results import join
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.screen import Part, figure_files, number, number_table, parts_of, show
+from infoset.experiments.common.units import M_PER_KM
+from infoset.experiments.interception.command import Bound
+from infoset.experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, work_of
+from infoset.experiments.interception.scenario_file import study_scenario
+from infoset.experiments.interception.strategies import chosen_strategies
+from infoset.experiments.interception.study import max_guarantee_m
+from infoset.guidance import Strategy
+from infoset.sim import BoundError, Record, Results, Scenario
+from infoset.sim.bound.game_value import ValueReserve, value_reserve, why_no_value
+from infoset.sim.bound.lower_bound import LowerBound, lower_bound, pair_at
+from infoset.sim.bound.pair_flight import PairFlight, fly_pair
+from infoset.sim.bound.pair_of_motions import TruthPair
+from infoset.sim.results import join
 
 FIGURE = "figure-bound"
 
@@ -93,7 +93,7 @@ def run(options: Bound) -> None:
         }
         work.save({**_summary(scenario, lower, nominal, worst), "value": value})
         if options.out is not None:
-            from experiments.interception.figures.bound import draw_bound
+            from infoset.experiments.interception.figures.bound import draw_bound
 
             worst_m = {strategy.name: strategy.worst_m for strategy in worst}
             work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from rich.table import Table
 
-from experiments.common.output import Cell, hit_key, to_csv
-from experiments.common.screen import (
+from infoset.experiments.common.output import hit_key
+from infoset.experiments.common.screen import (
     Part,
     figure_files,
     number,
@@ -19,11 +19,11 @@ from experiments.common.screen import (
     show,
     some_runs,
 )
-from experiments.interception.command import Compare
-from experiments.interception.runs.shared import b_plane_figures, simulate_all, work_of
-from experiments.interception.scenario_file import study_scenario
-from experiments.interception.strategies import chosen_noises, chosen_strategies
-from experiments.interception.study import (
+from infoset.experiments.interception.command import Compare
+from infoset.experiments.interception.runs.shared import b_plane_figures, simulate_all, work_of
+from infoset.experiments.interception.scenario_file import study_scenario
+from infoset.experiments.interception.strategies import chosen_noises, chosen_strategies
+from infoset.experiments.interception.study import (
     QUANTILES,
     Comparison,
     SetCounts,
@@ -37,9 +37,10 @@ from experiments.interception.study import (
     set_warnings,
     summary,
 )
-from guidance import NoiseKind
-from sim import Scenario
-from sim.parallel import Task
+from infoset.guidance import NoiseKind
+from infoset.sim import Scenario
+from infoset.sim.columns import Cell, csv_text
+from infoset.sim.parallel import Task
 
 FIGURE = "figure-comparison"
 NEAR = 0.1
@@ -78,7 +79,7 @@ def run(options: Compare) -> None:
         )
         work.written.save("results.csv", _csv(compared), "--csv")
         if options.out is not None:
-            from experiments.interception.figures.commands import draw_compared
+            from infoset.experiments.interception.figures.commands import draw_compared
 
             work.written.draw(figures, draw_compared(scenario, compared), work.begin("figure"))
     show(_parts(scenario, compared), options.quiet or work.written.stdout_taken)
@@ -112,7 +113,7 @@ def _csv(compared: Sequence[Comparison]) -> str:
             columns = results.to_dict()
             head = [comparison.strategy, comparison.noise, None if tie is None else tie.value]
             rows += [[*head, *values] for values in zip(*(columns[name] for name in names), strict=True)]
-    return to_csv(("strategy", "noise", "tie", *names), rows)
+    return csv_text(("strategy", "noise", "tie", *names), rows)
 
 
 def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]:

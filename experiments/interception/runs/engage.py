@@ -8,23 +8,24 @@ from time import perf_counter
 
 import numpy as np
 
-from experiments.common.output import Cell, outcome_columns, to_csv
-from experiments.common.screen import figure_files, show
-from experiments.interception.command import Engage
-from experiments.interception.record_file import record_bytes
-from experiments.interception.runs.engagement_table import (
+from infoset.experiments.common.output import outcome_columns
+from infoset.experiments.common.screen import figure_files, show
+from infoset.experiments.interception.command import Engage
+from infoset.experiments.interception.record_file import record_bytes
+from infoset.experiments.interception.runs.engagement_table import (
     draw_engagements,
     engagement_figures,
     engagement_parts,
 )
-from experiments.interception.runs.shared import need_finite, work_of
-from experiments.interception.scenario_file import scenario_with
-from experiments.interception.strategies import NOISES, chosen_noise, own_strategy
-from experiments.interception.study import is_of_paper
-from guidance import NoiseKind
-from guidance.noise import NoiseSource
-from guidance.thruster import modulus
-from sim import Record, fly_one
+from infoset.experiments.interception.runs.shared import need_finite, work_of
+from infoset.experiments.interception.scenario_file import scenario_with
+from infoset.experiments.interception.strategies import NOISES, chosen_noise, own_strategy
+from infoset.experiments.interception.study import is_of_paper
+from infoset.guidance import NoiseKind
+from infoset.guidance.noise import NoiseSource
+from infoset.guidance.thruster import modulus
+from infoset.sim import Record, fly_one
+from infoset.sim.columns import Cell, csv_text
 
 
 def run(options: Engage) -> None:
@@ -89,7 +90,7 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
 def steps_csv(records: Sequence[Record]) -> str:
     """Return a line for each step of engagements of one scenario, as CSV; columns name the lateral axis."""
     rows = [{"noise": record.noise_name, **row} for record in records for row in _step_rows(record)]
-    return to_csv([*rows[0]], [[*row.values()] for row in rows])
+    return csv_text([*rows[0]], [[*row.values()] for row in rows])
 
 
 def _step_rows(record: Record) -> list[dict[str, Cell]]:

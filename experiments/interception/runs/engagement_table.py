@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from experiments.common.output import Output
-from experiments.common.screen import BeginProgress, Part, number, number_table
-from experiments.interception.published import printed_single_runs
-from experiments.interception.runs.shared import allowance, bound_name
-from experiments.interception.study import is_of_paper
-from sim import Record, Scenario
+from infoset.experiments.common.output import Output
+from infoset.experiments.common.screen import BeginProgress, Part, number, number_table
+from infoset.experiments.interception.published import printed_single_runs
+from infoset.experiments.interception.runs.shared import allowance, bound_name
+from infoset.experiments.interception.study import is_of_paper
+from infoset.sim import Record, Scenario
 
 FIGURES = ("figure-process", "figure-sets", "figure-approach")
 FIGURES_OF_PAPER = ("figure-2-process", "figure-3-sets", "figure-approach")
@@ -86,7 +86,7 @@ def draw_engagements(
 ) -> None:
     """Draw the figures of one or two engagements into the folder, if there is one."""
     if written.folder is not None:
-        from experiments.interception.figures.commands import draw_flights
+        from infoset.experiments.interception.figures.commands import draw_flights
 
         names = engagement_figures(records[0].scenario)
         written.draw(names, draw_flights(records, times_s), begin("figures"))

@@ -7,12 +7,21 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from rich.table import Table
 
-from experiments.common.output import hit_key, outcome_columns, to_csv
-from experiments.common.screen import Part, figure_files, number, number_table, quantile_notes, say, show, some_runs
-from experiments.interception.command import Experiment
-from experiments.interception.course import Courses
-from experiments.interception.remedy import Remedy, find_remedies
-from experiments.interception.runs.shared import (
+from infoset.experiments.common.output import hit_key, outcome_columns
+from infoset.experiments.common.screen import (
+    Part,
+    figure_files,
+    number,
+    number_table,
+    quantile_notes,
+    say,
+    show,
+    some_runs,
+)
+from infoset.experiments.interception.command import Experiment
+from infoset.experiments.interception.course import Courses
+from infoset.experiments.interception.remedy import Remedy, find_remedies
+from infoset.experiments.interception.runs.shared import (
     allowance,
     b_plane_figures,
     bound_name,
@@ -20,9 +29,9 @@ from experiments.interception.runs.shared import (
     simulate_all,
     work_of,
 )
-from experiments.interception.scenario_file import scenario_with
-from experiments.interception.strategies import NOISES, chosen_noise, own_strategy
-from experiments.interception.study import (
+from infoset.experiments.interception.scenario_file import scenario_with
+from infoset.experiments.interception.strategies import NOISES, chosen_noise, own_strategy
+from infoset.experiments.interception.study import (
     QUANTILES,
     Curve,
     SetCounts,
@@ -38,11 +47,12 @@ from experiments.interception.study import (
     set_warnings,
     summary,
 )
-from guidance import NoiseKind
-from sim import Results, Scenario
-from sim.parallel import Task
-from sim.scenario import strategy_name
-from sim.statistics import shown_quantiles
+from infoset.guidance import NoiseKind
+from infoset.sim import Results, Scenario
+from infoset.sim.columns import csv_text
+from infoset.sim.parallel import Task
+from infoset.sim.scenario import strategy_name
+from infoset.sim.statistics import shown_quantiles
 
 FIGURE, FIGURE_OF_PAPER = "figure-distributions", "figure-4-distributions"
 CORRIDOR = "figure-corridor"
@@ -117,7 +127,7 @@ def run(options: Experiment) -> None:
         )
         work.written.save("results.csv", _csv(scenario, curves), "--csv")
         if options.out is not None:
-            from experiments.interception.figures.commands import draw_experiment
+            from infoset.experiments.interception.figures.commands import draw_experiment
 
             work.written.draw(figures, draw_experiment(scenario, curves, courses[::-1]), work.begin("figure"))
     show(_parts(scenario, curves, remedies), options.quiet or work.written.stdout_taken)
@@ -138,7 +148,7 @@ def _csv(scenario: Scenario, curves: Sequence[Curve]) -> str:
         for curve in curves
         for values in zip(*curve.results.to_dict().values(), strict=True)
     ]
-    return to_csv((*_key(scenario, curves[0]), *curves[0].results.to_dict()), rows)
+    return csv_text((*_key(scenario, curves[0]), *curves[0].results.to_dict()), rows)
 
 
 def _parts(scenario: Scenario, curves: Sequence[Curve], remedies: Mapping[int, Sequence[Remedy]]) -> Iterator[Part]:

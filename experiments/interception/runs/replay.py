@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from experiments.common.errors import InputError, input_errors
-from experiments.common.output import output_of
-from experiments.common.screen import figure_files, progress_bar, show
-from experiments.interception.command import Replay
-from experiments.interception.page import MAX_RECORDS, interception_page
-from experiments.interception.record_file import load_record
-from experiments.interception.runs.engagement_table import (
+from infoset.experiments.common.errors import InputError, input_errors
+from infoset.experiments.common.output import output_of
+from infoset.experiments.common.screen import figure_files, progress_bar, show
+from infoset.experiments.interception.command import Replay
+from infoset.experiments.interception.page import MAX_RECORDS, interception_page
+from infoset.experiments.interception.record_file import load_record
+from infoset.experiments.interception.runs.engagement_table import (
     FIGURES,
     FIGURES_OF_PAPER,
     draw_engagements,
@@ -36,7 +36,7 @@ def run(options: Replay) -> None:
         if options.html is not None:
             written.deliver("--html", interception_page(records))
         if options.gif is not None:
-            from experiments.interception.figures.animation import animate
+            from infoset.experiments.interception.figures.animation import animate
 
             written.deliver("--gif", animate(records, progress=begin(options.gif.name)))
         draw_engagements(records, written, begin, times_s)

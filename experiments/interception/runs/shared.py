@@ -10,21 +10,21 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from experiments.common.errors import InputError
-from experiments.common.input_file import to_toml
-from experiments.common.output import Output, output_of, to_json
-from experiments.common.screen import NOT_FINITE, BeginProgress, progress_bar, say_warnings, some_runs
-from experiments.interception.scenario_file import all_warnings
-from experiments.interception.strategies import own_code_errors
-from experiments.interception.study import SetCounts
-from guidance import Strategy
-from sim import Results, Scenario
-from sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
-from sim.gravity import on_board_model
-from sim.parallel import Task, is_finite, simulate_tasks
-from sim.scenario import strategy_name
-from sim.storage.codec import fingerprint
-from sim.versions import versions
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.common.output import Output, output_of, to_json
+from infoset.experiments.common.screen import NOT_FINITE, BeginProgress, progress_bar, say_warnings, some_runs
+from infoset.experiments.interception.scenario_file import all_warnings
+from infoset.experiments.interception.strategies import own_code_errors
+from infoset.experiments.interception.study import SetCounts
+from infoset.guidance import Strategy
+from infoset.sim import Results, Scenario
+from infoset.sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
+from infoset.sim.gravity import on_board_model
+from infoset.sim.parallel import Task, is_finite, simulate_tasks
+from infoset.sim.scenario import strategy_name
+from infoset.sim.storage.codec import fingerprint
+from infoset.sim.versions import versions
 
 Progress = Callable[[float], None]
 

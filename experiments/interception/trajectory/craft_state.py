@@ -8,13 +8,19 @@ from fractions import Fraction
 
 import numpy as np
 
-from experiments.common.errors import InputError
-from experiments.interception.trajectory.epochs import Epoch, converted, is_guess, tdb_drift_s
-from experiments.interception.trajectory.frames import SOLAR_SYSTEM, Frame, centre_name, inertial_frame, is_same_frame
-from experiments.interception.trajectory.interpolation import Interpolated, interpolate
-from experiments.interception.trajectory.oem import OemCovariance, OemSegment
 from infoset.arrays import Floats
-from sim.approach import propagate
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.trajectory.epochs import Epoch, converted, is_guess, tdb_drift_s
+from infoset.experiments.interception.trajectory.frames import (
+    SOLAR_SYSTEM,
+    Frame,
+    centre_name,
+    inertial_frame,
+    is_same_frame,
+)
+from infoset.experiments.interception.trajectory.interpolation import Interpolated, interpolate
+from infoset.experiments.interception.trajectory.oem import OemCovariance, OemSegment
+from infoset.sim.approach import propagate
 
 SAME_EPOCH_S = Fraction(1, 1000)
 """Difference between the epoch of a covariance and of the states: files write both with milliseconds."""

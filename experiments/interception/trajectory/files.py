@@ -6,7 +6,7 @@ import stat
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.common.errors import InputError, shown
+from infoset.experiments.common.errors import InputError, shown
 
 
 def named_file(name: str, folder: Path, allowed: Sequence[Path]) -> Path:

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.common.errors import InputError
-from experiments.common.input_file import read_input
-from experiments.interception.trajectory.files import named_file
 from infoset.arrays import Floats
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import read_input
+from infoset.experiments.interception.trajectory.files import named_file
 
 BINARY = (b"DAF/", b"NAIF/DA", b"DAS/", b"NAIF/DAS")
 """First bytes of binary kernels, of which SPICE reads only what it needs."""

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from sim import simulate
-from sim.requirement import Decision, HitRequirement, judge
-from sim.storage import CampaignFolder
+from infoset.experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
+from infoset.sim import simulate
+from infoset.sim.requirement import Decision, HitRequirement, judge
+from infoset.sim.storage import CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[3]

@@ -14,16 +14,16 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from experiments.campaigns import cluster
-from experiments.common.errors import InputError
-from experiments.interception.scenario_file import load_scenario, with_model
-from experiments.interception.strategies import load_strategy
-from guidance import NoiseKind
 from infoset import Model
-from sim import Campaign, CampaignNoise, Scenario, fly_one
-from sim.storage import CampaignFolder
-from sim.storage.codec import fingerprint
-from sim.versions import versions
+from infoset.experiments.campaigns import cluster
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.scenario_file import load_scenario, with_model
+from infoset.experiments.interception.strategies import load_strategy
+from infoset.guidance import NoiseKind
+from infoset.sim import Campaign, CampaignNoise, Scenario, fly_one
+from infoset.sim.storage import CampaignFolder
+from infoset.sim.storage.codec import fingerprint
+from infoset.sim.versions import versions
 
 Infoset = Callable[..., tuple[int, str, str]]
 needs_kill = pytest.mark.skipif(os.name != "posix", reason="there is no kill -9")
@@ -162,7 +162,7 @@ def test_what_is_wrong_is_said_before_the_work(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("sim.parallel.simulate_task", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("infoset.sim.parallel.simulate_task", lambda *_: pytest.fail("began to work"))
     code, out, err = infoset("campaign", file, "--runs", 10, "--out", "runs", *arguments)
     assert (code, out) == (2, "")
     assert err.count("error: ") == 1
@@ -176,12 +176,16 @@ def test_what_is_wrong_is_said_before_the_work(
 def test_without_an_extra_it_says_which(
     library: str, extra: str, infoset: Infoset, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import sim.storage
+    from infoset.sim import storage
 
     monkeypatch.setitem(sys.modules, library, None)
-    for name in [each for each in sys.modules if each.startswith(("experiments.campaigns.", "sim.storage.tables"))]:
+    for name in [
+        each
+        for each in sys.modules
+        if each.startswith(("infoset.experiments.campaigns.", "infoset.sim.storage.tables"))
+    ]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.delattr(sim.storage, "tables", raising=False)
+    monkeypatch.delattr(storage, "tables", raising=False)
     options = ("--dask", "tcp://127.0.0.1:1") if library == "distributed" else ()
     code, out, err = infoset("campaign", file, "--runs", 8, "--out", "runs", *options)
     assert (code, out) == (2, "")
@@ -191,7 +195,7 @@ def test_without_an_extra_it_says_which(
 def command(file: Path, folder: Path, runs: int, *options: object) -> list[str]:
     """The command that begins or resumes a campaign in a process."""
     asked = ("campaign", file, "--runs", runs, "--chunk", 8, "--noise", "mixed", "--out", folder, "--resume", "-q")
-    return [sys.executable, "-m", "experiments", *map(str, (*asked, *options))]
+    return [sys.executable, "-m", "infoset", *map(str, (*asked, *options))]
 
 
 def wait_for_shards(process: subprocess.Popen[bytes], folder: Path, number: int) -> None:

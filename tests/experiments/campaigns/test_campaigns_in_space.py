@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments.interception.scenario_file import load_scenario, with_model
-from guidance import NoiseKind
 from infoset import Model
-from sim import simulate
-from sim.scenario import of_model
-from sim.storage import CampaignFolder
+from infoset.experiments.interception.scenario_file import load_scenario, with_model
+from infoset.guidance import NoiseKind
+from infoset.sim import simulate
+from infoset.sim.scenario import of_model
+from infoset.sim.storage import CampaignFolder
 from tests.experiments.command_line import Command, strict
 from tests.sensors import linear
 

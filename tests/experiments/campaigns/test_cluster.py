@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.campaigns.cluster import cluster
-from experiments.common.errors import InputError
-from sim import Campaign, CampaignNoise, Scenario
-from sim.storage import CampaignFolder
+from infoset.experiments.campaigns.cluster import cluster
+from infoset.experiments.common.errors import InputError
+from infoset.sim import Campaign, CampaignNoise, Scenario
+from infoset.sim.storage import CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
 
@@ -31,7 +31,7 @@ def test_no_scheduler_is_one_message_and_an_open_one_is_warned_of(
     address: str, is_open: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     notes: list[str] = []
-    monkeypatch.setattr("experiments.campaigns.cluster.PATIENCE_S", 0.5)
+    monkeypatch.setattr("infoset.experiments.campaigns.cluster.PATIENCE_S", 0.5)
     with (
         pytest.raises(InputError, match=f"no Dask scheduler answers at {address} .*start one with: dask scheduler"),
         cluster(address, notes.append),
@@ -136,7 +136,7 @@ def test_a_scheduler_that_ends_is_one_message_and_the_campaign_goes_on_without(
     processes.worker()
     processes.wait_for(1)
     asked = ["campaign", str(file), "--model", "paper", "--runs", "6000", "--chunk", "16", "--out", "runs", "-q"]
-    command = [sys.executable, "-m", "experiments", *asked, "--dask", processes.address]
+    command = [sys.executable, "-m", "infoset", *asked, "--dask", processes.address]
     killer = kill_after(tmp_path / "runs" / "shards", 10, processes.scheduler)
     done = subprocess.run(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
     killer.join()

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from experiments.common.input_file import to_toml
-from sim.closed_form import possible_miss_m
+from infoset.experiments import load_scenario
+from infoset.experiments.common.input_file import to_toml
+from infoset.sim.closed_form import possible_miss_m
 from tests.experiments.command_line import Command
 
 pytest.importorskip("pyarrow")

@@ -14,13 +14,13 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.stats import pearsonr
 
-from experiments.campaigns.campaign_figures import draw_convergence, draw_dispersion
-from experiments.campaigns.run_tables import correlations
-from experiments.interception.figures.distributions import MAX_POINTS
-from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind
-from sim import Campaign, CampaignNoise, Scenario, simulate
-from sim.storage import CampaignFolder
+from infoset.experiments.campaigns.campaign_figures import draw_convergence, draw_dispersion
+from infoset.experiments.campaigns.run_tables import correlations
+from infoset.experiments.interception.figures.distributions import MAX_POINTS
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Campaign, CampaignNoise, Scenario, simulate
+from infoset.sim.storage import CampaignFolder
 from tests.experiments.command_line import Command
 
 FIGURES = [

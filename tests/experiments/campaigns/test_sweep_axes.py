@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.common.errors import InputError
-from experiments.interception.scenario_file import load_scenario
-from sim import Scenario
-from sim.scenario import of_model
-from sim.storage import Axis
+from infoset.experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim import Scenario
+from infoset.sim.scenario import of_model
+from infoset.sim.storage import Axis
 from tests.sensors import linear
 
 

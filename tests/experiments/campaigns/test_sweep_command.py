@@ -11,11 +11,11 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.interception.scenario_file import load_scenario
-from sim import Campaign, Scenario, estimate_hits
-from sim.requirement import share_interval
-from sim.storage import CampaignFolder, read_manifest
+from infoset.experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim import Campaign, Scenario, estimate_hits
+from infoset.sim.requirement import share_interval
+from infoset.sim.storage import CampaignFolder, read_manifest
 from tests.experiments.command_line import Command
 
 pytestmark = pytest.mark.usefixtures("unrendered")
@@ -104,7 +104,7 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Command, swept: 
 def test_what_is_wrong_is_said_before_the_work(
     arguments: list[str], part: str, infoset: Command, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sim.Campaign.run", lambda *_, **__: pytest.fail("began to work"))
+    monkeypatch.setattr("infoset.sim.Campaign.run", lambda *_, **__: pytest.fail("began to work"))
     given = {"--vary": TWO, "--runs": 10, "--out": "sweep"} | dict(zip(arguments[::2], arguments[1::2], strict=True))
     assert part in infoset.refused("sweep", file, *[part for pair in given.items() for part in pair])
     assert [each.name for each in tmp_path.iterdir()] == ["brief.toml"]

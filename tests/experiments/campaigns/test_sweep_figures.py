@@ -11,13 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.campaigns.sweep_axes import tied_keys
-from experiments.campaigns.sweep_figures import draw_sweep
-from experiments.campaigns.sweep_report import SHOWN
-from experiments.campaigns.sweep_table import SweepTable, limits
-from sim import QuantileName, Requirement
-from sim.requirement import AnyRequirement, HitRequirement
-from sim.storage import Axis
+from infoset.experiments.campaigns.sweep_axes import tied_keys
+from infoset.experiments.campaigns.sweep_figures import draw_sweep
+from infoset.experiments.campaigns.sweep_report import SHOWN
+from infoset.experiments.campaigns.sweep_table import SweepTable, limits
+from infoset.sim import QuantileName, Requirement
+from infoset.sim.requirement import AnyRequirement, HitRequirement
+from infoset.sim.storage import Axis
 
 REQUIRED = Requirement(QuantileName("miss_m", 0.99), 10.0)
 

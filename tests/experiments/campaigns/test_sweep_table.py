@@ -13,13 +13,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.campaigns.sweep_axes import sweep_cells
-from experiments.campaigns.sweep_table import SweepTable, limits, spans_decades, sweep_table
-from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind
-from sim import Body, Campaign, CampaignNoise, QuantileName, Requirement, Scenario, simulate
-from sim.requirement import AnyRequirement, HitRequirement, judge
-from sim.storage import Axis, CampaignFolder
+from infoset.experiments.campaigns.sweep_axes import sweep_cells
+from infoset.experiments.campaigns.sweep_table import SweepTable, limits, spans_decades, sweep_table
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import Body, Campaign, CampaignNoise, QuantileName, Requirement, Scenario, simulate
+from infoset.sim.requirement import AnyRequirement, HitRequirement, judge
+from infoset.sim.storage import Axis, CampaignFolder
 
 REQUIRED = Requirement(QuantileName("miss_m", 0.99), 10.0)
 MET, NOT_MET, OPEN = "met", "not-met", "undecided"

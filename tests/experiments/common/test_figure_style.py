@@ -15,11 +15,10 @@ from typing import Any
 import matplotlib
 import pytest
 
-import experiments
-from experiments.cli import main
-from experiments.common import figure_style
-from experiments.common.figure_style import WIDTH_MM, figure_bytes, legend_below, style, subplots
-from infoset import ConvexPolygons, Polytope
+from infoset import ConvexPolygons, Polytope, experiments
+from infoset.experiments.cli import main
+from infoset.experiments.common import figure_style
+from infoset.experiments.common.figure_style import WIDTH_MM, figure_bytes, legend_below, style, subplots
 
 
 def test_pdfs_have_truetype_fonts_and_pngs_200_dpi(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,7 +60,7 @@ figure.dpi: 33
 """A matplotlibrc that changes or stops every figure; TeX is often not installed."""
 DRAW = """
 import hashlib, sys
-from experiments.common.figure_style import figure_bytes, style, subplots
+from infoset.experiments.common.figure_style import figure_bytes, style, subplots
 
 @style()
 def draw():
@@ -92,7 +91,7 @@ def test_the_users_matplotlibrc_changes_no_byte_of_a_figure(tmp_path: Path) -> N
 
 def test_a_command_draws_although_the_backend_of_a_notebook_is_missing(tmp_path: Path) -> None:
     environment = {**os.environ, "MPLBACKEND": "module://no_such_package.backend_inline"}
-    command = [sys.executable, "-m", "experiments", "pareto", "--out", "figures", "--quiet"]
+    command = [sys.executable, "-m", "infoset", "pareto", "--out", "figures", "--quiet"]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "figures" / "figure-front.png").stat().st_size > 0
@@ -113,7 +112,7 @@ def test_the_backend_of_the_process_is_the_same_after_a_command(
 
 FIGURES = [
     module.name
-    for module in pkgutil.walk_packages(experiments.__path__, "experiments.")
+    for module in pkgutil.walk_packages(experiments.__path__, "infoset.experiments.")
     if "figure" in module.name.rpartition(".")[2] or ".figures." in module.name
 ]
 
@@ -130,7 +129,7 @@ def test_whatever_makes_axes_is_drawn_in_the_style(name: str) -> None:
         and {"subplots", "new_figure"} & called(function)
         and "style()" not in map(ast.unparse, function.decorator_list)
     ]
-    assert bare == [] or name == "experiments.common.figure_style"
+    assert bare == [] or name == "infoset.experiments.common.figure_style"
 
 
 def called(function: ast.FunctionDef) -> set[str]:

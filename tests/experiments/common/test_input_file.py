@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.built_in_files import SCENARIO, built_in_files
-from experiments.common.errors import InputError
-from experiments.common.input_file import changed, load_problem, parse, read_file, read_text, to_toml
-from experiments.interception.scenario_file import load_scenario
-from sim import Scenario
+from infoset.experiments.common.built_in_files import SCENARIO, built_in_files
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import changed, load_problem, parse, read_file, read_text, to_toml
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim import Scenario
 from tests.built_in import problem_text, scenario_text
 
 TEXT = scenario_text("asteroid-1997")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.common.units import length_unit, time_unit
+from infoset.experiments.common.units import length_unit, time_unit
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.input_file import to_toml
-from experiments.common.screen import number
-from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario, with_model
 from infoset import Model
-from sim import Scenario
-from sim.adversary import find_worst
-from sim.storage.codec import fingerprint
-from sim.versions import versions
+from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.common.screen import number
+from infoset.experiments.interception.record_file import load_record
+from infoset.experiments.interception.scenario_file import load_scenario, with_model
+from infoset.sim import Scenario
+from infoset.sim.adversary import find_worst
+from infoset.sim.storage.codec import fingerprint
+from infoset.sim.versions import versions
 from tests.built_in import scenario_text
 from tests.experiments.command_line import Command
 from tests.space import in_space
@@ -96,8 +96,8 @@ def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Sc
 @pytest.mark.thorough
 def test_both_max_misses_are_those_of_bound(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
-    monkeypatch.setattr("sim.bound.lower_bound.PERIODS_LOOKED_AT", 1)  # few pairs
-    monkeypatch.setattr("sim.bound.lower_bound.REFINEMENTS", 0)
+    monkeypatch.setattr("infoset.sim.bound.lower_bound.PERIODS_LOOKED_AT", 1)  # few pairs
+    monkeypatch.setattr("infoset.sim.bound.lower_bound.REFINEMENTS", 0)
     options = ("--budget", 24, "--model", "paper", "--json")
     same = ("--objective", "fixed-truth", *options)
     table = infoset("bound", "--strategies", "symmetric-miss", *options, "bound.json")[1]

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.common.input_file import to_toml
-from experiments.interception.figures.bound import draw_bound
-from experiments.interception.scenario_file import load_scenario
-from guidance import strategy_names
 from infoset import StateBox
-from sim import Scenario
-from sim.bound.lower_bound import LowerBound, lower_bound, pair_at
-from sim.scenario import of_model
-from sim.storage.codec import fingerprint
-from sim.versions import versions
+from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.interception.figures.bound import draw_bound
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import strategy_names
+from infoset.sim import Scenario
+from infoset.sim.bound.lower_bound import LowerBound, lower_bound, pair_at
+from infoset.sim.scenario import of_model
+from infoset.sim.storage.codec import fingerprint
+from infoset.sim.versions import versions
 from tests.experiments.command_line import Command
 from tests.sensors import linear
 from tests.space import in_space
@@ -48,7 +48,7 @@ def planar(short: Scenario) -> LowerBound:
 @pytest.fixture
 def known(planar: LowerBound, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command gets the bound of the short scenario without computing it again."""
-    monkeypatch.setattr("experiments.interception.runs.bound.lower_bound", lambda *_, **__: planar)
+    monkeypatch.setattr("infoset.experiments.interception.runs.bound.lower_bound", lambda *_, **__: planar)
 
 
 @pytest.fixture
@@ -195,12 +195,12 @@ def test_bound_in_space(infoset: Command, short: Scenario, planar: LowerBound, t
 def test_a_program_without_a_solution_is_one_message(
     infoset: Command, short_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from sim import BoundError
+    from infoset.sim import BoundError
 
     def fail(*_: object, **__: object) -> None:
         raise BoundError("label 1 m")
 
-    monkeypatch.setattr("experiments.interception.runs.bound.lower_bound", fail)
+    monkeypatch.setattr("infoset.experiments.interception.runs.bound.lower_bound", fail)
     code, out, err = infoset("bound", short_file, "-q")
     assert (code, out) == (2, "")
     assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")

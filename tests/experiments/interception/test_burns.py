@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from experiments.interception.runs.experiment import burns_key
-from sim import simulate
-from sim.results import join
+from infoset.experiments import load_scenario
+from infoset.experiments.interception.runs.experiment import burns_key
+from infoset.sim import simulate
+from infoset.sim.results import join
 from tests.experiments.command_line import Command, strict
 
 SETTINGS = ("thruster.impulses_s=[80.0, 40.0, 10.0]", "thruster.last_impulse_s=20.0")

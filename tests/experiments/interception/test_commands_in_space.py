@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario
-from sim import simulate
+from infoset.experiments.interception.record_file import load_record
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim import simulate
 from tests.experiments.command_line import Command, strict
 
 ANGLES = ["measured_angle_y_rad", "measured_angle_z_rad"]

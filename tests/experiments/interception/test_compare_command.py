@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.interception.scenario_file import with_model
-from experiments.interception.study import summary
-from guidance import NoiseKind, TieRule, strategy_names
 from infoset import Model
-from sim import Scenario, simulate
-from sim.storage.codec import fingerprint
-from sim.versions import versions
+from infoset.experiments.interception.scenario_file import with_model
+from infoset.experiments.interception.study import summary
+from infoset.guidance import NoiseKind, TieRule, strategy_names
+from infoset.sim import Scenario, simulate
+from infoset.sim.storage.codec import fingerprint
+from infoset.sim.versions import versions
 from tests.experiments.command_line import Command
 
 TWO = ("--strategies", "symmetric-miss,patient")

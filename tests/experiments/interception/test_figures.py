@@ -12,18 +12,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
-from experiments.common.figure_style import CURVE_LOOKS, figure_bytes
-from experiments.interception.course import Courses
-from experiments.interception.figures.commands import draw_experiment
-from experiments.interception.figures.comparison import draw_comparison
-from experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
-from experiments.interception.figures.process import draw_process
-from experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, choose_sections, draw_sets
-from experiments.interception.scenario_file import load_scenario
-from experiments.interception.study import Comparison, Curve, curve_scenarios
-from guidance import NoiseKind, TieRule
 from infoset.arrays import Floats
-from sim import Record, Results, fly_one, simulate
+from infoset.experiments.common.figure_style import CURVE_LOOKS, figure_bytes
+from infoset.experiments.interception.course import Courses
+from infoset.experiments.interception.figures.commands import draw_experiment
+from infoset.experiments.interception.figures.comparison import draw_comparison
+from infoset.experiments.interception.figures.distributions import Sample, draw_distributions, draw_samples
+from infoset.experiments.interception.figures.process import draw_process
+from infoset.experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, choose_sections, draw_sets
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.experiments.interception.study import Comparison, Curve, curve_scenarios
+from infoset.guidance import NoiseKind, TieRule
+from infoset.sim import Record, Results, fly_one, simulate
 
 UNITS = (", m", ", s", ", m/s", ", mrad", ", µrad/s", "share of runs")
 RUNS = 6

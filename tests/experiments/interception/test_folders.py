@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.interception.scenario_file import load_scenario
-from sim.storage.codec import fingerprint
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim.storage.codec import fingerprint
 from tests.experiments.command_line import Command, strict
 
 TIE_AND_SECTIONS = ("--set", "tie=lower", "--set", "information_set.sections=9")

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from experiments.common.built_in_files import built_in_files
-from experiments.common.errors import InputError
-from experiments.interception.scenario_file import all_warnings
+from infoset.experiments import load_scenario
+from infoset.experiments.common.built_in_files import built_in_files
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.scenario_file import all_warnings
 from tests.built_in import scenario_text
 
 

@@ -12,12 +12,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from experiments.common.input_file import changed, to_toml
-from experiments.interception.study import miss_text
-from guidance import NoiseKind
 from infoset import Model
-from sim import Body, HitRequirement, MissCause, Scenario, estimate_hits, simulate
-from sim.requirement import Decision, judge, parse_requirement
+from infoset.experiments.common.input_file import changed, to_toml
+from infoset.experiments.interception.study import miss_text
+from infoset.guidance import NoiseKind
+from infoset.sim import Body, HitRequirement, MissCause, Scenario, estimate_hits, simulate
+from infoset.sim.requirement import Decision, judge, parse_requirement
 from tests.experiments.command_line import Command
 
 RUNS = 50

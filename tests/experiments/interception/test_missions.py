@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from guidance import NoiseKind
-from sim import simulate
+from infoset.experiments import load_scenario
+from infoset.guidance import NoiseKind
+from infoset.sim import simulate
 
 
 @pytest.mark.parametrize("noise", NoiseKind)

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.interception import record_file
-from experiments.interception.record_file import load_record, write_record
-from experiments.interception.scenario_file import load_scenario
-from guidance import LineOfSight, NoiseKind, Situation
 from infoset import InformationSetView, RateSensor, Section
-from sim import Record, fly_one
-from sim.versions import versions
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception import record_file
+from infoset.experiments.interception.record_file import load_record, write_record
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import LineOfSight, NoiseKind, Situation
+from infoset.sim import Record, fly_one
+from infoset.sim.versions import versions
 from tests.long_steps import with_long_steps
 from tests.records import first_steps
 from tests.space import in_space

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments.interception.figures.animation import animate
-from experiments.interception.page import interception_page
-from experiments.interception.record_file import write_record
-from experiments.interception.scenario_file import load_scenario
-from sim import Record, fly_one
+from infoset.experiments.interception.figures.animation import animate
+from infoset.experiments.interception.page import interception_page
+from infoset.experiments.interception.record_file import write_record
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.sim import Record, fly_one
 from tests.experiments.command_line import Command
 from tests.records import first_steps
 

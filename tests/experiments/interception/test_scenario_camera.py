@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.common.input_file import read_text, to_toml
-from experiments.interception.scenario_file import scenario_warnings
 from infoset import Camera
-from sim import Scenario
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import read_text, to_toml
+from infoset.experiments.interception.scenario_file import scenario_warnings
+from infoset.sim import Scenario
 from tests.built_in import scenario_text
 
 PLANE = scenario_text("asteroid-1997")

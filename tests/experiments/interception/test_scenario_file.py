@@ -6,17 +6,22 @@ import re
 
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.common.input_file import read_text, to_toml
-from experiments.common.units import si_factor
-from experiments.interception.scenario_file import feasibility_warnings, load_scenario, scenario_warnings, with_model
-from guidance.noise import NoiseKind, TieRule
-from guidance.thruster import Thruster
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import read_text, to_toml
+from infoset.experiments.common.units import si_factor
+from infoset.experiments.interception.scenario_file import (
+    feasibility_warnings,
+    load_scenario,
+    scenario_warnings,
+    with_model,
+)
+from infoset.guidance.noise import NoiseKind, TieRule
+from infoset.guidance.thruster import Thruster
 from infoset.model import Model, SetModel, SetSettings, StateBox
 from infoset.sensors import AngleSensor, Camera, RangeSensor, RateSensor
-from sim.covariance import Covariance
-from sim.scenario import Body, Scenario, Sun, Target, of_model
-from sim.storage.codec import fingerprint
+from infoset.sim.covariance import Covariance
+from infoset.sim.scenario import Body, Scenario, Sun, Target, of_model
+from infoset.sim.storage.codec import fingerprint
 from tests.built_in import scenario_names, scenario_text
 
 PAPER = scenario_text("asteroid-1997")

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.common.input_file import read_text, to_toml
-from experiments.interception.scenario_file import load_scenario, scenario_warnings
-from sim import Manoeuvre, Scenario, Target
-from sim.scenario import of_model
-from sim.storage.codec import fingerprint
+from infoset.experiments.common.input_file import read_text, to_toml
+from infoset.experiments.interception.scenario_file import load_scenario, scenario_warnings
+from infoset.sim import Manoeuvre, Scenario, Target
+from infoset.sim.scenario import of_model
+from infoset.sim.storage.codec import fingerprint
 from tests.built_in import scenario_text
 from tests.sensors import linear
 

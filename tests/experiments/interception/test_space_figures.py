@@ -11,20 +11,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.path import Path
 
-from experiments.common.figure_style import figure_bytes
-from experiments.interception.course import Courses, complete_steps, true_predicted_misses
-from experiments.interception.figures.approach import draw_approach
-from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse
-from experiments.interception.figures.corridor import draw_corridor
-from experiments.interception.figures.process import draw_process
-from experiments.interception.figures.sets import draw_sets
-from experiments.interception.scenario_file import load_scenario
-from experiments.interception.study import Curve
-from guidance import NoiseKind
-from guidance.thruster import modulus
 from infoset.arrays import Floats
-from sim import Record, Results, fly_one, simulate
-from sim.scenario import of_model
+from infoset.experiments.common.figure_style import figure_bytes
+from infoset.experiments.interception.course import Courses, complete_steps, true_predicted_misses
+from infoset.experiments.interception.figures.approach import draw_approach
+from infoset.experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse
+from infoset.experiments.interception.figures.corridor import draw_corridor
+from infoset.experiments.interception.figures.process import draw_process
+from infoset.experiments.interception.figures.sets import draw_sets
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.experiments.interception.study import Curve
+from infoset.guidance import NoiseKind
+from infoset.guidance.thruster import modulus
+from infoset.sim import Record, Results, fly_one, simulate
+from infoset.sim.scenario import of_model
 
 RUNS = 12
 MEDIAN, NINETY, GUARANTEE = "circle: median of the miss", "circle: 90 % of the misses", "guaranteed miss Φ"
@@ -174,8 +174,8 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
 
 @pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-space"])
 def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
-    monkeypatch.setattr("experiments.interception.course.MAX_COURSES", 3)
+    monkeypatch.setattr(sys.modules["infoset.sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
+    monkeypatch.setattr("infoset.experiments.interception.course.MAX_COURSES", 3)
     scenario = load_scenario(name)
     scenario = replace(scenario, **of_model(replace(scenario.set_model, sections=5)))
     courses = Courses(scenario, 4)
@@ -194,7 +194,7 @@ def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.
 
 
 def test_courses_of_long_flights_keep_the_max_impulses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.interception.course.MAX_STEPS", 40)
+    monkeypatch.setattr("infoset.experiments.interception.course.MAX_STEPS", 40)
     scenario = load_scenario("haiv-2013")
     courses = Courses(scenario, 2)
     assert len(courses.steps) <= 44

@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.interception.scenario_file import load_scenario
-from experiments.interception.strategies import chosen_strategies, load_noise, load_strategy, own_strategy
-from guidance import SymmetricMiss
-from sim import Scenario, simulate
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.experiments.interception.strategies import chosen_strategies, load_noise, load_strategy, own_strategy
+from infoset.guidance import SymmetricMiss
+from infoset.sim import Scenario, simulate
 from tests.experiments.command_line import Command
 
 LIKE_PUBLISHED = """
 from dataclasses import dataclass
 from half import HALF
-from guidance import symmetric_impulse
+from infoset.guidance import symmetric_impulse
 
 @dataclass(frozen=True)
 class Mine:
@@ -83,7 +83,7 @@ def test_every_command_takes_a_strategy_of_a_file(
     infoset: Command,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("sim.bound.lower_bound.REFINEMENTS", 0)
+    monkeypatch.setattr("infoset.sim.bound.lower_bound.REFINEMENTS", 0)
     few = {
         "experiment": ["--runs", 2],
         "compare": ["--runs", 2],

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from experiments.common.input_file import to_toml
-from experiments.interception.scenario_file import with_model
-from experiments.interception.study import SetCounts, hit_text, percent, set_counts, set_warnings
 from infoset import Model
-from sim import Body, Scenario, estimate_hits, simulate
+from infoset.experiments import load_scenario
+from infoset.experiments.common.input_file import to_toml
+from infoset.experiments.interception.scenario_file import with_model
+from infoset.experiments.interception.study import SetCounts, hit_text, percent, set_counts, set_warnings
+from infoset.sim import Body, Scenario, estimate_hits, simulate
 
 pytestmark = pytest.mark.usefixtures("unrendered")
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments import load_scenario
-from experiments.common.input_file import read_text
-from experiments.interception.trajectory_file import KnownTarget, scenario_of
 from infoset.arrays import Floats
-from sim.approach import propagate
-from sim.kepler import KeplerMotion
-from sim.scenario import Scenario, corners
+from infoset.experiments import load_scenario
+from infoset.experiments.common.input_file import read_text
+from infoset.experiments.interception.trajectory_file import KnownTarget, scenario_of
+from infoset.sim.approach import propagate
+from infoset.sim.kepler import KeplerMotion
+from infoset.sim.scenario import Scenario, corners
 from tests.experiments.command_line import Command
 from tests.oem_text import HEADER, covariance_block, segment
 
@@ -479,7 +479,7 @@ def test_text_with_a_new_line_cannot_write_keys_into_the_scenario(key: str, info
 
 
 def test_size_is_limited_before_reading(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.interception.trajectory_file.MAX_OEM_BYTES", 100)
+    monkeypatch.setattr("infoset.experiments.interception.trajectory_file.MAX_OEM_BYTES", 100)
     meeting_oem(Path())
 
     assert "spacecraft.oem: has more than 100 bytes" in infoset.refused(

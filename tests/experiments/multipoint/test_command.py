@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.input_file import load_problem
-from rendezvous.multipoint import KeplerTour, Meet, Target
+from infoset.experiments.common.input_file import load_problem
+from infoset.rendezvous.multipoint import KeplerTour, Meet, Target
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.common.built_in_files import built_in_files
-from experiments.common.input_file import load_problem
-from experiments.observer.command import Errors
-from experiments.observer.data import simulate
+from infoset.experiments.common.built_in_files import built_in_files
+from infoset.experiments.common.input_file import load_problem
+from infoset.experiments.observer.command import Errors
+from infoset.experiments.observer.data import simulate
 from tests.experiments.command_line import Command, strict
 
 PUBLISHED = json.loads((Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text())

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rendezvous.pursuit_evasion import Policy
-from rendezvous.pursuit_evasion._branch import follow
+from infoset.rendezvous.pursuit_evasion import Policy
+from infoset.rendezvous.pursuit_evasion._branch import follow
 from tests.experiments.command_line import Command
 from tests.experiments.pursuit.test_file import with_state
 
@@ -69,7 +69,7 @@ def test_verdicts_without_a_capture(settings: list[str], verdict: str, said: str
 
 
 def test_a_game_that_takes_too_long_to_follow_is_bounded(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rendezvous.pursuit_evasion.solver.follow", partial(follow, max_work=10.0))
+    monkeypatch.setattr("infoset.rendezvous.pursuit_evasion.solver.follow", partial(follow, max_work=10.0))
     code, out, _ = infoset("pursuit")
     assert code == 0
     assert "branch-not-certified: the extremals are a saddle up to a duration of" in out

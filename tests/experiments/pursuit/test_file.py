@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.common.input_file import load_problem, read_text
-from experiments.pursuit.file import PursuitProblem
-from experiments.pursuit.map import game_at
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import load_problem, read_text
+from infoset.experiments.pursuit.file import PursuitProblem
+from infoset.experiments.pursuit.map import game_at
 from tests.built_in import problem_text
 
 TEXT = problem_text("geo-pursuit")

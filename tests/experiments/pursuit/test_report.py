@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.common.input_file import load_problem
-from experiments.pursuit.report import Report, report_json, report_lines, saddle_point
-from rendezvous.pursuit_evasion import Certificate, Solution, certify, solve
+from infoset.experiments.common.input_file import load_problem
+from infoset.experiments.pursuit.report import Report, report_json, report_lines, saddle_point
+from infoset.rendezvous.pursuit_evasion import Certificate, Solution, certify, solve
 
 PROBLEM = load_problem("leo-pursuit")
 

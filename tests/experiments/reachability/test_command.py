@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.common.input_file import load_problem, read_text
-from experiments.reachability.command import Reach
-from experiments.reachability.figures import draw_controls
-from experiments.reachability.file import Rendezvous
-from experiments.reachability.run import COMMAND
-from rendezvous.reachability.conic import ConeProgram
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.common.input_file import load_problem, read_text
+from infoset.experiments.reachability.command import Reach
+from infoset.experiments.reachability.figures import draw_controls
+from infoset.experiments.reachability.file import Rendezvous
+from infoset.experiments.reachability.run import COMMAND
+from infoset.rendezvous.reachability.conic import ConeProgram
 from tests.built_in import problem_text
 from tests.experiments.command_line import Command
 from tests.rendezvous.reachability.conftest import printed

@@ -14,13 +14,13 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import linprog
 
 from benchmarks import published_radius
-from experiments.common.hill_axes import from_paper, to_paper
-from experiments.common.input_file import load_problem
-from experiments.common.printed_numbers import Comparison, Verdict, read_paper
-from experiments.reachability.published import PROBLEM, printed_tables, published_motion
-from experiments.reproduced_numbers import reproduce_paper
 from infoset.arrays import Floats
-from rendezvous.reachability import minimum_energy, solve
+from infoset.experiments.common.hill_axes import from_paper, to_paper
+from infoset.experiments.common.input_file import load_problem
+from infoset.experiments.common.printed_numbers import Comparison, Verdict, read_paper
+from infoset.experiments.reachability.published import PROBLEM, printed_tables, published_motion
+from infoset.experiments.reproduced_numbers import reproduce_paper
+from infoset.rendezvous.reachability import minimum_energy, solve
 
 RENDEZVOUS = load_problem(PROBLEM)
 TABLES = printed_tables()

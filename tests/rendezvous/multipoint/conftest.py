@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from rendezvous.multipoint import Meet, Target, Tour
-from rendezvous.relative_motion import ClohessyWiltshire
+from infoset.rendezvous.multipoint import Meet, Target, Tour
+from infoset.rendezvous.relative_motion import ClohessyWiltshire
 
 Make = Callable[..., Tour]
 RATE = 1.13e-3

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from infoset.arrays import Floats
-from rendezvous.multipoint.segments import Nodes, check_times
-from rendezvous.relative_motion import LinearMotion
+from infoset.rendezvous.multipoint.segments import Nodes, check_times
+from infoset.rendezvous.relative_motion import LinearMotion
 
 
 def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> tuple[float, Floats]:

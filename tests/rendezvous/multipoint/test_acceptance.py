@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rendezvous.multipoint import (
+from infoset.rendezvous.multipoint import (
     Meet,
     Nodes,
     Target,
@@ -18,7 +18,7 @@ from rendezvous.multipoint import (
     best_times,
     solve_segments,
 )
-from rendezvous.relative_motion import TimeVaryingMotion
+from infoset.rendezvous.relative_motion import TimeVaryingMotion
 from tests.rendezvous.multipoint.conftest import Make
 from tests.rendezvous.multipoint.dense import solve_dense
 

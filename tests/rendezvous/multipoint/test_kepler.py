@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from infoset.arrays import Floats
-from rendezvous.multipoint import (
+from infoset.rendezvous.multipoint import (
     KeplerTour,
     Meet,
     NotSettledError,
     Path,
     Target,
 )
-from rendezvous.multipoint._shooting import propagate
-from rendezvous.two_body import coast
+from infoset.rendezvous.multipoint._shooting import propagate
+from infoset.rendezvous.two_body import coast
 
 START = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from infoset.arrays import Floats
-from rendezvous.multipoint import Meet, Target, Tour, solve_segments
-from rendezvous.relative_motion import (
+from infoset.rendezvous.multipoint import Meet, Target, Tour, solve_segments
+from infoset.rendezvous.relative_motion import (
     ClohessyWiltshire,
     EllipticOrbit,
     LinearMotion,

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import minimize
 
 from infoset.arrays import Floats
-from rendezvous.multipoint import (
+from infoset.rendezvous.multipoint import (
     Meet,
     Target,
     TimeLimits,
@@ -18,7 +18,7 @@ from rendezvous.multipoint import (
     best_order,
     best_times,
 )
-from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
 pytestmark = pytest.mark.thorough
 

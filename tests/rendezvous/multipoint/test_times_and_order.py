@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rendezvous.multipoint import (
+from infoset.rendezvous.multipoint import (
     Meet,
     NotSettledError,
     Target,
@@ -15,7 +15,7 @@ from rendezvous.multipoint import (
     best_order_of_slots,
     best_times,
 )
-from rendezvous.relative_motion import ClohessyWiltshire
+from infoset.rendezvous.relative_motion import ClohessyWiltshire
 from tests.rendezvous.multipoint.conftest import Make
 
 
@@ -144,7 +144,7 @@ def test_times_are_best_where_gaps_differ_by_orders_of_magnitude() -> None:
 
 
 def test_times_that_are_no_minimum_are_no_answer(tours: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rendezvous.multipoint.times._descend", lambda _, begin, *__: begin)
-    monkeypatch.setattr("rendezvous.multipoint.times._polish", lambda _, best, *__: best)
+    monkeypatch.setattr("infoset.rendezvous.multipoint.times._descend", lambda _, begin, *__: begin)
+    monkeypatch.setattr("infoset.rendezvous.multipoint.times._polish", lambda _, best, *__: best)
     with pytest.raises(NotSettledError, match="are no minimum"):
         best_times(tours(3), (0, 1, 2), TimeLimits(latest_s=4000.0))

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 from scipy.optimize import minimize
 
 from infoset.arrays import Floats
-from rendezvous.pareto import (
+from infoset.rendezvous.pareto import (
     Component,
     Core,
     Craft,
@@ -33,7 +33,7 @@ from rendezvous.pareto import (
     solve_encounter,
     total_impulse,
 )
-from rendezvous.relative_motion import ClohessyWiltshire
+from infoset.rendezvous.relative_motion import ClohessyWiltshire
 
 POSITION = (Component.X, Component.Y, Component.Z)
 

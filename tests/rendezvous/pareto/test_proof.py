@@ -12,8 +12,8 @@ from scipy.linalg import expm
 from scipy.sparse import csc_matrix
 
 from infoset.arrays import Floats
-from rendezvous.pareto import Component, Craft, Encounter, Meeting, solve_encounter
-from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, TschaunerHempel
+from infoset.rendezvous.pareto import Component, Craft, Encounter, Meeting, solve_encounter
+from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, TschaunerHempel
 
 NODES = 24
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.common.hill_axes import from_paper, to_paper
 from infoset.arrays import Floats
-from rendezvous.pareto import (
+from infoset.experiments.common.hill_axes import from_paper, to_paper
+from infoset.rendezvous.pareto import (
     Component,
     Core,
     Craft,
@@ -20,7 +20,7 @@ from rendezvous.pareto import (
     distances,
     solve_encounter,
 )
-from rendezvous.relative_motion import ClohessyWiltshire
+from infoset.rendezvous.relative_motion import ClohessyWiltshire
 
 NINE_DIGITS = 1e-9
 STARTS = (

@@ -11,7 +11,7 @@ import pytest
 from scipy.sparse import csc_matrix
 
 from infoset.arrays import Floats
-from rendezvous.pareto import (
+from infoset.rendezvous.pareto import (
     Component,
     Craft,
     Encounter,
@@ -21,7 +21,7 @@ from rendezvous.pareto import (
     minimax_excess,
     solve_encounter,
 )
-from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
 Check = Callable[[int], None]
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from rendezvous.pursuit_evasion import Game, Gravity, Player, Solution, solve
-from rendezvous.two_body import OrbitalElements
+from infoset.rendezvous.pursuit_evasion import Game, Gravity, Player, Solution, solve
+from infoset.rendezvous.two_body import OrbitalElements
 
 MU_M3_S2 = 398600.4418e9
 EARTH_M = 6378137.0

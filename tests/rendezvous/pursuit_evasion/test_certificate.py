@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from rendezvous.pursuit_evasion import PathError, Policy, Solution, certify, solve
-from rendezvous.pursuit_evasion.game import scaled_craft
-from rendezvous.pursuit_evasion.paths import steered_path
+from infoset.rendezvous.pursuit_evasion import PathError, Policy, Solution, certify, solve
+from infoset.rendezvous.pursuit_evasion.game import scaled_craft
+from infoset.rendezvous.pursuit_evasion.paths import steered_path
 
 from .conftest import MakeGame
 from .published import CASES, Case
@@ -89,7 +89,7 @@ def test_a_capture_that_is_off_is_told(solved: Solution) -> None:
 
 
 def test_a_path_that_turns_too_fast_is_told(solved: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rendezvous.pursuit_evasion.paths._MAX_RATES", 100)
+    monkeypatch.setattr("infoset.rendezvous.pursuit_evasion.paths._MAX_RATES", 100)
     evader = scaled_craft(solved.game.evader, solved.game.gravity, solved.units)
     with pytest.raises(PathError, match="turns too fast"):
         steered_path(evader, Policy.PROGRADE.direction, 3.4)

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import minimize
 
 from infoset.arrays import Floats
-from rendezvous.pursuit_evasion import Solution
-from rendezvous.pursuit_evasion.game import scaled_craft
-from rendezvous.pursuit_evasion.paths import extremal_paths
+from infoset.rendezvous.pursuit_evasion import Solution
+from infoset.rendezvous.pursuit_evasion.game import scaled_craft
+from infoset.rendezvous.pursuit_evasion.paths import extremal_paths
 
 NODES, STEPS = 16, 400
 

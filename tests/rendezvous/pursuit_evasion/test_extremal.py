@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from infoset.arrays import Floats
-from rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, end_of, flow_back, rate, shoot_back
-from rendezvous.pursuit_evasion._pair import across
+from infoset.rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, end_of, flow_back, rate, shoot_back
+from infoset.rendezvous.pursuit_evasion._pair import across
 
 PLACE = st.floats(-1.5, 1.5)
 OBLATENESS = (0.0, 5e-4)

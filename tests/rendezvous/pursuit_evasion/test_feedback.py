@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rendezvous.pursuit_evasion import (
+from infoset.rendezvous.pursuit_evasion import (
     Ended,
     Observation,
     Policy,

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from infoset.arrays import Floats
-from rendezvous.pursuit_evasion import (
+from infoset.rendezvous.pursuit_evasion import (
     Capture,
     Game,
     Gravity,
@@ -19,9 +19,9 @@ from rendezvous.pursuit_evasion import (
     Verdict,
     solve,
 )
-from rendezvous.pursuit_evasion._branch import Ending, follow
-from rendezvous.pursuit_evasion._pair import Node, Pair
-from rendezvous.pursuit_evasion.game import scaled_game, units_of
+from infoset.rendezvous.pursuit_evasion._branch import Ending, follow
+from infoset.rendezvous.pursuit_evasion._pair import Node, Pair
+from infoset.rendezvous.pursuit_evasion.game import scaled_game, units_of
 
 from .conftest import EARTH_M, MU_M3_S2, MakeGame
 from .linear_game import capture_s

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rendezvous.reachability import MotionModel, ReachabilityProblem, ThrustShape, discretised, motion_of
-from rendezvous.relative_motion import EllipticOrbit
+from infoset.rendezvous.reachability import MotionModel, ReachabilityProblem, ThrustShape, discretised, motion_of
+from infoset.rendezvous.relative_motion import EllipticOrbit
 
 Paper = Callable[..., ReachabilityProblem]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
 from infoset.arrays import Floats
-from rendezvous.reachability import ReachabilityProblem, ThrustShape
+from infoset.rendezvous.reachability import ReachabilityProblem, ThrustShape
 
 Numbers = NDArray[Any]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from infoset.arrays import Floats
-from rendezvous.reachability import (
+from infoset.rendezvous.reachability import (
     InadmissibleStartError,
     MotionModel,
     ReachabilityProblem,
@@ -16,7 +16,7 @@ from rendezvous.reachability import (
     discretised,
     motion_of,
 )
-from rendezvous.relative_motion import EllipticOrbit
+from infoset.rendezvous.relative_motion import EllipticOrbit
 
 from .high_precision import Dense, cone_program
 

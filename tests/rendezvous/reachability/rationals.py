@@ -9,7 +9,7 @@ from math import lcm
 import numpy as np
 
 from infoset.arrays import Floats
-from rendezvous.reachability.problem import Block
+from infoset.rendezvous.reachability.problem import Block
 from tests.rationals import Fraction
 
 with suppress(ModuleNotFoundError):  # tests that need it are skipped

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from infoset.arrays import Floats
-from rendezvous.reachability import MotionModel, NonlinearMotion, replan
-from rendezvous.relative_motion import EllipticOrbit
+from infoset.rendezvous.reachability import MotionModel, NonlinearMotion, replan
+from infoset.rendezvous.relative_motion import EllipticOrbit
 from tests.rendezvous.reachability.conftest import Paper
 
 

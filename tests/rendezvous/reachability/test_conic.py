@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rendezvous.reachability.conic import ConeProgram, NoSolutionError
+from infoset.rendezvous.reachability.conic import ConeProgram, NoSolutionError
 
 
 def program_with_solution() -> tuple[ConeProgram, np.ndarray, np.ndarray]:

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.common.input_file import load_problem
-from rendezvous.reachability import (
+from infoset.experiments.common.input_file import load_problem
+from infoset.rendezvous.reachability import (
     EmptyTubeError,
     ReachabilityProblem,
     Route,
@@ -26,7 +26,7 @@ from rendezvous.reachability import (
     samples,
     solve,
 )
-from rendezvous.reachability.conic import CONE_TOLERANCE, MAX_GAP, NoSolutionError
+from infoset.rendezvous.reachability.conic import CONE_TOLERANCE, MAX_GAP, NoSolutionError
 from tests.rendezvous.reachability.conftest import Paper
 
 from .high_precision import Dense, cone_program, precise_min_norm

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.common.hill_axes import to_paper
 from infoset.arrays import Floats
-from rendezvous.reachability import (
+from infoset.experiments.common.hill_axes import to_paper
+from infoset.rendezvous.reachability import (
     MotionModel,
     NonlinearMotion,
     SetCounts,
@@ -25,7 +25,7 @@ from rendezvous.reachability import (
     minimum_peak,
     solve,
 )
-from rendezvous.relative_motion import EllipticOrbit
+from infoset.rendezvous.relative_motion import EllipticOrbit
 from tests.rendezvous.reachability.conftest import Paper, printed
 
 FORWARD = {

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from infoset.arrays import Floats
-from rendezvous.reachability import (
+from infoset.rendezvous.reachability import (
     EmptyTubeError,
     FeedbackPlan,
     ReachabilityProblem,
@@ -16,7 +16,7 @@ from rendezvous.reachability import (
     solve,
     tightened,
 )
-from rendezvous.reachability.conic import NoSolutionError
+from infoset.rendezvous.reachability.conic import NoSolutionError
 from tests.rendezvous.reachability.conftest import Paper
 
 
@@ -93,6 +93,6 @@ def test_a_plan_that_is_not_optimal_is_refused(paper: Paper, monkeypatch: pytest
         result.x = result.x + 1e-6
         return result
 
-    monkeypatch.setattr("rendezvous.reachability.robust.linprog", shifted)
+    monkeypatch.setattr("infoset.rendezvous.reachability.robust.linprog", shifted)
     with pytest.raises(NoSolutionError, match="constraints violated by"):
         feedback_plan(paper(), pushes(paper(), 1e-3))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from infoset.arrays import Floats
 from infoset.geometry.polytope import UncertainHullError
-from rendezvous.reachability import (
+from infoset.rendezvous.reachability import (
     EmptyTubeError,
     ReachabilityProblem,
     ReachableSets,
@@ -31,10 +31,10 @@ from rendezvous.reachability import (
     solve,
     vertices,
 )
-from rendezvous.reachability.conic import CONE_TOLERANCE
-from rendezvous.reachability.optimum import BlockOptimum
-from rendezvous.reachability.sets import LiftedSets, exact_sets
-from rendezvous.reachability.solve import optimal_controls
+from infoset.rendezvous.reachability.conic import CONE_TOLERANCE
+from infoset.rendezvous.reachability.optimum import BlockOptimum
+from infoset.rendezvous.reachability.sets import LiftedSets, exact_sets
+from infoset.rendezvous.reachability.solve import optimal_controls
 from tests.rendezvous.reachability.conftest import Paper
 
 from .rationals import rational_sets
@@ -157,7 +157,7 @@ def test_analytic_centre_has_the_max_product_of_slacks(paper: Paper) -> None:
 
 
 def test_reasons_for_the_lifted_route(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rendezvous.reachability.sets.MAX_VERTICES", 100)
+    monkeypatch.setattr("infoset.rendezvous.reachability.sets.MAX_VERTICES", 100)
     for problem, reason in (
         (paper(), ""),
         (paper(thrust=ThrustShape.BALL), "thrust in a ball"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from infoset.arrays import Floats
-from rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
+from infoset.rendezvous.relative_motion import EllipticOrbit, TschaunerHempel
 
 Vector = list[mp.mpf]
 

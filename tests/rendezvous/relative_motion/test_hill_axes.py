@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from infoset.arrays import Floats
-from rendezvous.pursuit_evasion import orbital_axes
-from rendezvous.reachability import NonlinearMotion
-from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
-from rendezvous.two_body import OrbitalElements
+from infoset.rendezvous.pursuit_evasion import orbital_axes
+from infoset.rendezvous.reachability import NonlinearMotion
+from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+from infoset.rendezvous.two_body import OrbitalElements
 
 MU = 3.986004418e14
 ANGLES = (0.9, 2.1, 0.4)

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from experiments.common.hill_axes import to_paper
 from infoset.arrays import Floats
-from rendezvous.reachability import MotionModel, motion_of
-from rendezvous.relative_motion import (
+from infoset.experiments.common.hill_axes import to_paper
+from infoset.rendezvous.reachability import MotionModel, motion_of
+from infoset.rendezvous.relative_motion import (
     ClohessyWiltshire,
     CollocatedMotion,
     EllipticOrbit,
@@ -19,7 +19,7 @@ from rendezvous.relative_motion import (
     TimeVaryingMotion,
     TschaunerHempel,
 )
-from rendezvous.relative_motion.elliptic_orbit import eccentric_of_mean
+from infoset.rendezvous.relative_motion.elliptic_orbit import eccentric_of_mean
 
 RATE = 1.13e-3
 MOTIONS: dict[str, Callable[[], LinearMotion]] = {

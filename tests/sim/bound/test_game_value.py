@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.interception.scenario_file import load_scenario, with_model
-from guidance import NoiseKind, Thruster
 from infoset import AngleSensor, Camera, InitialSet, Model, StateBox
+from infoset.experiments.interception.scenario_file import load_scenario, with_model
+from infoset.guidance import NoiseKind, Thruster
 from infoset.sensors import RateSensor
-from sim import Scenario, Sun, lower_bound, simulate
-from sim.bound.game_value import ValueReserve, value_reserve, why_no_value
-from sim.scenario import of_model
+from infoset.sim import Scenario, Sun, lower_bound, simulate
+from infoset.sim.bound.game_value import ValueReserve, value_reserve, why_no_value
+from infoset.sim.scenario import of_model
 from tests.sensors import linear
 from tests.space import in_space
 

@@ -15,13 +15,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from guidance import Thruster
 from infoset import AngleSensor, Camera, Model, RangeSensor, RateSensor, SetModel, StateBox
-from sim import Scenario, Sun
-from sim.bound.coasting import coasting
-from sim.bound.lower_bound import pair_at
-from sim.bound.pair_of_motions import Approach, TruthPair, later_impulses
-from sim.scenario import of_model
+from infoset.guidance import Thruster
+from infoset.sim import Scenario, Sun
+from infoset.sim.bound.coasting import coasting
+from infoset.sim.bound.lower_bound import pair_at
+from infoset.sim.bound.pair_of_motions import Approach, TruthPair, later_impulses
+from infoset.sim.scenario import of_model
 from tests.space import in_space
 
 Floats = NDArray[np.float64]

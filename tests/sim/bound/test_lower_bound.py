@@ -8,8 +8,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from experiments import load_scenario
-from guidance import Thruster
 from infoset import (
     AngleSensor,
     Model,
@@ -18,11 +16,13 @@ from infoset import (
     SetModel,
     StateBox,
 )
-from sim import Scenario, Sun
-from sim.bound.lower_bound import lower_bound, pair_at
-from sim.bound.pair_flight import fly_pair
-from sim.bound.pair_of_motions import TruthPair
-from sim.scenario import of_model
+from infoset.experiments import load_scenario
+from infoset.guidance import Thruster
+from infoset.sim import Scenario, Sun
+from infoset.sim.bound.lower_bound import lower_bound, pair_at
+from infoset.sim.bound.pair_flight import fly_pair
+from infoset.sim.bound.pair_of_motions import TruthPair
+from infoset.sim.scenario import of_model
 from tests.space import in_space
 
 NOMINAL_LABEL_M = 5801.3e3

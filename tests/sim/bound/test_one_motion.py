@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import load_scenario
-from guidance import Thruster, make_strategy
 from infoset import InitialSet, Model, StateBox
-from sim import Scenario
-from sim.bound.lower_bound import lower_bound, pair_at
-from sim.bound.pair_flight import fly_pair
-from sim.bound.pair_of_motions import Approach
-from sim.scenario import of_model
+from infoset.experiments import load_scenario
+from infoset.guidance import Thruster, make_strategy
+from infoset.sim import Scenario
+from infoset.sim.bound.lower_bound import lower_bound, pair_at
+from infoset.sim.bound.pair_flight import fly_pair
+from infoset.sim.bound.pair_of_motions import Approach
+from infoset.sim.scenario import of_model
 from tests.space import in_space
 
 

@@ -6,9 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.interception.scenario_file import load_scenario
-from guidance import LineOfSight, Strategy, Thruster, make_strategy
-from guidance.situation import Situation
 from infoset import (
     AngleSensor,
     InformationSet,
@@ -19,12 +16,15 @@ from infoset import (
     StateBox,
 )
 from infoset.arrays import Floats
+from infoset.experiments.interception.scenario_file import load_scenario
+from infoset.guidance import LineOfSight, Strategy, Thruster, make_strategy
+from infoset.guidance.situation import Situation
 from infoset.model import InitialSet, Model
 from infoset.sensors import Sensor
-from sim import Scenario, Sun
-from sim.bound.lower_bound import lower_bound, pair_at
-from sim.bound.pair_flight import PairNoise, fly_pair
-from sim.scenario import of_model
+from infoset.sim import Scenario, Sun
+from infoset.sim.bound.lower_bound import lower_bound, pair_at
+from infoset.sim.bound.pair_flight import PairNoise, fly_pair
+from infoset.sim.scenario import of_model
 from tests.sensors import linear
 
 QUICK = 4

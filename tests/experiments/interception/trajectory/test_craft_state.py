@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.interception.trajectory.craft_state import (
+from infoset.arrays import Floats
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.trajectory.craft_state import (
     CraftState,
     axes_note,
     epoch_scale,
@@ -17,10 +18,9 @@ from experiments.interception.trajectory.craft_state import (
     oem_craft,
     time_notes,
 )
-from experiments.interception.trajectory.epochs import Epoch, parse_epoch
-from experiments.interception.trajectory.frames import Frame
-from experiments.interception.trajectory.oem import OemSegment, read_oem
-from infoset.arrays import Floats
+from infoset.experiments.interception.trajectory.epochs import Epoch, parse_epoch
+from infoset.experiments.interception.trajectory.frames import Frame
+from infoset.experiments.interception.trajectory.oem import OemSegment, read_oem
 from tests.oem_text import HEADER, covariance_block, segment
 
 SUN_M3_S2 = 1.32712440018e20

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from experiments.interception.trajectory.epochs import (
+from infoset.experiments.interception.trajectory.epochs import (
     converted,
     is_guess,
     known_scale,

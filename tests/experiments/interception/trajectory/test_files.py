@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.common.errors import InputError
-from experiments.interception.trajectory.files import named_file
-from experiments.interception.trajectory.kernels import MAX_TEXT_BYTES, kernel_files
+from infoset.experiments.common.errors import InputError
+from infoset.experiments.interception.trajectory.files import named_file
+from infoset.experiments.interception.trajectory.kernels import MAX_TEXT_BYTES, kernel_files
 
 
 @pytest.fixture

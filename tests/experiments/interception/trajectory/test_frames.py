@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.interception.trajectory.frames import centre_name, frame_of_spice, inertial_frame, is_same_frame
+from infoset.experiments.interception.trajectory.frames import (
+    centre_name,
+    frame_of_spice,
+    inertial_frame,
+    is_same_frame,
+)
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ from itertools import accumulate
 import numpy as np
 import pytest
 
-from experiments.interception.trajectory import interpolation
-from experiments.interception.trajectory.interpolation import Interpolated, hermite, interpolate, lagrange
 from infoset.arrays import Floats
+from infoset.experiments.interception.trajectory import interpolation
+from infoset.experiments.interception.trajectory.interpolation import Interpolated, hermite, interpolate, lagrange
 
 Polynomial = list[Fraction]
 """Coefficients, the constant first."""
