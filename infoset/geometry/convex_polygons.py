@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from infoset.arrays import Flags, Floats
+from infoset.arrays import Flags, Floats, Integers
+from infoset.geometry import conversion
 from infoset.geometry import polygon_batches as kernels
 from infoset.geometry._set_arguments import (
     axis_numbers,
+    bound_values,
+    box_ends,
+    constraint_values,
     finite_values,
+    need_finite,
+    need_set,
     not_negative,
     offset_values,
     present_axes,
+    radius_values,
 )
 from infoset.geometry.convex_set import ConvexSet
-from infoset.geometry.polygon_arrays import PolygonArrays
 from infoset.limits import Limits, real_values, shown
 
 if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
     from infoset.geometry.polytope import Polytope
 
 
-class ConvexPolygons(PolygonArrays, ConvexSet):
+class ConvexPolygons(ConvexSet):
     """A batch of convex polygons with any batch shape; a single polygon is a batch of shape ().
 
     Parameters
@@ -56,6 +66,239 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
     `point in P`, `P <= Q` (subset). `P == Q` compares objects; `equals` compares sets.
     """
 
+    vertices: Floats
+    counts: Integers
+
+    def __init__(self, vertices: ArrayLike, counts: ArrayLike) -> None:
+        points = real_values("vertices", vertices)
+        numbers = real_values("counts", counts)
+        room = points.shape[-2] if points.ndim > 1 else 0
+        if points.shape != (*numbers.shape, room, 2):
+            raise ValueError(
+                f"vertices of shape (..., V, 2) and counts of shape (...) are needed: "
+                f"got {points.shape} and {numbers.shape}"
+            )
+        if not ((numbers >= 0) & (numbers <= room) & (numbers == np.floor(numbers))).all():
+            raise ValueError(f"counts must be whole numbers from 0 to {room}, the room for vertices")
+
+        given = self.unchecked(points, numbers.astype(np.int64))
+        need_finite("vertices", points[given._used()])
+        hull = given._make(0, kernels.hull)
+        self.vertices = hull.vertices
+        self.counts = hull.counts
+
+    @classmethod
+    def unchecked(cls, vertices: Floats, counts: Integers) -> Self:
+        """Return polygons of arrays `vertices` and `counts`, counter-clockwise, without checks and without a copy."""
+        self = cls.__new__(cls)
+        self.vertices = vertices
+        self.counts = counts
+        return self
+
+    @classmethod
+    def from_vertices(cls, rings: ArrayLike) -> Self:
+        """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the polygon. O(n).
+
+        A ring may repeat vertices, also its first at the end, and have vertices along a side. `stack` makes a batch of
+        polygons from rings of different lengths.
+
+        Raises
+        ------
+        ValueError
+            If a ring is not convex; the message has the first reflex vertex. This is decided exactly. `from_points`
+            takes the convex hull of any points instead.
+        """
+        vertices = finite_values("rings", rings, "...", "k", 2)
+        polygons = cls.unchecked(vertices.copy(), np.full(vertices.shape[:-2], vertices.shape[-2]))
+        corners, counts = polygons._flat()
+        reflex = np.empty(polygons.shape, dtype=np.int64)
+
+        kernels.drop_repeats(corners, counts)
+        kernels.reflex_vertices(corners, counts, reflex.reshape(-1))
+        if (reflex >= 0).any():
+            index = np.argwhere(reflex >= 0)[0].tolist()
+            of_member = f" of polygon {index}" if index else ""
+            vertex = reflex[tuple(index)]
+            x, y = polygons.vertices[*index, vertex]
+            raise ValueError(f"the ring is not convex: vertex {vertex}{of_member}, ({x:.17g}, {y:.17g}), is reflex")
+
+        return polygons._make(0, kernels.hull)
+
+    @classmethod
+    def from_points(cls, points: ArrayLike) -> Self:
+        """Return the convex hull of points, shape (n, 2) or (..., n, 2); no points give the empty set.
+
+        O(n) for sorted points, O(n^2) at worst. Exact: vertices are points, and rounding does not decide which.
+        """
+        array = finite_values("points", points, "...", "k", 2)
+        return cls.unchecked(array, np.full(array.shape[:-2], array.shape[-2]))._make(0, kernels.hull)
+
+    @classmethod
+    def from_constraints(cls, normals: ArrayLike, offsets: ArrayLike) -> Self:
+        """Return {p: normals p <= offsets}, with normals of shape (..., k, 2), of any length, and offsets (..., k).
+
+        Infinite offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether the set is empty, is
+        decided without rounding, and each coordinate is within a few ulp of itself.
+
+        Raises
+        ------
+        ValueError
+            If a set is unbounded.
+        """
+        rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "...", "k", 2)
+        shape = np.broadcast_shapes(rows.shape[:-1], limits.shape)
+        if not shape[-1]:
+            raise ValueError("a set without constraints is unbounded")
+
+        table = np.empty((*shape, 3))
+        table[..., :2] = rows
+        table[..., 2] = limits
+        lines = table.reshape(-1, shape[-1], 3, 1)
+        sets = cls.empty(shape[:-1])._make(shape[-1] + 4, kernels.intersect_lines, lines)
+        if (sets.counts < 0).any():
+            index = np.argwhere(sets.counts < 0)[0].tolist()
+            raise ValueError(f"the set{f' {index}' if index else ''} is unbounded")
+
+        return sets
+
+    @classmethod
+    def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
+        """Return {p: lower <= p <= upper}, of shapes (2,) or (..., 2). Exact; equal ends give a segment or a point."""
+        minimum, most = box_ends(lower, upper, "...", 2)
+        corners = np.stack([minimum, minimum, most, most], axis=-2)
+        corners[..., 1, 0] = most[..., 0]
+        corners[..., 3, 0] = minimum[..., 0]
+
+        # Equal ends give repeated corners.
+        counts = np.full(corners.shape[:-2], 4)
+        kernels.drop_repeats(corners.reshape(-1, 4, 2), counts.reshape(-1))
+        return cls.unchecked(corners, counts)
+
+    @classmethod
+    def from_ball(cls, centre: ArrayLike, radius: ArrayLike, sides: int = 16, *, outer: bool = True) -> Self:
+        """Return regular polygons around discs with `centre`, shape (..., 2), and `radius`, shape (...), or in them.
+
+        An `outer` polygon contains the disc and exceeds it by the factor 1 / cos(pi / sides); an inner one is
+        contained in it. Both to rounding: a few ulp. O(sides), at least three.
+        """
+        Limits(minimum=3, whole=True).need("sides", sides)
+        middle = finite_values("centre", centre, "...", 2)
+        radii = radius_values(radius, "...")
+
+        first = 0.5 if outer else 0.0
+        stretch = math.cos(math.pi / sides) if outer else 1.0
+        angles = (np.arange(sides) + first) * (2.0 * math.pi / sides)
+        unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1) / stretch
+        return cls.from_points(middle[..., None, :] + radii[..., None, None] * unit)
+
+    @classmethod
+    def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Self:
+        """Return {centre + sum of z_i generators[i]: -1 <= z_i <= 1}, with a row of `generators` for each i.
+
+        `centre` has the shape (2,) or (..., 2), and `generators` (g, 2) or (..., g, 2). O(g^2); each coordinate is
+        rounded g times.
+        """
+        middle = finite_values("centre", centre, "...", 2)
+        rows = finite_values("generators", generators, "...", "g", 2)
+        shape = np.broadcast_shapes(middle.shape[:-1], rows.shape[:-2])
+
+        centres = cls.unchecked(middle[..., None, :], np.ones(middle.shape[:-1], dtype=np.int64)).broadcast_to(shape)
+        halves = np.broadcast_to(rows, (*shape, *rows.shape[-2:])).reshape(centres.counts.size, *rows.shape[-2:])
+        return centres._make(2 * rows.shape[-2], kernels.add_segments, np.ascontiguousarray(halves))
+
+    @classmethod
+    def from_shapely(cls, geometry: BaseGeometry) -> Self:
+        """Return a convex shapely Point, LineString or Polygon as a single polygon. O(n).
+
+        Vertices along a side are dropped.
+
+        Raises
+        ------
+        ValueError
+            If a geometry is not convex by more than rounding, or is of another type.
+        """
+        ring = conversion.ring_of_geometry(geometry)
+        return cls.unchecked(ring, np.array(len(ring), dtype=np.int64))
+
+    def to_shapely(self) -> BaseGeometry:
+        """Return a single polygon as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
+        return conversion.geometry_of_ring(self.polygon())
+
+    @classmethod
+    def empty(cls, shape: tuple[int, ...] = ()) -> Self:
+        """Return a batch of empty sets."""
+        return cls.unchecked(np.zeros((*shape, 0, 2)), np.zeros(shape, dtype=np.int64))
+
+    @classmethod
+    def stack(cls, sets: Sequence[Self]) -> Self:
+        """Return a batch of single polygons, or of batches of equal shape, along a new first axis.
+
+        Raises
+        ------
+        ValueError
+            If the shapes of the batches differ.
+        """
+        shapes = {need_set("each of sets", one, cls).shape for one in sets}
+        if len(shapes) > 1:
+            raise ValueError(f"sets must be batches of the same shape: got {sorted(shapes)}")
+
+        shape = (len(sets), *(sets[0].shape if sets else ()))
+        counts = np.array([one.counts for one in sets], dtype=np.int64).reshape(shape)
+        room = max((one.vertices.shape[-2] for one in sets), default=0)
+        vertices = np.zeros((*shape, room, 2))
+        for row, one in zip(vertices, sets, strict=True):
+            row[..., : one.vertices.shape[-2], :] = one.vertices
+        return cls.unchecked(vertices, counts)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the batch."""
+        return self.counts.shape
+
+    @property
+    def is_empty(self) -> Flags:
+        """Whether each polygon is empty, shape (...)."""
+        return np.asarray(self.counts == 0)
+
+    def __len__(self) -> int:
+        if not self.shape:
+            raise TypeError("a single polygon has no length; its number of vertices is .counts")
+        return self.shape[0]
+
+    def __getitem__(self, index: int | slice | tuple[int | slice, ...] | Flags) -> Self:
+        if not self.shape:
+            raise TypeError("a single polygon cannot be indexed; its vertices are .polygon()")
+        return self.unchecked(self.vertices[index], np.asarray(self.counts[index]))
+
+    def __iter__(self) -> Iterator[Self]:
+        return (self[i] for i in range(len(self)))
+
+    def polygon(self) -> Floats:
+        """Return the vertices of a single polygon, shape (count, 2).
+
+        Raises
+        ------
+        ValueError
+            If this is a batch.
+        """
+        if self.shape:
+            raise ValueError(f"this is a batch of shape {self.shape}: choose one with an index first")
+        return np.array(self.vertices[: int(self.counts)])
+
+    def broadcast_to(self, shape: tuple[int, ...]) -> Self:
+        """Return the batch repeated along new axes to another shape; the vertices are shared, not copied.
+
+        Raises
+        ------
+        ValueError
+            If the batch cannot be broadcast to this shape.
+        """
+        if shape == self.shape:
+            return self
+
+        counts = np.broadcast_to(self.counts, shape)
+        return self.unchecked(np.broadcast_to(self.vertices, (*shape, *self.vertices.shape[-2:])), counts)
+
     def __repr__(self) -> str:
         return f"ConvexPolygons(shape={self.shape}, counts={self.counts.tolist()})"
 
@@ -65,8 +308,6 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
 
         vertices = self.polygon()
         return Polytope.from_vertices(vertices) if len(vertices) else Polytope.empty(2)
-
-    # Sets -----------------------------------------------------------------------------------------------------------
 
     def cut(
         self, normal: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf, *, slack_ulp: float = 0.0
@@ -89,6 +330,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         if not np.logical_or.reduce(normals, axis=-1).all():
             raise ValueError("the normal of a strip must not be zero")
         not_negative("slack_ulp", slack_ulp)
+
         bounds = np.stack([self._each("lower", lower), self._each("upper", upper)], axis=-1)
         return self._make(2, kernels.cut, normals, bounds, float(slack_ulp))
 
@@ -128,6 +370,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         rows = real_values("matrix", matrix)
         if rows.shape[-1:] != (2,):
             return self.polytope().preimage(rows, offset)
+
         matrices = self._each("matrix", rows, 2, 2)
         start = offset_values(offset, "...", 2)
         inverse = np.zeros(matrices.shape)
@@ -175,6 +418,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         if absent.any():
             if not one.shape and one.counts:
                 raise ValueError("the difference with an empty set is unbounded")
+            # Without a bounded difference a member of a batch is empty.
             one = ConvexPolygons.unchecked(one.vertices, np.where(absent, 0, one.counts))
         return one._make(6, kernels.difference, *two._flat())
 
@@ -191,7 +435,10 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         """Return the convex hull of the union. O((n + m)^2) at worst; exact, the vertices are vertices of the sets."""
         one, two = self._with(other)
         points = np.concatenate([one.vertices, two.vertices], axis=-2)
-        order = np.argsort(~np.concatenate([one._used(), two._used()], axis=-1), axis=-1, kind="stable")
+        used = np.concatenate([one._used(), two._used()], axis=-1)
+
+        # The vertices of both first, then the padding of both.
+        order = np.argsort(~used, axis=-1, kind="stable")
         points = np.take_along_axis(points, order[..., None], axis=-2)
         return ConvexPolygons.unchecked(points, one.counts + two.counts)._make(0, kernels.hull)
 
@@ -204,6 +451,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         numbers = axis_numbers(axes, 2, 2)
         if len(numbers) > 1:
             return self.linear_map(np.eye(2)[numbers])
+
         lower, upper = self.bounding_box()
         return lower[..., numbers[0]], upper[..., numbers[0]]
 
@@ -222,6 +470,7 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         section = self.cut(np.eye(2)[axis], values, values)
         if not self.shape and section.is_empty:
             raise ValueError(f"the line where coordinate {axis} is {shown(values)} does not meet the polygon")
+
         intervals: tuple[Floats, Floats] = section.project(1 - axis)
         return intervals
 
@@ -233,8 +482,6 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         Limits(minimum=4, whole=True).need("cap", cap)
         return self._make(0, kernels.reduce_outward, np.int64(cap))
 
-    # Measures ---------------------------------------------------------------------------------------------------------
-
     def constraints(self) -> tuple[Floats, Floats]:
         """Return normals, shape (..., k, 2), of unit length, and offsets, shape (..., k): the set is normals p <=
         offsets.
@@ -244,11 +491,16 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         """
         vertices, counts = self._flat()
         room = max(4, vertices.shape[1])
-        normals, offsets = np.zeros((counts.size, room, 2)), np.zeros((counts.size, room))
+        normals = np.zeros((counts.size, room, 2))
+        offsets = np.zeros((counts.size, room))
         kernels.constraints(vertices, counts, normals, offsets)
-        room = 1 + int(np.flatnonzero(np.any(normals.any(axis=-1) | (offsets < 0.0), axis=0)).max(initial=0))
-        normals, offsets = normals[:, :room], offsets[:, :room]
-        return normals.reshape(*self.shape, room, 2), offsets.reshape(*self.shape, room)
+
+        # The row 0 p <= -1 of an empty set is used, although it has no direction.
+        is_used = normals.any(axis=-1) | (offsets < 0.0)
+        last = int(np.flatnonzero(is_used.any(axis=0)).max(initial=0))
+        normals = normals[:, : last + 1].reshape(*self.shape, last + 1, 2)
+        offsets = offsets[:, : last + 1].reshape(*self.shape, last + 1)
+        return normals, offsets
 
     def support_function(self, direction: ArrayLike) -> Floats:
         """Return max(direction . p), shape (...); -inf for the empty set. O(n); rounded as one scalar product."""
@@ -354,3 +606,78 @@ class ConvexPolygons(PolygonArrays, ConvexSet):
         axes = present_axes(axes)
         for index in np.ndindex(self.shape):
             axes.fill(*self.vertices[index][: self.counts[index]].T, **style)
+
+    def _used(self) -> Flags:
+        """Which rows of the array hold vertices, shape (..., V)."""
+        return np.asarray(np.arange(self.vertices.shape[-2]) < self.counts[..., None])
+
+    def _known(self, values: Floats, quantity: str) -> Floats:
+        """Return values, shape (..., k), masked for empty members of a batch."""
+        empty = self.is_empty
+        if not empty.any():
+            return values
+        if not self.shape:
+            raise ValueError(f"the empty set has no {quantity}")
+
+        shape = empty.shape + (1,) * (values.ndim - empty.ndim)
+        return np.ma.masked_array(values, np.broadcast_to(empty.reshape(shape), values.shape))
+
+    def _measure_at(self, kernel: Callable[..., None], name: str, value: ArrayLike) -> Floats:
+        """Apply a kernel that measures at a vector for each polygon; a single polygon is measured at all vectors."""
+        polygons = self
+        if not self.shape:
+            polygons = self.broadcast_to(real_values(name, value).shape[:-1])
+        return polygons._measure(kernel, polygons._each(name, value, 2))
+
+    def _each(self, name: str, value: ArrayLike, *last: int) -> Floats:
+        """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`.
+
+        Numbers, whose shape is (), may be infinite. Values may be masked for empty polygons, as results of a batch are.
+        """
+        if isinstance(value, np.ma.MaskedArray) and value.shape == (*self.shape, *last):
+            masked = np.ma.getmaskarray(value).reshape(*self.shape, -1).any(axis=-1)
+            value = value.filled(0.0) if (self.is_empty | ~masked).all() else value
+        values = finite_values(name, value, "...", *last) if last else bound_values(name, value)
+        shape = (*self.shape, *last)
+        if values.shape != shape:
+            try:
+                values = np.broadcast_to(values, shape)
+            except ValueError:
+                raise ValueError(
+                    f"{name} must have the shape {last}, or one that can be broadcast to {shape}: got {values.shape}"
+                ) from None
+        return _plain(values.reshape(self.counts.size, *last))
+
+    def _with(self, other: Self) -> tuple[Self, Self]:
+        """Return both batches in their common shape."""
+        need_set("other", other, type(self))
+        if self.shape == other.shape:
+            return self, other
+
+        shape = np.broadcast_shapes(self.shape, other.shape)
+        return self.broadcast_to(shape), other.broadcast_to(shape)
+
+    def _flat(self) -> tuple[Floats, Integers]:
+        vertices = self.vertices.reshape(self.counts.size, self.vertices.shape[-2], 2)
+        return _plain(vertices), _plain(self.counts.reshape(-1))
+
+    def _make(self, more: int, kernel: Callable[..., None], *arguments: object) -> Self:
+        """Apply a kernel whose results have at most `more` vertices more than these polygons."""
+        vertices, counts = self._flat()
+        out = np.zeros((counts.size, vertices.shape[1] + more, 2))
+        made = np.zeros(counts.size, dtype=np.int64)
+        kernel(vertices, counts, out, made, *arguments)
+        room = int(made.max(initial=0))
+        return self.unchecked(out[:, :room].reshape(*self.shape, room, 2), made.reshape(self.shape))
+
+    def _measure(self, kernel: Callable[..., None], *arguments: object) -> Floats:
+        """Apply a kernel that computes up to three numbers for each polygon, shape (..., 3)."""
+        vertices, counts = self._flat()
+        out = np.zeros((counts.size, 3))
+        kernel(vertices, counts, out, *arguments)
+        return out.reshape(*self.shape, 3)
+
+
+def _plain(values: NDArray[Any]) -> NDArray[Any]:
+    """Return an array that kernels accept: contiguous and writeable."""
+    return values if values.flags.carray else values.copy()

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
+from infoset.geometry import conversion
 from infoset.geometry._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
 from infoset.geometry.double_words import EPS, affine_image, supports
-from infoset.geometry.polygon_arrays import PolygonArrays
 from infoset.geometry.polytope import cone
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import orthonormal
@@ -125,18 +125,18 @@ class PolytopeArrays:
     @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Self:
         """Return a convex shapely Point, LineString or Polygon as a set of R^2; see `ConvexPolygons.from_shapely`."""
-        vertices = PolygonArrays.from_shapely(geometry).polygon()
-        return cls.from_vertices(vertices) if len(vertices) else cls.empty(2)
+        ring = conversion.ring_of_geometry(geometry)
+        return cls.from_vertices(ring) if len(ring) else cls.empty(2)
 
     def to_shapely(self) -> BaseGeometry:
         """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
-        return self._polygon().to_shapely()
+        return conversion.geometry_of_ring(self._polygon())
 
-    def _polygon(self) -> PolygonArrays:
-        """Return a set of R^2 as a polygon."""
+    def _polygon(self) -> Floats:
+        """Return the vertices of a set of R^2, shape (v, 2), counter-clockwise."""
         if self.space != 2:
             raise ValueError(f"a set of R^2 is needed: project this one, of R^{self.space}, on two axes first")
-        return PolygonArrays.from_points(self.vertices)
+        return conversion.ring_of_points(self.vertices)
 
     @classmethod
     def _hull(cls, points: Floats, centre: Floats, scale: Floats, flat: float = FLAT, allowed: bool = True) -> Self:

@@ -334,7 +334,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     def area(self) -> float:
         """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
-        return self.volume() if len(self._polygon().polygon()) > 2 else 0.0
+        return self.volume() if len(self._polygon()) > 2 else 0.0
 
     def centroid(self) -> Floats:
         """Return the centroid within the affine hull, shape (n,), from a division into simplices."""
@@ -403,7 +403,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     def plot(self, axes: Any = None, **style: Any) -> None:
         """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""
-        present_axes(axes).fill(*self._polygon().polygon().T, **style)
+        present_axes(axes).fill(*self._polygon().T, **style)
 
 
 def _less(limits: Floats, widths: Floats) -> Floats:

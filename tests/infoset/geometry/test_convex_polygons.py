@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from infoset import ConvexPolygons
+from infoset import ConvexPolygons, Polytope
 from tests.rationals import Fraction
 
 
@@ -231,6 +231,15 @@ def test_from_shapely_orients_and_refuses() -> None:
         ConvexPolygons.from_shapely(shapely.MultiPoint([(0.0, 0.0), (1.0, 0.0)]))
     with pytest.raises(ValueError, match="choose one with an index"):
         boxes((3,)).to_shapely()
+
+
+@pytest.mark.parametrize("kind", [ConvexPolygons, Polytope])
+@pytest.mark.parametrize(
+    "value", [[(0.0, 0.0), (1.0, 0.0)], "POINT (1 2)", None, shapely.LinearRing([(0, 0), (1, 0), (0, 1)])]
+)
+def test_from_shapely_names_the_geometries_that_it_takes(kind: Any, value: Any) -> None:
+    with pytest.raises(ValueError, match="a Point, a LineString or a Polygon is needed: got"):
+        kind.from_shapely(value)
 
 
 def meets_range(vertices: Any, matrix: Any, offset: Any) -> bool:
