@@ -63,6 +63,8 @@ nitpick_ignore = [
         "infoset.experiments.reachability.system_file": ("ReachableSystem",),
         "infoset.guidance.predictive": ("ManoeuvreState",),
         "infoset.guidance.proportional_navigation": ("PulseState",),
+        "infoset.geometry.convex_polygons": ("PolygonsOrPolytope",),
+        "infoset.geometry.convex_set": ("ConvexSet",),
         "infoset.geometry.polytope.nearest": ("NearestPair",),
         "infoset.sim.scenario": ("_Speed",),
         "infoset.observer.sets": ("Polygons", "Polytopes", "Motion"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,13 +25,16 @@ from infoset.geometry._set_arguments import (
     present_axes,
     radius_values,
 )
-from infoset.geometry.convex_set import ConvexSet
+from infoset.geometry.convex_set import ConvexSet, need_convex_set
 from infoset.limits import Limits, real_values, shown
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from infoset.geometry.polytope import Polytope
+
+PolygonsOrPolytope = TypeVar("PolygonsOrPolytope", "ConvexPolygons", "Polytope")
+"""The class of the other set of an operation, and of its result."""
 
 
 class ConvexPolygons(ConvexSet):
@@ -61,6 +64,10 @@ class ConvexPolygons(ConvexSet):
     An empty member of a batch does not affect the others: sets made from it are empty, its support function is -inf,
     its distance from any set is inf, and points such as its centroid are masked (`numpy.ma.MaskedArray`). A single
     empty set has no such points; then a ValueError is raised.
+
+    An operation of a single polygon with a `Polytope` of the plane, in either order, is that of two polytopes: a set
+    that it gives is a `Polytope`, and it is exact only to rounding. `ConvexPolygons.from_points(polytope.vertices)`
+    converts the other one.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
     `point in P`, `P <= Q` (subset). `P == Q` compares objects; `equals` compares sets.
@@ -303,11 +310,22 @@ class ConvexPolygons(ConvexSet):
         return f"ConvexPolygons(shape={self.shape}, counts={self.counts.tolist()})"
 
     def polytope(self) -> Polytope:
-        """Return a single polygon as a `Polytope`; `ConvexPolygons.from_points(polytope.vertices)` is the reverse."""
+        """Return a single polygon as a `Polytope`; `ConvexPolygons.from_points(polytope.vertices)` is the reverse.
+
+        Raises
+        ------
+        ValueError
+            If this is a batch.
+        """
         from infoset.geometry.polytope import Polytope
 
-        vertices = self.polygon()
-        return Polytope.from_vertices(vertices) if len(vertices) else Polytope.empty(2)
+        if self.shape:
+            raise ValueError(
+                f"a batch of shape {self.shape} is no Polytope: choose one with an index first, or convert the "
+                f"Polytope of an operation with ConvexPolygons.from_points(polytope.vertices)"
+            )
+        ring = self.polygon()
+        return Polytope.from_vertices(ring) if len(ring) else Polytope.empty(2)
 
     def cut(
         self, normal: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf, *, slack_ulp: float = 0.0
@@ -396,12 +414,15 @@ class ConvexPolygons(ConvexSet):
         """
         return self._make(2, kernels.add_segments, self._each("half", half, 2)[:, None])
 
-    def minkowski_sum(self, other: ConvexPolygons) -> ConvexPolygons:
+    def minkowski_sum(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
         """Return the Minkowski sum. O(n + m), each vertex rounded once."""
+        if not isinstance(other, ConvexPolygons):
+            return self._polytope_with(other).minkowski_sum(other)
+
         one, two = self._with(other)
         return one._make(two.vertices.shape[-2], kernels.add_polygon, *two._flat())
 
-    def minkowski_difference(self, other: ConvexPolygons) -> ConvexPolygons:
+    def minkowski_difference(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
         """Return the Pontryagin difference {p: p + q in the set for all q in the other}.
 
         A member of a batch without a bounded difference, because only the other set is empty, gives the empty set.
@@ -413,6 +434,9 @@ class ConvexPolygons(ConvexSet):
         ValueError
             If the other set is empty and this one is not, both single: every point satisfies the condition.
         """
+        if not isinstance(other, ConvexPolygons):
+            return self._polytope_with(other).minkowski_difference(other)
+
         one, two = self._with(other)
         absent = two.counts == 0
         if absent.any():
@@ -422,17 +446,23 @@ class ConvexPolygons(ConvexSet):
             one = ConvexPolygons.unchecked(one.vertices, np.where(absent, 0, one.counts))
         return one._make(6, kernels.difference, *two._flat())
 
-    def intersection(self, other: ConvexPolygons) -> ConvexPolygons:
+    def intersection(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
         """Return the intersection.
 
         O(n m). Exact: which vertices are kept, which sides cross, and whether the sets touch, is decided without
         rounding; crossings are within 4 ulp of the coordinates.
         """
+        if not isinstance(other, ConvexPolygons):
+            return self._polytope_with(other).intersection(other)
+
         one, two = self._with(other)
         return one._make(two.vertices.shape[-2], kernels.intersect, *two._flat())
 
-    def convex_hull(self, other: ConvexPolygons) -> ConvexPolygons:
+    def convex_hull(self, other: PolygonsOrPolytope) -> PolygonsOrPolytope:
         """Return the convex hull of the union. O((n + m)^2) at worst; exact, the vertices are vertices of the sets."""
+        if not isinstance(other, ConvexPolygons):
+            return self._polytope_with(other).convex_hull(other)
+
         one, two = self._with(other)
         points = np.concatenate([one.vertices, two.vertices], axis=-2)
         used = np.concatenate([one._used(), two._used()], axis=-1)
@@ -525,12 +555,15 @@ class ConvexPolygons(ConvexSet):
         distance = self._measure_at(kernels.nearest, "point", point)[..., 2]
         return np.asarray(distance <= not_negative("tolerance", tolerance))
 
-    def is_subset(self, other: ConvexPolygons, tolerance: float = 0.0) -> Flags:
+    def is_subset(self, other: ConvexPolygons | Polytope, tolerance: float = 0.0) -> Flags:
         """Return whether all points of the set are in the other one, or within a distance of it, shape (...).
 
         O(n m). Exact for a tolerance of 0: rounding does not affect the answer. Sets that were computed are subsets
         only up to rounding in general.
         """
+        if not isinstance(other, ConvexPolygons):
+            return np.asarray(self._polytope_with(other).is_subset(other, tolerance))
+
         return np.asarray(self._excess(other) <= not_negative("tolerance", tolerance))
 
     def _excess(self, other: ConvexPolygons) -> Floats:
@@ -567,27 +600,36 @@ class ConvexPolygons(ConvexSet):
         """Return the maximum distance between two points, shape (...); 0 for the empty set. O(n^2), rounded."""
         return self._measure(kernels.diameter)[..., 0]
 
-    def distance(self, other: ConvexPolygons | ArrayLike) -> Floats:
+    def distance(self, other: ConvexPolygons | Polytope | ArrayLike) -> Floats:
         """Return the distance from other sets or points, shape (...); inf if a set is empty.
 
         O(n m). It is 0 exactly if the sets intersect; otherwise rounded.
         """
+        if isinstance(other, ConvexSet) and not isinstance(other, ConvexPolygons):
+            return np.asarray(self._polytope_with(other).distance(other))
         if not isinstance(other, ConvexPolygons):
             points = finite_values("other", other, "...", 2)
             other = ConvexPolygons.unchecked(points[..., None, :], np.ones(points.shape[:-1], dtype=np.int64))
+
         one, two = self._with(other)
         return one._measure(kernels.gap, *two._flat())[..., 0]
 
-    def isdisjoint(self, other: ConvexPolygons) -> Flags:
+    def isdisjoint(self, other: ConvexPolygons | Polytope) -> Flags:
         """Return whether no point is in both sets, shape (...). O(n m), exact."""
+        if isinstance(other, ConvexSet) and not isinstance(other, ConvexPolygons):
+            return np.asarray(self._polytope_with(other).isdisjoint(other))
+
         return np.asarray(self.distance(other) > 0.0)
 
     def closest_point(self, point: ArrayLike) -> Floats:
         """Return the point of the set nearest to a point, shape (2,) or (..., 2): itself if inside. O(n), rounded."""
         return self._known(self._measure_at(kernels.nearest, "point", point)[..., :2], "closest point")
 
-    def hausdorff_distance(self, other: ConvexPolygons) -> Floats:
+    def hausdorff_distance(self, other: ConvexPolygons | Polytope) -> Floats:
         """Return the Hausdorff distance, shape (...); inf between an empty and a nonempty set. O(n m), rounded."""
+        if not isinstance(other, ConvexPolygons):
+            return np.asarray(self._polytope_with(other).hausdorff_distance(other))
+
         return np.asarray(np.maximum(self._excess(other), other._excess(self)))
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
@@ -648,9 +690,13 @@ class ConvexPolygons(ConvexSet):
                 ) from None
         return _plain(values.reshape(self.counts.size, *last))
 
+    def _polytope_with(self, other: object) -> Polytope:
+        """Return a single polygon as a `Polytope`, for an operation with a set of another class."""
+        need_convex_set("other", other)
+        return self.polytope()
+
     def _with(self, other: Self) -> tuple[Self, Self]:
         """Return both batches in their common shape."""
-        need_set("other", other, type(self))
         if self.shape == other.shape:
             return self, other
 

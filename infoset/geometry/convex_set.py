@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from numbers import Real
-from typing import Any, Self
+from typing import Any, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.geometry._set_arguments import finite_values
+from infoset.limits import shown
 
 
 class ConvexSet:
-    """What `ConvexPolygons` and `Polytope` share: operators and equality in terms of their methods."""
+    """What `ConvexPolygons` and `Polytope` share: operators and equality in terms of their methods.
+
+    An operation of sets of two classes is that of `Polytope` for both: each class has the method `polytope`.
+    """
 
     __array_ufunc__ = None  # so that NumPy leaves `array + set` and `array @ set` to the set
 
@@ -22,8 +26,9 @@ class ConvexSet:
     intersection: Any
     is_subset: Any
     minkowski_sum: Any
+    polytope: Any
 
-    def equals(self, other: Self, tolerance: float = 0.0) -> Any:
+    def equals(self, other: ConvexSet, tolerance: float = 0.0) -> Any:
         """Return whether each set is a subset of the other one, with the tolerance of `is_subset`."""
         return self.is_subset(other, tolerance) & other.is_subset(self, tolerance)
 
@@ -38,12 +43,20 @@ class ConvexSet:
         moved: Self = self.affine_map(np.eye(space), finite_values("offset", offset, space))
         return moved
 
-    def __and__(self, other: Self) -> Self:
-        return self.intersection(other) if isinstance(other, type(self)) else NotImplemented
+    # The second signatures are those of sets of two classes: mypy looks only at this class, where `Self` is any set.
+    @overload
+    def __and__(self, other: Self) -> Self: ...
+    @overload
+    def __and__(self, other: ConvexSet) -> Any: ...  # type: ignore[overload-cannot-match]
+    def __and__(self, other: Any) -> Any:
+        return self.intersection(other) if isinstance(other, ConvexSet) else NotImplemented
 
-    def __add__(self, other: Self | ArrayLike) -> Self:
-        result: Self = self.minkowski_sum(other) if isinstance(other, ConvexSet) else self.translate(other)
-        return result
+    @overload
+    def __add__(self, other: Self | ArrayLike) -> Self: ...
+    @overload
+    def __add__(self, other: ConvexSet) -> Any: ...  # type: ignore[overload-cannot-match]
+    def __add__(self, other: Any) -> Any:
+        return self.minkowski_sum(other) if isinstance(other, ConvexSet) else self.translate(other)
 
     __radd__ = __add__
 
@@ -66,5 +79,12 @@ class ConvexSet:
             raise TypeError("'in' is for one point and one set; use contains for a batch")
         return bool(found)
 
-    def __le__(self, other: Self) -> Any:
-        return self.is_subset(other) if isinstance(other, type(self)) else NotImplemented
+    def __le__(self, other: ConvexSet) -> Any:
+        return self.is_subset(other) if isinstance(other, ConvexSet) else NotImplemented
+
+
+def need_convex_set(name: str, value: object) -> ConvexSet:
+    """Return an argument that is a set of any class, or raise a TypeError."""
+    if not isinstance(value, ConvexSet):
+        raise TypeError(f"{name} must be a set, ConvexPolygons or a Polytope: got {shown(value)}")
+    return value

@@ -16,12 +16,11 @@ from infoset.geometry._set_arguments import (
     axis_numbers,
     bound_values,
     finite_values,
-    need_set,
     not_negative,
     offset_values,
     present_axes,
 )
-from infoset.geometry.convex_set import ConvexSet
+from infoset.geometry.convex_set import ConvexSet, need_convex_set
 from infoset.geometry.double_words import EPS, affine_image, supports
 from infoset.geometry.polytope import cone
 from infoset.geometry.polytope import double_description as dd
@@ -57,10 +56,16 @@ class Polytope(PolytopeArrays, ConvexSet):
     arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
     (ValueError). An UncertainHullError is raised if vertices and facets do not agree because of rounding.
 
+    The other set of an operation may be a single polygon, one of `ConvexPolygons`: it is converted.
+
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
     `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding). `P == Q` compares objects; `equals` compares sets. The
     vertices are in no order; `plot` and `to_shapely` order those of a set of the plane.
     """
+
+    def polytope(self) -> Polytope:
+        """Return the set itself; every class of sets has this method."""
+        return self
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0, *, hull: bool = True) -> Polytope:
         """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.
@@ -113,13 +118,13 @@ class Polytope(PolytopeArrays, ConvexSet):
         composed = cone.product(cone.rationals(rows), cone.rationals(matrix))
         return not cone.vertices_of(composed, cone.rationals(relaxed[None])[0]).points
 
-    def minkowski_sum(self, other: Polytope) -> Polytope:
+    def minkowski_sum(self, other: ConvexSet) -> Polytope:
         """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two vertices."""
-        self._need_other(other)
-        if self.is_empty or other.is_empty:
-            return self if self.is_empty else other
-        pairs = [np.repeat(self.points, len(other.points), axis=0), np.tile(other.points, (len(self.points), 1))]
-        centre, scale = np.append(self.centre, other.centre), np.append(self.scale, other.scale)
+        two = self._need_other(other)
+        if self.is_empty or two.is_empty:
+            return self if self.is_empty else two
+        pairs = [np.repeat(self.points, len(two.points), axis=0), np.tile(two.points, (len(self.points), 1))]
+        centre, scale = np.append(self.centre, two.centre), np.append(self.scale, two.scale)
         product = replace(self, points=np.hstack(pairs), centre=centre, scale=scale)
         return product.affine_map(np.tile(np.eye(self.space), 2))
 
@@ -172,7 +177,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         sides, none = np.vstack([self.facets, ends.reshape(-1, self.space + 1)]), self.equations[:0]
         return replace(self, points=points, facets=sides, equations=none, incidence=on, scale=scale)
 
-    def minkowski_difference(self, other: Polytope) -> Polytope:
+    def minkowski_difference(self, other: ConvexSet) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
 
         If the difference is flat, rounding decides whether it is empty.
@@ -182,23 +187,23 @@ class Polytope(PolytopeArrays, ConvexSet):
         ValueError
             If the other set is empty and this one is not: every point would satisfy the condition.
         """
-        self._need_other(other)
+        two = self._need_other(other)
         if self.is_empty:
             return self
-        if other.is_empty:
+        if two.is_empty:
             raise ValueError("the difference with an empty set is unbounded")
         rows, limits = self._rows(self.centre)
         if self.dimension < self.space:
             # The difference plus a point of the other set is a part of this one: it cannot leave the affine hull.
-            start = other.vertices[0]
-            part = self._with_rows(rows, _less(limits, supports(other.vertices - start, rows)), self.centre)
+            start = two.vertices[0]
+            part = self._with_rows(rows, _less(limits, supports(two.vertices - start, rows)), self.centre)
             return part.translate(-start)
-        less = _less(limits, supports(other.vertices, rows))
-        lower, upper = np.array(self.bounding_box()) - other.bounding_box()
+        less = _less(limits, supports(two.vertices, rows))
+        lower, upper = np.array(self.bounding_box()) - two.bounding_box()
         found = self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
         return self._of_rows(rows, less, self.centre) if found.is_empty else found
 
-    def intersection(self, *others: Polytope) -> Polytope:
+    def intersection(self, *others: ConvexSet) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
         sets = sorted((self, *map(self._need_other, others)), key=lambda one: (one.dimension, -len(one.facets)))
         found = sets[0]
@@ -209,7 +214,7 @@ class Polytope(PolytopeArrays, ConvexSet):
                 found = found._with_rows(*one._rows(one.centre), one.centre, box)
         return found
 
-    def convex_hull(self, *others: Polytope) -> Polytope:
+    def convex_hull(self, *others: ConvexSet) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
         sets = [one for one in (self, *map(self._need_other, others)) if not one.is_empty]
         return self.from_vertices(np.vstack([one.vertices for one in sets])) if sets else self
@@ -268,11 +273,12 @@ class Polytope(PolytopeArrays, ConvexSet):
         solid = self if self.dimension == self.space else self._prism(np.zeros(self.space))
         return reduced_outward(solid, cap, max_vertices)
 
-    def _need_other(self, other: Polytope) -> Polytope:
-        """Return another polytope; it must be in the same space."""
-        if need_set("other", other, Polytope).space != self.space:
-            raise ValueError(f"other must be a polytope in R^{self.space}, as this one: got {other!r}")
-        return other
+    def _need_other(self, other: ConvexSet) -> Polytope:
+        """Return another set as a polytope; it must be in the same space."""
+        polytope: Polytope = need_convex_set("other", other).polytope()
+        if polytope.space != self.space:
+            raise ValueError(f"other must be a set in R^{self.space}, as this one: got {other!r}")
+        return polytope
 
     def support_function(self, directions: ArrayLike) -> Floats:
         """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the empty set. O(v n)."""
@@ -311,7 +317,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`margin`)."""
         return np.asarray(self.margin(points) >= -not_negative("tolerance", tolerance))
 
-    def is_subset(self, other: Polytope, tolerance: float = 0.0) -> bool:
+    def is_subset(self, other: ConvexSet, tolerance: float = 0.0) -> bool:
         """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
         return bool(self._need_other(other).contains(self.vertices, tolerance).all())
 
@@ -372,34 +378,39 @@ class Polytope(PolytopeArrays, ConvexSet):
             return x
         return nearest_pair(self.needed().vertices, x[None]).point
 
-    def distance(self, other: Polytope | ArrayLike) -> float:
-        """Return the distance from a polytope or point `other`, shape (n,); inf if one is empty. As `closest_point`."""
-        if not isinstance(other, Polytope):
+    def distance(self, other: ConvexSet | ArrayLike) -> float:
+        """Return the distance from a set or point `other`, shape (n,); inf if one is empty. As `closest_point`."""
+        if not isinstance(other, ConvexSet):
             other = self.from_vertices(finite_values("other", other, self.space)[None])
-        if self._need_other(other).is_empty or self.is_empty:
+        two = self._need_other(other)
+        if two.is_empty or self.is_empty:
             return float("inf")
-        return float(np.linalg.norm(nearest_pair(self.vertices, other.vertices).difference))
+        return float(np.linalg.norm(nearest_pair(self.vertices, two.vertices).difference))
 
-    def isdisjoint(self, other: Polytope) -> bool:
+    def isdisjoint(self, other: ConvexSet) -> bool:
         """Return whether no point is in both sets, to rounding; see `separating_direction`."""
-        return self.is_empty or self._need_other(other).is_empty or self.separating_direction(other) is not None
+        two = self._need_other(other)
+        return self.is_empty or two.is_empty or self.separating_direction(two) is not None
 
-    def separating_direction(self, other: Polytope) -> Floats | None:
+    def separating_direction(self, other: ConvexSet) -> Floats | None:
         """Return a witness that two sets are disjoint; None if they meet, to rounding, or one is empty.
 
         It is a direction d, shape (n,), of unit length, with d . x < d . y for all x of this set and y of the other.
         """
-        if self.is_empty or self._need_other(other).is_empty:
+        two = self._need_other(other)
+        if self.is_empty or two.is_empty:
             return None
-        between = nearest_pair(other.vertices, self.vertices).difference
+        between = nearest_pair(two.vertices, self.vertices).difference
         length = float(np.linalg.norm(between))
         direction = np.asarray(between / (length or 1.0))
-        return direction if self.support_function(direction) < -other.support_function(-direction) else None
+        return direction if self.support_function(direction) < -two.support_function(-direction) else None
 
-    def hausdorff_distance(self, other: Polytope) -> float:
+    def hausdorff_distance(self, other: ConvexSet) -> float:
         """Return the Hausdorff distance; inf between an empty and a nonempty set. One `distance` for each vertex."""
-        pairs = (self, self._need_other(other)), (other, self)
-        return max((two.distance(vertex) for one, two in pairs for vertex in one.vertices), default=0.0)
+        two = self._need_other(other)
+        from_this = [two.distance(vertex) for vertex in self.vertices]
+        from_other = [self.distance(vertex) for vertex in two.vertices]
+        return max(from_this + from_other, default=0.0)
 
     def plot(self, axes: Any = None, **style: Any) -> None:
         """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""

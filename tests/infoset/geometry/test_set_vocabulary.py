@@ -16,14 +16,13 @@ VOCABULARY = {
     "vertices", "constraints", "area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter",
     "hausdorff_distance", "distance", "closest_point", "project", "slice", "sample", "reduce_outward", "plot",
     "add_segment", "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely",
-    "to_shapely", "margin", "empty", "isdisjoint",
+    "to_shapely", "margin", "empty", "isdisjoint", "polytope",
 }  # fmt: skip
 """The names of both classes."""
 
 ONLY_POLYGONS = {
     **dict.fromkeys(["counts", "shape", "stack", "broadcast_to"], "a Polytope is a single set, not a batch"),
     "polygon": "the vertices of a member of a batch; those of a Polytope are .vertices",
-    "polytope": "conversion; the reverse is ConvexPolygons.from_points(P.vertices)",
     "from_points": "from_vertices of a Polytope is a hull of points in any order; a ring has an order",
     "unchecked": "for arrays of kernels, which only polygons have",
 }
