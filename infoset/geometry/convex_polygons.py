@@ -366,7 +366,8 @@ class ConvexPolygons(ConvexSet):
         """
         rows = real_values("matrix", matrix)
         if rows.shape[-2:] == (2, 2):
-            return self.linear_map(rows).translate(offset_values(offset, "...", 2))
+            moved = offset_values(self._without_mask(offset, 2), "...", 2)
+            return self.linear_map(rows).translate(moved)
         return self.polytope().affine_map(rows, offset)
 
     def translate(self, offset: ArrayLike) -> ConvexPolygons:
@@ -390,7 +391,7 @@ class ConvexPolygons(ConvexSet):
             return self.polytope().preimage(rows, offset)
 
         matrices = self._each("matrix", rows, 2, 2)
-        start = offset_values(offset, "...", 2)
+        start = offset_values(self._without_mask(offset, 2), "...", 2)
         inverse = np.zeros(matrices.shape)
         kernels.invert(matrices, inverse)
         mapped = self.translate(-start).linear_map(inverse.reshape(*self.shape, 2, 2))
@@ -608,7 +609,7 @@ class ConvexPolygons(ConvexSet):
         if isinstance(other, ConvexSet) and not isinstance(other, ConvexPolygons):
             return np.asarray(self._polytope_with(other).distance(other))
         if not isinstance(other, ConvexPolygons):
-            points = finite_values("other", other, "...", 2)
+            points = finite_values("other", self._without_mask(other, 2), "...", 2)
             other = ConvexPolygons.unchecked(points[..., None, :], np.ones(points.shape[:-1], dtype=np.int64))
 
         one, two = self._with(other)
@@ -671,14 +672,25 @@ class ConvexPolygons(ConvexSet):
             polygons = self.broadcast_to(real_values(name, value).shape[:-1])
         return polygons._measure(kernel, polygons._each(name, value, 2))
 
+    def _without_mask(self, value: ArrayLike, *last: int) -> ArrayLike:
+        """Return values for each polygon, of shape (..., *last), without a mask.
+
+        Values may be masked for empty polygons, as results of a batch are: ones replace them, which are a normal too.
+        Another mask stays.
+        """
+        if not isinstance(value, np.ma.MaskedArray) or value.shape != (*self.shape, *last):
+            return value
+        is_masked = np.ma.getmaskarray(value).any(axis=tuple(range(-len(last), 0)))
+        if (is_masked & ~self.is_empty).any():
+            return value
+        return np.asarray(value.filled(1.0))
+
     def _each(self, name: str, value: ArrayLike, *last: int) -> Floats:
         """Return a value for each polygon, shape (B, *last), from such values or from one of the shape `last`.
 
-        Numbers, whose shape is (), may be infinite. Values may be masked for empty polygons, as results of a batch are.
+        Numbers, whose shape is (), may be infinite.
         """
-        if isinstance(value, np.ma.MaskedArray) and value.shape == (*self.shape, *last):
-            masked = np.ma.getmaskarray(value).reshape(*self.shape, -1).any(axis=-1)
-            value = value.filled(0.0) if (self.is_empty | ~masked).all() else value
+        value = self._without_mask(value, *last)
         values = finite_values(name, value, "...", *last) if last else bound_values(name, value)
         shape = (*self.shape, *last)
         if values.shape != shape:
