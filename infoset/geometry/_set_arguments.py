@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from typing import Any, TypeVar
 
 import numpy as np
@@ -114,8 +113,3 @@ def not_negative(name: str, value: float) -> float:
     if value != 0.0:
         NOT_NEGATIVE.need(name, value)
     return value
-
-
-def present_axes(axes: Any) -> Any:
-    """Return matplotlib axes: those given, or the present ones of pyplot, which is imported only for them."""
-    return axes if axes is not None else import_module("matplotlib.pyplot").gca()

@@ -22,10 +22,10 @@ from infoset.geometry._set_arguments import (
     need_set,
     not_negative,
     offset_values,
-    present_axes,
     radius_values,
 )
 from infoset.geometry.convex_set import ConvexSet, need_convex_set
+from infoset.geometry.drawing import draw_polygons
 from infoset.limits import Limits, real_values, shown
 
 if TYPE_CHECKING:
@@ -644,11 +644,15 @@ class ConvexPolygons(ConvexSet):
         kernels.sample(vertices, counts, random.random((counts.size, count, 3)), out)
         return self._known(out.reshape(*self.shape, count, 2), "points")
 
-    def plot(self, axes: Any = None, **style: Any) -> None:
-        """Fill the polygons on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""
-        axes = present_axes(axes)
-        for index in np.ndindex(self.shape):
-            axes.fill(*self.vertices[index][: self.counts[index]].T, **style)
+    def plot(self, ax: Any = None, **style: Any) -> list[Any]:
+        """Draw the polygons on matplotlib axes (default: the present ones of pyplot), and return the artists.
+
+        There is one for each polygon that is not empty, in the order of the batch. `style` has the options of
+        matplotlib's `fill`, and of `scatter` for a point. Edges have the colour of the face, unless the style has
+        another: segments and thin sets are visible.
+        """
+        rings = [self.vertices[index][: self.counts[index]] for index in np.ndindex(self.shape)]
+        return draw_polygons(ax, rings, style)
 
     def _used(self) -> Flags:
         """Which rows of the array hold vertices, shape (..., V)."""

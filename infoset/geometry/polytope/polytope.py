@@ -18,10 +18,10 @@ from infoset.geometry._set_arguments import (
     finite_values,
     not_negative,
     offset_values,
-    present_axes,
 )
 from infoset.geometry.convex_set import ConvexSet, need_convex_set
 from infoset.geometry.double_words import EPS, affine_image, supports
+from infoset.geometry.drawing import draw_facets, draw_polygons, ring_order
 from infoset.geometry.polytope import cone
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, simplices_of, triangle_of
@@ -412,9 +412,33 @@ class Polytope(PolytopeArrays, ConvexSet):
         from_other = [self.distance(vertex) for vertex in two.vertices]
         return max(from_this + from_other, default=0.0)
 
-    def plot(self, axes: Any = None, **style: Any) -> None:
-        """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`."""
-        present_axes(axes).fill(*self._polygon().T, **style)
+    def plot(self, ax: Any = None, **style: Any) -> list[Any]:
+        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists: one, or none for the empty set.
+
+        Without axes the present ones of pyplot are used, or new ones if these have not as many dimensions as the set.
+        `style` has the options of matplotlib's `fill` in the plane and `Poly3DCollection` in space, and of `scatter`
+        for a point. Facets in space are transparent. Segments and thin sets are visible by their edges.
+
+        Raises
+        ------
+        ValueError
+            If the set is in another space, or the axes have not as many dimensions.
+        """
+        if self.space == 2:
+            return draw_polygons(ax, [self._polygon()], style)
+        if self.space == 3:
+            return draw_facets(ax, self._facet_rings(), style)
+        instead = "project it on two or three axes first" if self.space > 3 else "it is the interval of bounding_box()"
+        raise ValueError(f"sets of R^2 and R^3 are drawn, and this one is of R^{self.space}: {instead}")
+
+    def _facet_rings(self) -> list[Floats]:
+        """Return the vertices of each facet of a set of R^3 in their order around it; of a flat set, all vertices."""
+        if self.is_empty:
+            return []
+        faces = self.incidence.T
+        if self.dimension < 3:
+            faces = np.ones((1, len(self.points)), np.bool_)
+        return [self.vertices[on][ring_order(self.points[on])] for on in faces]
 
 
 def _less(limits: Floats, widths: Floats) -> Floats:

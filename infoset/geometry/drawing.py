@@ -1,0 +1,125 @@
+"""Drawing of convex sets of the plane and of space on axes of matplotlib, which is imported only for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from infoset.arrays import Floats, Integers
+from infoset.limits import shown
+
+FACE_OPACITY = 0.3
+"""Opacity of the facets of a set of space, unless the style has another: the edges behind them stay visible."""
+EDGE_NAMES = {"edgecolor", "ec", "color"}
+"""Names of matplotlib for the colour of the edges of patches."""
+COLLECTION_NAMES = {"edgecolor": "edgecolors", "ec": "edgecolors", "facecolor": "facecolors", "fc": "facecolors"}
+"""Other names of the colours of collections; with `shade` only these two are taken."""
+OF_PATCHES = {"closed", "fill"}
+"""Options that matplotlib's patches have, and its collections do not."""
+
+
+def draw_polygons(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list[Any]:
+    """Draw polygons with rings of vertices, shape (k, 2), on 2-D axes; return an artist for each that has vertices.
+
+    The edges have the colour of the face, unless the style has another, so that a segment and a set that is thinner
+    than a pixel are visible; a point is a dot. `style` has the options of matplotlib's `fill`.
+    """
+    axes = _axes_of(ax, 2)
+    artists = []
+    for ring in rings:
+        if len(ring) == 1:
+            artists.append(_draw_point(axes, ring[0], style))
+        elif len(ring) > 1:
+            (patch,) = axes.fill(*ring.T, **style)
+            if patch.get_fill() and not EDGE_NAMES & style.keys():
+                _colour_edges_as_face(patch)
+            artists.append(patch)
+    return artists
+
+
+def draw_facets(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list[Any]:
+    """Draw polygons with rings of vertices, shape (k, 3), on 3-D axes; return one artist, or none without polygons.
+
+    A ring may be a segment; a single ring of one vertex is a dot. `style` has the options of matplotlib's
+    `Poly3DCollection`. `color`, or the next colour of the axes, is that of the edges and of transparent faces, unless
+    `alpha`, `facecolor` or `edgecolor` are given.
+    """
+    axes = _axes_of(ax, 3)
+    if not rings:
+        return []
+
+    look = {COLLECTION_NAMES.get(name, name): value for name, value in style.items()}
+    colour = look.pop("color", None)
+    if colour is None and "facecolors" not in look:
+        colour = _next_colour(axes)
+    if len(rings[0]) == 1:
+        return [_draw_point(axes, rings[0][0], look | {"color": colour})]
+
+    if "facecolors" not in look:
+        look["facecolors"] = colour if "alpha" in look else (colour, FACE_OPACITY)
+    if "edgecolors" not in look:
+        look["edgecolors"] = look["facecolors"] if colour is None else colour
+
+    facets = import_module("mpl_toolkits.mplot3d.art3d").Poly3DCollection(rings, **look)
+    has_data = axes.has_data()
+    axes.add_collection3d(facets, autolim=False)
+    axes.auto_scale_xyz(*np.vstack(rings).T, had_data=has_data)
+    return [facets]
+
+
+def ring_order(points: Floats) -> Integers:
+    """Return the order around it of the vertices, shape (k, n), of a convex polygon, a segment or a point of R^n."""
+    if len(points) < 3:
+        return np.arange(len(points))
+    # In these coordinates the polygon is as wide as it is long; the order is the same under any affine map.
+    steps = points - points.mean(axis=0)
+    coordinates = np.linalg.svd(steps, full_matrices=False)[0]
+    return np.argsort(np.arctan2(coordinates[:, 1], coordinates[:, 0]))
+
+
+def _colour_edges_as_face(patch: Any) -> None:
+    """Give the edges of a patch the colour of its face, but not its hatching, which has that of the edges."""
+    hatching = patch.get_hatchcolor()
+    patch.set_edgecolor(patch.get_facecolor())
+    patch.set_hatchcolor(hatching)
+
+
+def _draw_point(axes: Any, point: Floats, style: dict[str, Any]) -> Any:
+    """Draw a set of one point as a dot, with the style of a polygon."""
+    look = {name: value for name, value in style.items() if name not in OF_PATCHES}
+    if not style.get("fill", True):
+        look["facecolor"] = "none"
+    return axes.scatter(*point[:, None], **look)
+
+
+def _next_colour(axes: Any) -> Any:
+    """Return the next colour of the cycle of the axes, which collections do not take themselves."""
+    (line,) = axes.plot([], [], [])
+    line.remove()
+    return line.get_color()
+
+
+def _axes_of(ax: Any, space: int) -> Any:
+    """Return axes for sets of R^2 or R^3: those given, the present ones of pyplot, or new ones if these do not fit."""
+    if ax is not None:
+        if not isinstance(ax, import_module("matplotlib.axes").Axes):
+            raise TypeError(f"ax must be axes of matplotlib: got {shown(ax)}")
+        if _dimensions(ax) != space:
+            raise ValueError(f"a set of R^{space} is drawn on axes of {space} dimensions: got {shown(ax)}")
+        return ax
+
+    pyplot = import_module("matplotlib.pyplot")
+    figure = pyplot.gcf()
+    if figure.axes and _dimensions(figure.gca()) == space:
+        return figure.gca()
+    if figure.axes:
+        figure = pyplot.figure()
+    return figure.add_subplot(projection="3d" if space == 3 else None)
+
+
+def _dimensions(axes: Any) -> int:
+    """Return the number of dimensions of axes."""
+    return 3 if axes.name == "3d" else 2
