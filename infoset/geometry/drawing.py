@@ -27,7 +27,7 @@ def draw_polygons(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> li
     The edges have the colour of the face, unless the style has another, so that a segment and a set that is thinner
     than a pixel are visible; a point is a dot. `style` has the options of matplotlib's `fill`.
     """
-    axes = _axes_of(ax, 2)
+    axes = axes_of(ax, 2)
     artists = []
     for ring in rings:
         if len(ring) == 1:
@@ -47,7 +47,7 @@ def draw_facets(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list
     `Poly3DCollection`. `color`, or the next colour of the axes, is that of the edges and of transparent faces, unless
     `alpha`, `facecolor` or `edgecolor` are given.
     """
-    axes = _axes_of(ax, 3)
+    axes = axes_of(ax, 3)
     if not rings:
         return []
 
@@ -68,6 +68,16 @@ def draw_facets(ax: Any, rings: Sequence[Floats], style: dict[str, Any]) -> list
     axes.add_collection3d(facets, autolim=False)
     axes.auto_scale_xyz(*np.vstack(rings).T, had_data=has_data)
     return [facets]
+
+
+def limits_of(axes: Any, dimensions: int) -> tuple[Floats, Floats]:
+    """Return the minimum and the maximum coordinates of axes, each of shape (2,) or (3,), and keep them as they are."""
+    lower, upper = np.empty(dimensions), np.empty(dimensions)
+    for k, axis in enumerate("xyz"[:dimensions]):
+        ends = getattr(axes, f"get_{axis}lim")()
+        getattr(axes, f"set_{axis}lim")(ends)
+        lower[k], upper[k] = sorted(ends)
+    return lower, upper
 
 
 def ring_order(points: Floats) -> Integers:
@@ -102,7 +112,7 @@ def _next_colour(axes: Any) -> Any:
     return line.get_color()
 
 
-def _axes_of(ax: Any, space: int) -> Any:
+def axes_of(ax: Any, space: int) -> Any:
     """Return axes for sets of R^2 or R^3: those given, the present ones of pyplot, or new ones if these do not fit."""
     if ax is not None:
         if not isinstance(ax, import_module("matplotlib.axes").Axes):

@@ -464,6 +464,8 @@ def _need_set(name: str, value: Set, space: int, shape: tuple[int, ...] = ()) ->
         raise ValueError(f"{name} must be a single polygon{batch}: got a batch of shape {value.shape}")
     if not isinstance(value, Zonotope) and np.any(value.is_empty):
         raise ValueError(f"{name} must not be empty")
+    if isinstance(value, Polytope) and not value.is_bounded:
+        raise ValueError(f"{name} must be bounded: got {value!r}")
 
 
 def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:

@@ -179,7 +179,7 @@ def optimal_polytope(optimum: BlockOptimum) -> Polytope:
             "for vertices"
         )
     try:
-        return Polytope.from_constraints(optimal.rows, optimal.limits).needed()
+        return Polytope.from_constraints(optimal.rows, optimal.limits).needed().bounded()
     except EmptyPolytopeError as error:  # the centre is inside
         raise UncertainHullError("the set of optimal controls of a block is too thin: it is empty") from error
 

@@ -20,6 +20,17 @@ from infoset.geometry.polytope import cone
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import orthonormal
 from infoset.geometry.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+from infoset.geometry.polytope.polyhedron import (
+    Polyhedron,
+    as_directions,
+    as_points,
+    holds_with_equality,
+    of_generators,
+    rounded_directions,
+    rounded_equations,
+    rounded_points,
+    rounded_rows,
+)
 from infoset.limits import COUNT
 
 if TYPE_CHECKING:
@@ -51,6 +62,8 @@ class PolytopeArrays:
     incidence: Flags
     centre: Floats
     scale: Floats
+    exact: Polyhedron | None = None
+    """The set in exact integers if it is unbounded; its other arrays are this one, rounded, with `scale` one."""
 
     @classmethod
     def empty(cls, space: int) -> Self:
@@ -76,8 +89,7 @@ class PolytopeArrays:
     ) -> Self:
         """Return {x: normals x <= offsets, across x = levels}, with the shapes (m, n), (m,), (k, n) and (k,).
 
-        It may be empty. Infinite offsets are no limit. One step of the double description for each row. An
-        UnboundedPolytopeError, which holds a direction, is raised if the set is unbounded.
+        It may be empty or unbounded. Infinite offsets are no limit. One step of the double description for each row.
         """
         rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "k", "n")
         if across is not None:
@@ -85,6 +97,53 @@ class PolytopeArrays:
             need_finite("levels", heights)
             rows, limits = np.vstack([rows, flat, -flat]), np.concatenate([limits, heights, -heights])
         return cls._of_rows(rows, limits)
+
+    @classmethod
+    def space_of(cls, space: int) -> Self:
+        """Return R^n, n = `space`."""
+        COUNT.need("space", space)
+        return cls.from_rays(np.zeros((1, space)), lines=np.eye(space))
+
+    @classmethod
+    def halfspace(cls, normal: ArrayLike, offset: float) -> Self:
+        """Return {x: normal . x <= offset}, with a `normal` of shape (n,) that is not zero."""
+        row = finite_values("normal", normal, "n")
+        if not row.any():
+            raise ValueError("normal must not be zero")
+        return cls.from_constraints(row[None], [offset])
+
+    @classmethod
+    def from_rays(cls, points: ArrayLike, directions: ArrayLike = (), lines: ArrayLike = ()) -> Self:
+        """Return the hull of `points` and of the rays from them along `directions`, and along both ends of `lines`.
+
+        The shapes are (m, n), m at least 1, (k, n) and (l, n). Without directions and lines it is `from_vertices`.
+        """
+        array = finite_values("points", points, "m", "n")
+        space = array.shape[1]
+        far = as_directions(finite_values("directions", directions, "k", space))
+        both = as_directions(finite_values("lines", lines, "k", space))
+        if not far and not both:
+            return cls.from_vertices(array)
+        return cls._of_polyhedron(of_generators(space, as_points(array), far, both))
+
+    @classmethod
+    def _of_polyhedron(cls, found: Polyhedron) -> Self:
+        """Return an exact set; its numbers are rounded to nearest, and once more in what is computed from them."""
+        if not found.points:
+            return cls.empty(found.space)
+        points = rounded_points(found.points, found.space)
+        if found.is_bounded:
+            return cls.from_vertices(points)
+        on = np.array([[holds_with_equality(facet, point) for facet in found.facets] for point in found.points])
+        return cls(
+            points,
+            rounded_rows(found.facets, found.space),
+            rounded_equations(found.equations, found.space),
+            on.reshape(len(points), len(found.facets)),
+            np.zeros(found.space),
+            np.ones(found.space),
+            found,
+        )
 
     @classmethod
     def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Self:
@@ -136,7 +195,7 @@ class PolytopeArrays:
         """Return the vertices of a set of R^2, shape (v, 2), counter-clockwise."""
         if self.space != 2:
             raise ValueError(f"a set of R^2 is needed: project this one, of R^{self.space}, on two axes first")
-        return conversion.ring_of_points(self.vertices)
+        return conversion.ring_of_points(self.bounded().vertices)
 
     @classmethod
     def _hull(cls, points: Floats, centre: Floats, scale: Floats, flat: float = FLAT, allowed: bool = True) -> Self:
@@ -190,11 +249,9 @@ class PolytopeArrays:
         rows, limits = rows[limits < np.inf], limits[limits < np.inf]
         if box:
             return cls._in_box(rows, limits, origin, box, cls.empty(rows.shape[1]))
-        found, unbounded = cls._guessed(rows, limits, origin)
+        found = cls._guessed(rows, limits, origin)
         if found._is_certain(rows, limits):
             return found
-        if unbounded is not None and _is_proved(unbounded, rows, limits, origin):
-            raise unbounded
         return cls._judged(rows, limits, origin, found)
 
     @classmethod
@@ -210,27 +267,20 @@ class PolytopeArrays:
         return found
 
     @classmethod
-    def _guessed(
-        cls, rows: Floats, limits: Floats, origin: Floats | float
-    ) -> tuple[Self, UnboundedPolytopeError | None]:
+    def _guessed(cls, rows: Floats, limits: Floats, origin: Floats | float) -> Self:
         """Return {x: rows (x - origin) <= limits}, or the empty set, computed in guessed coordinates, then in its own.
 
-        In too small a scale a set seems to be empty or unbounded, in too large a one it has no width. The other value
-        is an error if the set seems to be unbounded.
+        In too small a scale a set seems to be empty or unbounded, in too large a one it has no width.
         """
-        found, centre, unbounded = cls.empty(rows.shape[1]), np.zeros(rows.shape[1]), None
+        found, centre = cls.empty(rows.shape[1]), np.zeros(rows.shape[1])
         for share in (0.25, 1.0):
-            try:
+            with suppress(UnboundedPolytopeError, UncertainHullError):
                 found = cls._intersect(rows, limits, origin, centre, _guess(rows, limits, share))
-            except UnboundedPolytopeError as error:
-                unbounded = error
-            except UncertainHullError:
-                continue
             if not found.is_empty:
                 break
         if found._is_round:
-            return found, unbounded
-        return cls._in_box(rows, limits, origin, found.bounding_box(), found), unbounded
+            return found
+        return cls._in_box(rows, limits, origin, found.bounding_box(), found)
 
     def _is_certain(self, rows: Floats, limits: Floats) -> bool:
         """Whether the set of these half-spaces needs no judge: it has points, and no width is near its rounding.
@@ -245,21 +295,23 @@ class PolytopeArrays:
         return self.dimension == self.space or len(_equations(rows, limits)) == self.space - self.dimension
 
     @classmethod
+    def _unbounded(cls, exact: cone.Vertices) -> Self:
+        """Return the unbounded set of exact vertices, directions and lines."""
+        points = [cone.whole([*point, Fraction(1)]) for point in exact.points]
+        directions, lines = ([[*row, 0] for row in rows] for rows in (exact.directions, exact.lines))
+        return cls._of_polyhedron(of_generators(len(points[0]) - 1, points, directions, lines))
+
+    @classmethod
     def _judged(cls, rows: Floats, limits: Floats, origin: Floats | float, found: Self) -> Self:
         """Return {x: rows (x - origin) <= limits}; exact vertices decide whether it is the `found` one.
 
         If it is not, it is computed in the coordinates of the exact vertices.
-
-        Raises
-        ------
-        UnboundedPolytopeError
-            If the set is unbounded.
         """
         is_noise, exact = _noise(rows, limits, np.broadcast_to(origin, rows.shape[1]))
         if not exact.points or not _holds_without_direction(limits, is_noise):
             return cls.empty(rows.shape[1])
         if not exact.is_bounded:
-            raise UnboundedPolytopeError(cone.rounded([*exact.lines, *exact.directions][0]))
+            return cls._unbounded(exact)
         if not found.is_empty and found._agrees(exact.box()):
             return found
         around = cone.coordinates(exact.box(), _THIN)
@@ -313,10 +365,7 @@ class PolytopeArrays:
                 return cls.empty(space)
             free = np.linalg.svd(table)[2][-1:] if rank <= space else rays[~ends]
             if len(free):
-                inside = None
-                if rank > space:
-                    inside = centre + scale * rays[ends, :-1].mean(axis=0), scale * free[:, :-1].sum(axis=0)
-                raise UnboundedPolytopeError(free[0, :-1] * scale, inside)
+                raise UnboundedPolytopeError(free[0, :-1] * scale)
             start = cls(rays[:, :-1].copy(), scaled, np.zeros((0, space + 1)), on[:, 1:].copy(), centre, scale)
             with suppress(UncertainHullError):
                 return start._reduced(0)
@@ -392,6 +441,24 @@ class PolytopeArrays:
     def is_empty(self) -> bool:
         """Whether the set is empty."""
         return not len(self.points)
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether the set is bounded; the empty set is."""
+        return self.exact is None
+
+    @cached_property
+    def directions(self) -> Floats:
+        """Directions of unit length in which the set is unbounded, shape (r, n): those of its recession cone.
+
+        A set that contains lines has `lines` too, and one direction for each ray between them.
+        """
+        return rounded_directions(self.exact.directions if self.exact else (), self.space)
+
+    @cached_property
+    def lines(self) -> Floats:
+        """Directions of unit length of lines that the set contains, shape (l, n), linearly independent."""
+        return rounded_directions(self.exact.lines if self.exact else (), self.space)
 
     @cached_property
     def vertices(self) -> Floats:
@@ -471,12 +538,34 @@ class PolytopeArrays:
             raise EmptyPolytopeError("the polytope is empty")
         return self
 
+    def bounded(self) -> Self:
+        """Return the set itself.
+
+        Raises
+        ------
+        UnboundedPolytopeError
+            If it is unbounded.
+        """
+        if self.exact is not None:
+            raise UnboundedPolytopeError(np.vstack([self.lines, self.directions])[0])
+        return self
+
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Return the minimum and the maximum coordinates of the vertices, each of shape (n,). O(v n), exact."""
-        return self.needed().vertices.min(axis=0), self.vertices.max(axis=0)
+        """Return the minimum and the maximum coordinates, each of shape (n,), infinite where the set is unbounded.
+
+        O(v n), exact.
+        """
+        lower, upper = self.needed().vertices.min(axis=0), self.vertices.max(axis=0)
+        if self.exact is not None:
+            along = np.vstack([self.directions, self.lines, -self.lines])
+            lower = np.where((along < 0.0).any(axis=0), -np.inf, lower)
+            upper = np.where((along > 0.0).any(axis=0), np.inf, upper)
+        return lower, upper
 
     def __repr__(self) -> str:
         kind = "empty polytope" if self.is_empty else f"polytope of dimension {self.dimension}"
+        if not self.is_bounded:
+            kind = f"unbounded {kind}"
         return f"<{kind} in R^{self.space}: {len(self.points)} vertices, {len(self.facets)} facets>"
 
 
@@ -542,24 +631,6 @@ def _noise(rows: Floats, limits: Floats, origin: Floats) -> tuple[Flags, cone.Ve
     if (is_short == is_noise).all():
         return is_noise, exact
     return is_noise, _exact_vertices(rows[~is_noise], limits[~is_noise], origin)
-
-
-def _is_proved(unbounded: UnboundedPolytopeError, rows: Floats, limits: Floats, origin: Floats | float) -> bool:
-    """Whether {x: rows (x - origin) <= limits} has the point and the direction that an error holds, for certain.
-
-    Products have doubled digits: a sum that is not positive has the right sign, or is exactly zero.
-    """
-    if unbounded.inside is None or np.any(origin):
-        return False
-    point, direction = unbounded.inside
-    missing, falls = rows @ point - limits, -(rows @ direction)
-
-    # Rows that the point violates to rounding hold farther along the direction.
-    violated = (missing > 0.0) & (falls > 0.0)
-    point = point + 2.0 * float((missing[violated] / falls[violated]).max(initial=1.0)) * direction
-    slopes, _ = affine_image(direction[None], rows, np.zeros(len(rows)))
-    heights, _ = affine_image(point[None], rows, -limits)
-    return bool((slopes <= 0.0).all() and (heights <= 0.0).all())
 
 
 def _exact_vertices(rows: Floats, limits: Floats, origin: Floats) -> cone.Vertices:

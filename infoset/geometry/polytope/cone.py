@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -76,11 +77,11 @@ def null_space(matrix: list[Rationals]) -> list[Row]:
     size = len(matrix[0])
     basis = [[int(i == j) for j in range(size)] for i in range(size)]
     for row in map(whole, matrix):
-        heights = [_dot(row, line) for line in basis]
+        heights = [dot(row, line) for line in basis]
         pivot = next((k for k, height in enumerate(heights) if height), None)
         if pivot is not None:
             height, line = heights.pop(pivot), basis.pop(pivot)
-            basis = [_combined(height, one, -shift, line) for one, shift in zip(basis, heights, strict=True)]
+            basis = [combined(height, one, -shift, line) for one, shift in zip(basis, heights, strict=True)]
     return basis
 
 
@@ -93,7 +94,7 @@ def product(rows: list[Rationals], matrix: list[Rationals]) -> list[Rationals]:
 def whole(numbers: Rationals) -> Row:
     """Return rational numbers times a common positive factor, as integers without a common divisor."""
     divisor = math.lcm(*(number.denominator for number in numbers))
-    return _shortest([number.numerator * (divisor // number.denominator) for number in numbers])
+    return shortest([number.numerator * (divisor // number.denominator) for number in numbers])
 
 
 def rationals(rows: Floats) -> list[Rationals]:
@@ -138,7 +139,7 @@ def extreme_rays(rows: list[Row]) -> Cone:
     on = np.zeros((0, len(rows)), np.bool_)
     done = np.zeros(len(rows), np.bool_)
     for number, row in enumerate(rows):
-        heights = [_dot(row, line) for line in lines]
+        heights = [dot(row, line) for line in lines]
         pivot = next((k for k, height in enumerate(heights) if height), None)
         if pivot is None:
             continue
@@ -146,9 +147,9 @@ def extreme_rays(rows: list[Row]) -> Cone:
         # The half of a line that is above the row becomes a ray; all else moves along the line, onto the row.
         height = abs(heights.pop(pivot))
         line = lines.pop(pivot)
-        above = line if _dot(row, line) > 0 else [-entry for entry in line]
-        lines = [_combined(height, one, -shift, above) for one, shift in zip(lines, heights, strict=True)]
-        rays = [_combined(height, ray, -_dot(row, ray), above) for ray in rays]
+        above = line if dot(row, line) > 0 else [-entry for entry in line]
+        lines = [combined(height, one, -shift, above) for one, shift in zip(lines, heights, strict=True)]
+        rays = [combined(height, ray, -dot(row, ray), above) for ray in rays]
         on[:, number] = True
         rays.append(above)
         on = np.vstack([on, done])
@@ -173,7 +174,7 @@ def _inserted(rows: list[Row], rays: list[Row], on: Flags, done: Flags, lines: l
 
 def _cut(rays: list[Row], on: Flags, row: Row, number: int, least: int) -> tuple[list[Row], Flags]:
     """Return the rays above a row, which has a `number`, and those where edges cross it, and their rows."""
-    heights = [_dot(row, ray) for ray in rays]
+    heights = [dot(row, ray) for ray in rays]
     on[:, number] = [height == 0 for height in heights]
     if min(heights, default=0) >= 0:
         return rays, on
@@ -181,7 +182,7 @@ def _cut(rays: list[Row], on: Flags, row: Row, number: int, least: int) -> tuple
     signs = np.array([(height > 0) - (height < 0) for height in heights], np.int64)
     kept = np.flatnonzero(signs >= 0)
     ends = edges_across(packed(on), signs, least)
-    new = [_combined(heights[p], rays[q], -heights[q], rays[p]) for p, q in ends.tolist()]
+    new = [combined(heights[p], rays[q], -heights[q], rays[p]) for p, q in ends.tolist()]
     bits = on[ends[:, 0]] & on[ends[:, 1]]
     bits[:, number] = True
     return [*(rays[k] for k in kept), *new], np.vstack([on[kept], bits])
@@ -219,15 +220,17 @@ def edges_across(bits: Bits, signs: Integers, least: int) -> Integers:
     return pairs[:made]
 
 
-def _dot(one: Row, other: Row) -> int:
+def dot(one: Sequence[int], other: Sequence[int]) -> int:
+    """Return the sum of products."""
     return sum(a * b for a, b in zip(one, other, strict=True))
 
 
-def _combined(share: int, one: Row, other_share: int, other: Row) -> Row:
+def combined(share: int, one: Row, other_share: int, other: Row) -> Row:
     """Return share one + other_share other, without a common divisor."""
-    return _shortest([share * a + other_share * b for a, b in zip(one, other, strict=True)])
+    return shortest([share * a + other_share * b for a, b in zip(one, other, strict=True)])
 
 
-def _shortest(row: Row) -> Row:
+def shortest(row: Row) -> Row:
+    """Return the row without a common divisor."""
     divisor = math.gcd(*row)
     return [entry // divisor for entry in row] if divisor > 1 else row

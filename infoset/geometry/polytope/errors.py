@@ -12,11 +12,9 @@ class EmptyPolytopeError(ValueError):
 
 
 class UnboundedPolytopeError(ValueError):
-    """The constraints do not bound a set; `direction`, shape (n,), of unit length, is one in which it is unbounded."""
+    """An unbounded set has no answer; `direction`, shape (n,), of unit length, is one in which it is unbounded."""
 
-    def __init__(self, direction: Floats, inside: tuple[Floats, Floats] | None = None) -> None:
-        self.inside = inside
-        """A point of the set and the sum of its directions, to rounding, where they are known; for its proof."""
+    def __init__(self, direction: Floats) -> None:
         direction = direction / np.abs(direction).max()
         direction = direction / np.linalg.norm(direction) + 0.0
         shown = ", ".join(f"{component:.3g}" for component in direction)

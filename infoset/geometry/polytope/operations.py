@@ -70,6 +70,12 @@ def product(*polytopes: Polytope) -> Polytope:
         raise ValueError("a product needs at least one polytope")
     if any(factor.is_empty for factor in polytopes):
         return Polytope.empty(sum(factor.space for factor in polytopes))
+    if not all(factor.is_bounded for factor in polytopes):
+        axes = np.eye(sum(factor.space for factor in polytopes))
+        ends = np.cumsum([factor.space for factor in polytopes])[:-1]
+        parts = zip(polytopes, np.split(axes, ends), strict=True)
+        cylinders = [factor.preimage(rows) for factor, rows in parts]
+        return cylinders[0].intersection(*cylinders[1:])
     points, on = polytopes[0].points, polytopes[0].incidence
     for factor in polytopes[1:]:
         count = len(factor.points)

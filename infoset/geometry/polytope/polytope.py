@@ -1,8 +1,9 @@
-"""A bounded convex polytope in R^n, in both representations."""
+"""A convex polytope in R^n, in both representations."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from functools import cached_property
 from math import factorial
 from typing import Any
@@ -21,12 +22,12 @@ from infoset.geometry._set_arguments import (
 )
 from infoset.geometry.convex_set import ConvexSet, need_convex_set
 from infoset.geometry.double_words import EPS, affine_image, supports
-from infoset.geometry.drawing import draw_facets, draw_polygons, ring_order
-from infoset.geometry.polytope import cone
+from infoset.geometry.drawing import axes_of, draw_facets, draw_polygons, limits_of, ring_order
+from infoset.geometry.polytope import cone, polyhedron
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, simplices_of, triangle_of
 from infoset.geometry.polytope.arrays import PolytopeArrays
-from infoset.geometry.polytope.errors import UnboundedPolytopeError, UncertainHullError
+from infoset.geometry.polytope.errors import UncertainHullError
 from infoset.geometry.polytope.nearest import nearest_pair
 from infoset.geometry.polytope.reduction import reduced_outward
 from infoset.limits import Limits, real_values
@@ -36,7 +37,7 @@ _CLEAR_PIVOT = 1e-6
 
 
 class Polytope(PolytopeArrays, ConvexSet):
-    """A convex polytope; it may be flat, a segment, a point, or empty.
+    """A convex polytope; it may be flat, a segment, a point, empty, or unbounded.
 
     It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v, n), without redundant
     points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
@@ -51,6 +52,11 @@ class Polytope(PolytopeArrays, ConvexSet):
     The arrays are stored in scaled coordinates y, x = `centre` + `scale` y, with powers of two, which round nothing:
     `points`, shape (v, n), and rows (a, b) of `facets`, a . y <= b, shape (f, n + 1), and of `equations`, a . y = b,
     shape (n - dimension, n + 1). `incidence[i, j]`, shape (v, f), is whether vertex i is on facet j.
+
+    An unbounded set is the sum of the hull of its `vertices`, of the cone of its `directions` and of the span of its
+    `lines`; one that contains lines has points of its smallest faces in the place of vertices. It is stored and
+    computed in exact integers (`exact`), which takes ten to fifty times as long; a result that is bounded is rounded to
+    nearest. What is infinite is inf; what does not exist, such as a centroid, raises an UnboundedPolytopeError.
 
     Operations on the empty set give the empty set; points such as its centroid do not exist (EmptyPolytopeError). All
     arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
@@ -77,6 +83,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         moved = offset_values(offset, len(rows)).copy()
         if self.is_empty:
             return self.empty(len(rows))
+        if self.exact is not None:
+            mapped = polyhedron.image(self.exact, cone.rationals(rows), cone.rationals(moved[None])[0])
+            return self._of_polyhedron(mapped)
         points, facets, centre, scale, errors = dd.image(self.points, self.facets, self.centre, self.scale, rows, moved)
         if self.dimension < self.space or not len(facets):
             return self._hull(points, centre, scale, allowed=hull)._around(errors)
@@ -86,43 +95,42 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m).
 
         A step of the double description for each facet. If the matrix has a null space, the preimage is unbounded or
-        empty, which is decided in exact numbers for the facets of the set, relaxed by their rounding.
-
-        Raises
-        ------
-        UnboundedPolytopeError
-            If the preimage is unbounded.
+        empty; it is computed in exact integers from the facets of the set.
         """
         factor, moved = finite_values("matrix", matrix, self.space, "m"), offset_values(offset, self.space)
         if self.is_empty:
             return self.empty(factor.shape[1])
+        if self.exact is not None or _has_null_space(factor):
+            return self._exact_preimage(factor, moved)
         rows, limits = self._rows(moved)
-        lines = _null_space(factor)
-        if lines and self._misses_range(rows, limits, factor, moved):
-            return self.empty(factor.shape[1])
-        if lines:
-            raise UnboundedPolytopeError(cone.rounded(lines[0]))
         mapped, rounded = affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
         found = self._of_rows(mapped, limits)
         if found.dimension < found.space or not (rounded.any() or moved.any()):
             return found
         return found.enlarged(2.0 * EPS * np.abs(found.vertices).max(axis=0))
 
-    def _misses_range(self, rows: Floats, limits: Floats, matrix: Floats, offset: Floats) -> bool:
-        """Whether no x satisfies rows matrix x <= limits, the half-spaces around an `offset`, exactly decided.
+    def _exact_preimage(self, matrix: Floats, offset: Floats) -> Polytope:
+        """Return {x: matrix x + offset in the set} in exact integers.
 
-        The limits are relaxed by the rounding of the rows and of the limits themselves: by that of n + 2 operations.
+        The equations of a flat set are rounded, to either side: where they leave nothing, they are relaxed by the
+        rounding of n + 2 operations, as are its facets.
         """
-        terms = np.abs(rows) @ (np.abs(self.vertices).max(axis=0) + np.abs(offset) + np.abs(self.centre))
-        relaxed = limits + 4.0 * (self.space + 2) * EPS * terms
-        composed = cone.product(cone.rationals(rows), cone.rationals(matrix))
-        return not cone.vertices_of(composed, cone.rationals(relaxed[None])[0]).points
+        factor, (shift,) = cone.rationals(matrix), cone.rationals(offset[None])
+        found = polyhedron.preimage(self._polyhedron.half_spaces, factor, shift)
+        if not found.points and self.exact is None and len(self.equations):
+            rows, limits = self._rows(offset)
+            terms = np.abs(rows) @ (np.abs(self.vertices).max(axis=0) + np.abs(offset) + np.abs(self.centre))
+            relaxed = polyhedron.as_half_spaces(rows, limits + 4.0 * (self.space + 2) * EPS * terms)
+            found = polyhedron.preimage(relaxed, factor, [Fraction(0)] * self.space)
+        return self._of_polyhedron(found)
 
     def minkowski_sum(self, other: ConvexSet) -> Polytope:
         """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two vertices."""
         two = self._need_other(other)
         if self.is_empty or two.is_empty:
             return self if self.is_empty else two
+        if self._is_exact_with(two):
+            return self._of_polyhedron(polyhedron.total(self._polyhedron, two._polyhedron))
         pairs = [np.repeat(self.points, len(two.points), axis=0), np.tile(two.points, (len(self.points), 1))]
         centre, scale = np.append(self.centre, two.centre), np.append(self.scale, two.scale)
         product = replace(self, points=np.hstack(pairs), centre=centre, scale=scale)
@@ -138,7 +146,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         along = finite_values("half", half, self.space)
         if self.is_empty or not (along / self.scale).any():
             return self
-        if self.dimension < self.space:
+        if self.dimension < self.space or self.exact is not None:
             return self.minkowski_sum(self.from_vertices([-along, along]))
         points, facets, incidence, errors = dd.swept(self.points, self.facets, self.incidence, along / self.scale)
         whole = replace(self, points=points, facets=facets, incidence=incidence)
@@ -157,6 +165,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         not_negative("by", float(margin.min()))
         if self.is_empty or not margin.any():
             return self
+        if self.exact is not None:
+            outward = polyhedron.moved_outward(self.exact.half_spaces, cone.rationals(margin[None])[0])
+            return self._of_polyhedron(polyhedron.of_half_spaces(self.space, outward))
         start = self if self.dimension == self.space else self._prism(margin)
         return start._around(margin / start.scale)
 
@@ -192,6 +203,11 @@ class Polytope(PolytopeArrays, ConvexSet):
             return self
         if two.is_empty:
             raise ValueError("the difference with an empty set is unbounded")
+        if self._is_exact_with(two):
+            inward = polyhedron.moved_inward(self._polyhedron.half_spaces, two._polyhedron)
+            if inward is None:
+                return self.empty(self.space)
+            return self._of_polyhedron(polyhedron.of_half_spaces(self.space, inward))
         rows, limits = self._rows(self.centre)
         if self.dimension < self.space:
             # The difference plus a point of the other set is a part of this one: it cannot leave the affine hull.
@@ -205,7 +221,13 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     def intersection(self, *others: ConvexSet) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
-        sets = sorted((self, *map(self._need_other, others)), key=lambda one: (one.dimension, -len(one.facets)))
+        every = (self, *map(self._need_other, others))
+        if self._is_exact_with(*every):
+            rows = [row for one in every for row in one._polyhedron.half_spaces]
+            if any(one.is_empty for one in every):
+                return self.empty(self.space)
+            return self._of_polyhedron(polyhedron.of_half_spaces(self.space, rows))
+        sets = sorted(every, key=lambda one: (one.dimension, -len(one.facets)))
         found = sets[0]
         for one in sets[1:]:
             if not found.is_empty:
@@ -215,8 +237,10 @@ class Polytope(PolytopeArrays, ConvexSet):
         return found
 
     def convex_hull(self, *others: ConvexSet) -> Polytope:
-        """Return the convex hull of the union with one or more polytopes."""
+        """Return the convex hull of the union with one or more polytopes; its closure if one is unbounded."""
         sets = [one for one in (self, *map(self._need_other, others)) if not one.is_empty]
+        if self._is_exact_with(*sets):
+            return self._of_polyhedron(polyhedron.hull([one._polyhedron for one in sets]))
         return self.from_vertices(np.vstack([one.vertices for one in sets])) if sets else self
 
     def cut(
@@ -246,7 +270,11 @@ class Polytope(PolytopeArrays, ConvexSet):
         rows, limits = np.vstack([rows, -rows]), np.concatenate([most + wider, wider - minimum])
         if np.isneginf(limits).any() or (minimum > most + 2.0 * wider).any():
             return self.empty(self.space)
-        return self._with_rows(rows[limits < np.inf], limits[limits < np.inf], recompute=recompute)
+        rows, limits = rows[limits < np.inf], limits[limits < np.inf]
+        if self.exact is not None:
+            sides = [*self.exact.half_spaces, *polyhedron.as_half_spaces(rows, limits)]
+            return self._of_polyhedron(polyhedron.of_half_spaces(self.space, sides))
+        return self._with_rows(rows, limits, recompute=recompute)
 
     def project(self, axes: ArrayLike) -> Polytope:
         """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
@@ -268,6 +296,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         the set along its normal, until it has `cap` facets. A flat set becomes 3e-8 of its coordinates thick.
         """
         Limits(minimum=2 * self.space, whole=True).need("cap", cap)
+        self.bounded()
         if self.is_empty or (len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= max_vertices):
             return self
         solid = self if self.dimension == self.space else self._prism(np.zeros(self.space))
@@ -280,14 +309,56 @@ class Polytope(PolytopeArrays, ConvexSet):
             raise ValueError(f"other must be a set in R^{self.space}, as this one: got {other!r}")
         return polytope
 
+    def _is_exact_with(self, *others: Polytope) -> bool:
+        """Whether an operation on some sets is computed in exact integers: one of them is unbounded."""
+        return not all(one.is_bounded for one in (self, *others))
+
+    @cached_property
+    def _polyhedron(self) -> polyhedron.Polyhedron:
+        """The set in integers; of a bounded one, its vertices and facets as they are stored."""
+        if self.exact is not None:
+            return self.exact
+        centre, scale = (cone.rationals(each[None])[0] for each in (self.centre, self.scale))
+        points = []
+        for point in cone.rationals(self.points):
+            moved = [middle + unit * entry for middle, unit, entry in zip(centre, scale, point, strict=True)]
+            points.append(cone.whole([*moved, Fraction(1)]))
+        tables = []
+        for rows in (self.facets, self.equations):
+            table = []
+            for row in cone.rationals(rows):
+                normal = [entry / unit for entry, unit in zip(row[:-1], scale, strict=True)]
+                shift = sum((entry * middle for entry, middle in zip(normal, centre, strict=True)), Fraction(0))
+                table.append(cone.whole([*normal, row[-1] + shift]))
+            tables.append(tuple(table))
+        return polyhedron.Polyhedron(self.space, tuple(points), (), (), *tables)
+
+    def recession(self) -> Polytope:
+        """Return the cone of the directions in which the set is unbounded: the origin if it is bounded."""
+        return self._of_polyhedron(polyhedron.recession(self.needed()._polyhedron))
+
     def support_function(self, directions: ArrayLike) -> Floats:
-        """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the empty set. O(v n)."""
+        """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the empty set. O(v n).
+
+        It is inf where the set is unbounded. A product of two directions that is zero to rounding counts as zero.
+        """
         rows = finite_values("directions", directions, "...", self.space)
-        return np.asarray((rows @ self.vertices.T).max(axis=-1, initial=-np.inf))
+        heights = np.asarray((rows @ self.vertices.T).max(axis=-1, initial=-np.inf))
+        if self.exact is not None:
+            heights = np.where(self._rises(rows), np.inf, heights)
+        return heights
+
+    def _rises(self, rows: Floats) -> Flags:
+        """Whether the set is unbounded along `rows`, shape (..., n), beyond the rounding of scalar products."""
+        along = np.vstack([self.directions, self.lines, -self.lines])
+        rounding = 2.0 * (self.space + 2) * EPS * (np.abs(rows) @ np.abs(along).T)
+        return np.asarray((rows @ along.T > rounding).any(axis=-1))
 
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a `direction`, both of shape (n,). O(v n)."""
         row = finite_values("direction", direction, self.space)
+        if self.exact is not None and self._rises(row):
+            self.bounded()
         return np.asarray(self.vertices[int((self.needed().vertices @ row).argmax())])
 
     @cached_property
@@ -311,20 +382,30 @@ class Polytope(PolytopeArrays, ConvexSet):
             return np.full(x.shape[:-1], -np.inf)
         rows, limits = self._outer_rows
         rounding = (self.space + 2) * EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
-        return np.asarray((limits + rounding @ np.abs(rows).T - x @ rows.T).min(axis=-1))
+        return np.asarray((limits + rounding @ np.abs(rows).T - x @ rows.T).min(axis=-1, initial=np.inf))
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
         """Return whether `points`, shape (..., n), are in the set, to rounding or within a `tolerance` (`margin`)."""
         return np.asarray(self.margin(points) >= -not_negative("tolerance", tolerance))
 
     def is_subset(self, other: ConvexSet, tolerance: float = 0.0) -> bool:
-        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
-        return bool(self._need_other(other).contains(self.vertices, tolerance).all())
+        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets.
+
+        Of an unbounded set, also whether the other one is unbounded in the same directions.
+        """
+        two = self._need_other(other)
+        is_inside = bool(two.contains(self.vertices, tolerance).all())
+        if self.is_empty or self.exact is None or not is_inside:
+            return is_inside
+        rows, _ = two.constraints()
+        return not self._rises(rows).any()
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
         if self.is_empty:
             return 0.0
+        if self.exact is not None:
+            return float("inf")
         # Along each column of the triangle of `_steps` scaled coordinates are turned and stretched by its diagonal.
         stretch = np.prod(np.abs(np.diag(triangle_of(self._steps)[0]))) if self.dimension else 1.0
         return float(self._simplices[1].sum() * stretch / factorial(self.dimension))
@@ -340,31 +421,40 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     def area(self) -> float:
         """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
+        if self.exact is not None and self.space == 2:
+            return float("inf") if self.dimension == self.space else 0.0
         return self.volume() if len(self._polygon()) > 2 else 0.0
 
     def centroid(self) -> Floats:
         """Return the centroid within the affine hull, shape (n,), from a division into simplices."""
-        corners, sizes = self.needed()._simplices
+        corners, sizes = self.needed().bounded()._simplices
         return np.asarray(self.centre + self.scale * (sizes / sizes.sum() @ self.points[corners].mean(axis=1)))
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
         """Return points distributed uniformly over the set, shape (count, n), from a division into simplices."""
         random = np.random.default_rng(seed)
-        corners, sizes = self.needed()._simplices
+        corners, sizes = self.needed().bounded()._simplices
         weights = random.dirichlet(np.ones(corners.shape[1]), count)
         chosen = corners[random.choice(len(sizes), count, p=sizes / sizes.sum())]
         return np.asarray(self.centre + self.scale * np.einsum("ij,ijk->ik", weights, self.points[chosen]))
 
     def chebyshev_centre(self) -> tuple[Floats, float]:
-        """Return the centre, shape (n,), and radius of a largest ball in the set, within its affine hull (HiGHS)."""
+        """Return the centre, shape (n,), and radius of a largest ball in the set, within its affine hull (HiGHS).
+
+        An UnboundedPolytopeError is raised if the set has balls of any size.
+        """
         middle = self.needed().vertices.mean(axis=0)
+        if self.exact is not None and self.recession().dimension == self.dimension:
+            self.bounded()
         if not self.dimension:
             return middle, 0.0
         inner, radius = largest_ball(self.normals @ self._steps, self.offsets - self.normals @ middle)
         return middle + self._steps @ inner, max(0.0, radius)
 
     def diameter(self) -> float:
-        """Return the maximum distance between two vertices; 0 for the empty set. O(v^2 n)."""
+        """Return the maximum distance between two vertices; 0 for the empty set, inf for an unbounded one. O(v^2 n)."""
+        if self.exact is not None:
+            return float("inf")
         return float(cdist(self.vertices, self.vertices).max(initial=0.0))
 
     def closest_point(self, point: ArrayLike) -> Floats:
@@ -376,6 +466,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         x = finite_values("point", point, self.space)
         if x in self:
             return x
+        if self.exact is not None:
+            return x + self._nearest_difference(self.from_vertices(x[None]))
         return nearest_pair(self.needed().vertices, x[None]).point
 
     def distance(self, other: ConvexSet | ArrayLike) -> float:
@@ -385,7 +477,18 @@ class Polytope(PolytopeArrays, ConvexSet):
         two = self._need_other(other)
         if two.is_empty or self.is_empty:
             return float("inf")
-        return float(np.linalg.norm(nearest_pair(self.vertices, two.vertices).difference))
+        return float(np.linalg.norm(self._nearest_difference(two)))
+
+    def _nearest_difference(self, other: Polytope) -> Floats:
+        """Return the difference x - y of nearest points x of this set and y of the other, shape (n,)."""
+        if not self._is_exact_with(other):
+            return nearest_pair(self.vertices, other.vertices).difference
+        # The nearest difference is at most as long as the one of two points, so that it is in a box of this size.
+        differences = self + -other
+        some = differences.vertices[0]
+        size = float(np.linalg.norm(some)) * (1.0 + 1e-9)
+        near = differences & self.from_box(np.full(self.space, -size), np.full(self.space, size))
+        return nearest_pair(near.vertices, np.zeros((1, self.space))).difference
 
     def isdisjoint(self, other: ConvexSet) -> bool:
         """Return whether no point is in both sets, to rounding; see `separating_direction`."""
@@ -400,14 +503,20 @@ class Polytope(PolytopeArrays, ConvexSet):
         two = self._need_other(other)
         if self.is_empty or two.is_empty:
             return None
-        between = nearest_pair(two.vertices, self.vertices).difference
+        between = two._nearest_difference(self)
         length = float(np.linalg.norm(between))
         direction = np.asarray(between / (length or 1.0))
         return direction if self.support_function(direction) < -two.support_function(-direction) else None
 
     def hausdorff_distance(self, other: ConvexSet) -> float:
-        """Return the Hausdorff distance; inf between an empty and a nonempty set. One `distance` for each vertex."""
+        """Return the Hausdorff distance; inf between an empty and a nonempty set. One `distance` for each vertex.
+
+        It is inf if the sets are not unbounded in the same directions.
+        """
         two = self._need_other(other)
+        have_points = not (self.is_empty or two.is_empty)
+        if have_points and self._is_exact_with(two) and not self.recession().equals(two.recession()):
+            return float("inf")
         from_this = [two.distance(vertex) for vertex in self.vertices]
         from_other = [self.distance(vertex) for vertex in two.vertices]
         return max(from_this + from_other, default=0.0)
@@ -417,13 +526,17 @@ class Polytope(PolytopeArrays, ConvexSet):
 
         Without axes the present ones of pyplot are used, or new ones if these have not as many dimensions as the set.
         `style` has the options of matplotlib's `fill` in the plane and `Poly3DCollection` in space, and of `scatter`
-        for a point. Facets in space are transparent. Segments and thin sets are visible by their edges.
+        for a point. Facets in space are transparent. Segments and thin sets are visible by their edges. Of an unbounded
+        set the part within the limits of the axes is drawn: set them before.
 
         Raises
         ------
         ValueError
             If the set is in another space, or the axes have not as many dimensions.
         """
+        if self.space in (2, 3) and not self.is_bounded:
+            axes = axes_of(ax, self.space)
+            return (self & self.from_box(*limits_of(axes, self.space))).plot(axes, **style)
         if self.space == 2:
             return draw_polygons(ax, [self._polygon()], style)
         if self.space == 3:
@@ -448,9 +561,9 @@ def _less(limits: Floats, widths: Floats) -> Floats:
     return np.where(is_exact, less, np.nextafter(less, np.inf))
 
 
-def _null_space(matrix: Floats) -> list[cone.Row]:
-    """Return an exact basis of the null space of a matrix, shape (n, m)."""
+def _has_null_space(matrix: Floats) -> bool:
+    """Whether matrix x = 0 has solutions other than zero, exactly decided; the matrix has the shape (n, m)."""
     units = dd.in_units(np.ascontiguousarray(matrix.T))
     if len(dd.pivots(units, _CLEAR_PIVOT, -1)[0]) == matrix.shape[1]:
-        return []
-    return cone.null_space(cone.rationals(matrix))
+        return False
+    return bool(cone.null_space(cone.rationals(matrix)))

@@ -33,6 +33,10 @@ ONLY_POLYTOPES = {
     **dict.fromkeys(["points", "facets", "equations", "incidence", "centre", "scale"], "arrays in scaled coordinates"),
     "separating_direction": "a witness; polygons decide exactly whether they meet",
     "enlarged": "outward by given errors; kernels of polygons do this at each step",
+    **dict.fromkeys(
+        ["space_of", "halfspace", "from_rays", "is_bounded", "directions", "lines", "recession", "bounded", "exact"],
+        "a polygon is bounded: an unbounded set of the plane is a Polytope",
+    ),
     "recomputed": "in coordinates of its own size; polygons are exact in any",
 }
 

@@ -297,12 +297,26 @@ def test_empty_sets_are_refused_where_one_with_points_is_needed() -> None:
         ).needed()
 
 
-def test_unbounded_says_along_what() -> None:
-    with pytest.raises(UnboundedPolytopeError, match="along") as caught:
-        Polytope.from_constraints([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0, 1.0, 1.0])
-    assert caught.value.direction @ [1.0, 0.0] < -0.9
-    for limits in ([1.0, 1.0], [np.inf, np.inf]):
-        with pytest.raises(UnboundedPolytopeError):
-            Polytope.from_constraints([[1.0, 0.0], [-1.0, 0.0]], limits)
-    with pytest.raises(UnboundedPolytopeError):
-        Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [0.0, 0.0], [[0.0, 1.0, 0.0]], [0.0])
+@pytest.mark.parametrize(
+    ("rows", "limits", "equations", "directions", "lines"),
+    [
+        ([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0, 1.0, 1.0], None, [[-1.0, 0.0]], 0),
+        ([[1.0, 0.0], [-1.0, 0.0]], [1.0, 1.0], None, [], 1),
+        ([[1.0, 0.0], [-1.0, 0.0]], [np.inf, np.inf], None, [], 2),
+        ([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [0.0, 0.0], [[0.0, 1.0, 0.0]], [], 1),
+    ],
+)
+def test_half_spaces_without_an_end_give_an_unbounded_set(
+    rows: list[list[float]],
+    limits: list[float],
+    equations: list[list[float]] | None,
+    directions: list[list[float]],
+    lines: int,
+) -> None:
+    found = Polytope.from_constraints(rows, limits, equations, [0.0] * len(equations or ()))
+
+    assert not found.is_bounded
+    assert found.directions.tolist() == directions
+    assert len(found.lines) == lines
+    with pytest.raises(UnboundedPolytopeError, match="unbounded along"):
+        found.centroid()

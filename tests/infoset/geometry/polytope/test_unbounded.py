@@ -1,0 +1,405 @@
+"""Unbounded polytopes: half-spaces, cones, cylinders, R^n, against known answers and exact arithmetic (PPL)."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from infoset.arrays import Floats
+from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, product
+from infoset.geometry.polytope.polyhedron import Polyhedron
+from tests.infoset.geometry.polytope.exact_sets import polyhedron
+
+QUADRANT = Polytope.from_rays([[0.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]])
+STRIP = Polytope.from_constraints([[0.0, 1.0], [0.0, -1.0]], [1.0, 1.0])
+BOX = Polytope.from_box([-1.0, -1.0], [1.0, 1.0])
+WEDGE = Polytope.from_rays([[0.0, 0.0, 1.0], [2.0, 0.0, 1.0]], [[0.0, 1.0, 0.0], [0.0, 1.0, 1.0]])
+needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+
+
+def test_half_space_has_a_line_and_a_direction() -> None:
+    half = Polytope.halfspace([3.0, 4.0], 10.0)
+
+    assert (half.dimension, len(half.vertices), len(half.lines), len(half.directions)) == (2, 1, 1, 1)
+    np.testing.assert_allclose(half.normals, [[0.6, 0.8]], rtol=1e-15)
+    np.testing.assert_allclose(half.offsets, [2.0], rtol=1e-15)
+    assert half.contains([[2.0, 1.0], [2.1, 1.0], [-1e9, 1e8]]).tolist() == [True, False, True]
+
+
+def test_half_space_needs_a_normal() -> None:
+    with pytest.raises(ValueError, match="normal must not be zero"):
+        Polytope.halfspace([0.0, 0.0], 1.0)
+
+
+@pytest.mark.parametrize("space", [1, 2, 5])
+def test_the_whole_space_has_no_facet(space: int) -> None:
+    whole = Polytope.space_of(space)
+
+    assert (whole.dimension, len(whole.normals), len(whole.lines)) == (space, 0, space)
+    assert whole.contains(np.full(space, 1e50))
+    assert whole.margin(np.zeros(space)) == np.inf
+    assert whole.volume() == np.inf
+    np.testing.assert_array_equal(whole.bounding_box(), [[-np.inf] * space, [np.inf] * space])
+
+
+def test_rays_inside_the_cone_of_others_are_left_out() -> None:
+    cone = Polytope.from_rays([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 1.0], [2.0, 3.0], [0.0, 0.0]])
+
+    assert cone.equals(QUADRANT)
+    assert cone.vertices.tolist() == [[0.0, 0.0]]
+    assert sorted(cone.directions.tolist()) == [[0.0, 1.0], [1.0, 0.0]]
+
+
+def test_opposite_rays_are_a_line() -> None:
+    found = Polytope.from_rays([[0.0, 1.0]], [[1.0, 0.0], [-2.0, 0.0]])
+
+    assert (found.dimension, len(found.lines), len(found.directions)) == (1, 1, 0)
+    np.testing.assert_array_equal(found.across, [[0.0, 1.0]])
+    np.testing.assert_array_equal(found.levels, [1.0])
+
+
+def test_points_without_rays_are_their_hull() -> None:
+    assert Polytope.from_rays(BOX.vertices, np.zeros((0, 2))).equals(BOX)
+
+
+def test_support_is_infinite_only_where_the_set_is_unbounded() -> None:
+    directions = [[-1.0, -1.0], [-1.0, 0.0], [0.0, 1.0], [1e-300, -1.0]]
+
+    assert QUADRANT.support_function(directions).tolist() == [0.0, 0.0, np.inf, np.inf]
+    assert QUADRANT.support_vector([-1.0, -2.0]).tolist() == [0.0, 0.0]
+    with pytest.raises(UnboundedPolytopeError, match="along"):
+        QUADRANT.support_vector([1.0, 0.0])
+
+
+def test_support_along_a_facet_is_finite_in_spite_of_rounding() -> None:
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        cone = Polytope.from_rays(random.normal(size=(1, 4)), random.normal(size=(4, 4)))
+        rows, limits = cone.constraints()
+        np.testing.assert_allclose(cone.support_function(rows), limits, rtol=1e-14, atol=1e-14)
+        assert cone.is_subset(cone)
+
+
+def test_intersection_with_a_box_is_bounded() -> None:
+    part = QUADRANT & BOX
+
+    assert part.is_bounded
+    assert part.equals(Polytope.from_box([0.0, 0.0], [1.0, 1.0]))
+    assert (STRIP & QUADRANT).directions.tolist() == [[1.0, 0.0]]
+    assert (QUADRANT & Polytope.halfspace([1.0, 1.0], -1.0)).is_empty
+    assert (QUADRANT & Polytope.halfspace([1.0, 1.0], 0.0)).vertices.tolist() == [[0.0, 0.0]]
+    assert (QUADRANT & Polytope.empty(2)).is_empty
+
+
+def test_cut_and_slice() -> None:
+    assert QUADRANT.cut([1.0, 1.0], upper=1.0).area() == pytest.approx(0.5, rel=1e-15)
+    assert QUADRANT.cut([1.0, 1.0], lower=1.0).vertices.shape == (2, 2)
+    np.testing.assert_array_equal(WEDGE.slice(2, 2.0).bounding_box(), [[0.0, 1.0], [2.0, np.inf]])
+
+
+def test_sums() -> None:
+    assert (QUADRANT + BOX).vertices.tolist() == [[-1.0, -1.0]]
+    assert (QUADRANT + -QUADRANT).equals(Polytope.space_of(2))
+    assert QUADRANT.add_segment([1.0, 0.0]).vertices.tolist() == [[-1.0, 0.0]]
+    assert QUADRANT.enlarged([2.0, 3.0]).vertices.tolist() == [[-2.0, -3.0]]
+    assert (QUADRANT.translate([5.0, 7.0])).vertices.tolist() == [[5.0, 7.0]]
+
+
+def test_differences() -> None:
+    assert QUADRANT.minkowski_difference(BOX).vertices.tolist() == [[1.0, 1.0]]
+    assert QUADRANT.minkowski_difference(QUADRANT).equals(QUADRANT)
+    assert BOX.minkowski_difference(QUADRANT).is_empty
+    assert STRIP.minkowski_difference(BOX).dimension == 1
+
+
+def test_maps() -> None:
+    assert ([[1.0, -1.0]] @ QUADRANT).equals(Polytope.space_of(1))
+    assert (-QUADRANT).support_function([1.0, 1.0]) == 0.0
+    assert (np.zeros((1, 2)) @ QUADRANT).vertices.tolist() == [[0.0]]
+    np.testing.assert_array_equal(QUADRANT.project(1).bounding_box(), [[0.0], [np.inf]])
+
+
+def test_preimage_of_a_singular_matrix_contains_its_null_space() -> None:
+    found = BOX.preimage([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0]], [0.5, 0.0])
+
+    np.testing.assert_allclose(found.lines @ [[1.0], [1.0], [0.0]], 0.0, atol=1e-15)
+    np.testing.assert_allclose(found.support_function([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), [0.5, 0.5], rtol=1e-14)
+    assert BOX.preimage([[0.0, 0.0], [0.0, 0.0]]).equals(Polytope.space_of(2))
+    assert BOX.preimage([[0.0, 0.0], [0.0, 0.0]], [2.0, 0.0]).is_empty
+
+
+def test_hull_with_an_unbounded_set_is_closed() -> None:
+    hull = Polytope.halfspace([0.0, 1.0], 0.0).convex_hull(Polytope.from_vertices([[0.0, 1.0]]))
+
+    assert hull.equals(Polytope.halfspace([0.0, 1.0], 1.0))
+
+
+def test_subsets() -> None:
+    assert Polytope.halfspace([-1.0, -1.0], 0.0) >= QUADRANT
+    assert not Polytope.halfspace([-1.0, -1.0], 0.0) <= QUADRANT
+    assert not QUADRANT <= BOX
+    assert Polytope.from_box([0.0, 0.0], [1e9, 1.0]) <= QUADRANT
+
+
+def test_distances() -> None:
+    assert QUADRANT.distance([-3.0, -4.0]) == 5.0
+    assert QUADRANT.closest_point([-3.0, 7.0]).tolist() == [0.0, 7.0]
+    assert QUADRANT.distance((-QUADRANT).translate([-3.0, -4.0])) == 5.0
+    assert Polytope.halfspace([0.6, 0.8], 1.0).distance(Polytope.halfspace([-0.6, -0.8], -3.0)) == pytest.approx(2.0)
+    assert STRIP.distance(STRIP) == 0.0
+
+
+def test_separating_direction_of_unbounded_sets() -> None:
+    one = Polytope.halfspace([0.0, 1.0], 0.0)
+    other = QUADRANT.translate([3.0, 1.0])
+
+    assert one.separating_direction(other) is not None
+    assert one.isdisjoint(other)
+    assert not one.isdisjoint(QUADRANT)
+
+
+def test_hausdorff_distance_is_finite_for_equal_recession_cones() -> None:
+    assert QUADRANT.hausdorff_distance(QUADRANT.translate([3.0, 0.0])) == 3.0
+    assert QUADRANT.hausdorff_distance(STRIP) == np.inf
+    assert QUADRANT.hausdorff_distance(BOX) == np.inf
+
+
+def test_recession_cone() -> None:
+    assert (QUADRANT.translate([1.0, 2.0])).recession().equals(QUADRANT)
+    assert BOX.recession().vertices.tolist() == [[0.0, 0.0]]
+    with pytest.raises(EmptyPolytopeError):
+        Polytope.empty(2).recession()
+
+
+def test_largest_ball_of_a_strip_exists_and_that_of_a_quadrant_does_not() -> None:
+    centre, radius = STRIP.chebyshev_centre()
+
+    assert radius == pytest.approx(1.0)
+    assert centre[1] == pytest.approx(0.0, abs=1e-9)
+    with pytest.raises(UnboundedPolytopeError):
+        QUADRANT.chebyshev_centre()
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        Polytope.centroid,
+        lambda one: one.sample(3),
+        lambda one: one.reduce_outward(10),
+        Polytope.to_shapely,
+    ],
+)
+def test_what_only_bounded_sets_have_is_refused(ask: Callable[[Polytope], object]) -> None:
+    with pytest.raises(UnboundedPolytopeError, match=r"unbounded along \("):
+        ask(QUADRANT)
+
+
+def test_measures_are_infinite() -> None:
+    assert (QUADRANT.volume(), QUADRANT.area(), QUADRANT.diameter()) == (np.inf, np.inf, np.inf)
+    assert Polytope.from_rays([[0.0, 0.0]], [[1.0, 2.0]]).area() == 0.0
+
+
+def test_product_with_an_unbounded_factor() -> None:
+    found = product(QUADRANT, Polytope.from_box([0.0], [1.0]))
+
+    np.testing.assert_array_equal(found.bounding_box(), [[0.0, 0.0, 0.0], [np.inf, np.inf, 1.0]])
+    assert (len(found.vertices), len(found.directions)) == (2, 2)
+
+
+def test_plot_shows_the_part_within_the_limits_of_the_axes() -> None:
+    axes = Figure().add_subplot()
+    axes.set(xlim=(-2.0, 3.0), ylim=(4.0, -1.0))
+
+    (patch,) = QUADRANT.plot(axes)
+
+    assert sorted(map(tuple, patch.get_xy()[:-1].tolist())) == [(0.0, 0.0), (0.0, 4.0), (3.0, 0.0), (3.0, 4.0)]
+    assert (axes.get_xlim(), axes.get_ylim()) == ((-2.0, 3.0), (4.0, -1.0))
+
+
+def test_unbounded_set_survives_pickling_and_says_what_it_is() -> None:
+    again = pickle.loads(pickle.dumps(QUADRANT))
+
+    assert again.equals(QUADRANT)
+    assert repr(again) == "<unbounded polytope of dimension 2 in R^2: 1 vertices, 2 facets>"
+
+
+# Against exact arithmetic ------------------------------------------------------------------------------------------
+
+
+def random_set(random: np.random.Generator, space: int) -> tuple[Polytope, Any]:
+    """Return a random set, often unbounded, flat or touching others, and the polyhedron of PPL with the same data."""
+    import ppl
+
+    largest = 2 if random.random() < 0.7 else 1000
+
+    def values(count: int) -> Floats:
+        return random.integers(-largest, largest + 1, (count, space)).astype(float)
+
+    if random.random() < 0.4:
+        rows = values(int(random.integers(1, space + 2)))
+        limits = values(len(rows))[:, 0]
+        return Polytope.from_constraints(rows, limits), polyhedron(rows, limits)
+
+    points = values(int(random.integers(1, 4)))
+    directions = values(int(random.integers(0, 4)))
+    lines = values(int(random.random() < 0.3))
+    generators = ppl.Generator_System()
+    for make, vectors in ((ppl.point, points), (ppl.ray, directions), (ppl.line, lines)):
+        for vector in vectors:
+            if vector.any() or make is ppl.point:
+                generators.insert(make(linear(vector)))
+    universe = ppl.C_Polyhedron(space, "empty")
+    universe.add_generators(generators)
+    return Polytope.from_rays(points, directions, lines), universe
+
+
+def linear(entries: Any) -> Any:
+    """Return the sum of entries times variables, in the space of all of them."""
+    import ppl
+
+    return sum((int(entry) * ppl.Variable(i) for i, entry in enumerate(entries)), start=ppl.Linear_Expression(0))
+
+
+def need_equal(found: Polytope, expected: Any, label: str) -> None:
+    """Compare a set with a polyhedron: exactly if it is unbounded, else its vertices to rounding."""
+    import ppl
+
+    assert found.is_empty == expected.is_empty(), label
+    if found.is_empty:
+        return
+    assert found.is_bounded == expected.is_bounded(), label
+    assert found.dimension == expected.affine_dimension(), label
+    if found.exact is None:
+        points = [g for g in expected.minimized_generators() if g.is_point()]
+        exact = [[int(g.coefficient(ppl.Variable(i))) / int(g.divisor()) for i in range(found.space)] for g in points]
+        near = Polytope.from_vertices(exact)
+        size = max(1.0, float(np.abs(exact).max()))
+        assert len(found.vertices) == len(exact), label
+        assert found.hausdorff_distance(near) <= 1e-11 * size, label
+        return
+    assert both_representations(found.exact) == [expected, expected], label
+    facets = sum(1 for row in expected.minimized_constraints() if row.is_inequality())
+    assert len(found.normals) == facets, label
+
+
+def both_representations(one: Polyhedron) -> list[Any]:
+    """Return the polyhedra of PPL of the half-spaces of a set, and of its points, directions and lines."""
+    import ppl
+
+    sides = ppl.C_Polyhedron(one.space, "universe")
+    for row in one.half_spaces:
+        sides.add_constraint(linear(row[:-1]) <= row[-1])
+
+    generators = ppl.Generator_System()
+    for point in one.points:
+        generators.insert(ppl.point(linear(point[:-1]), point[-1]))
+    for direction in one.directions:
+        generators.insert(ppl.ray(linear(direction[:-1])))
+    for line in one.lines:
+        generators.insert(ppl.line(linear(line[:-1])))
+    sums = ppl.C_Polyhedron(one.space, "empty")
+    sums.add_generators(generators)
+    return [sides, sums]
+
+
+def is_exact(one: Polytope, expected: Any) -> bool:
+    """Whether a set is stored without rounding; vertices or facets of a bounded one may not be floats."""
+    return one.is_empty or both_representations(one._polyhedron) == [expected, expected]
+
+
+def mapped(given: Any, matrix: Floats, offset: Floats) -> Any:
+    """Return the image of a polyhedron: {y: y = matrix x + offset for an x of it}, by projection."""
+    import ppl
+
+    m = len(matrix)
+    result = ppl.C_Polyhedron(m, "universe")
+    result.concatenate_assign(given)
+    for j in range(m):
+        result.add_constraint(linear([*np.eye(m)[j], *-matrix[j]]) == int(offset[j]))
+    result.remove_higher_space_dimensions(m)
+    return result
+
+
+def source_of(given: Any, matrix: Floats, offset: Floats) -> Any:
+    """Return the preimage of a polyhedron: {x: matrix x + offset in it}, by projection."""
+    import ppl
+
+    m, n = matrix.shape
+    result = ppl.C_Polyhedron(n, "universe")
+    result.concatenate_assign(given)
+    for j in range(m):
+        result.add_constraint(linear([*-matrix[j], *np.eye(m)[j]]) == int(offset[j]))
+    result.remove_higher_space_dimensions(n)
+    return result
+
+
+def summed(one: Any, other: Any) -> Any:
+    """Return {x + y}: the image of the product."""
+    import ppl
+
+    both = ppl.C_Polyhedron(one)
+    both.concatenate_assign(other)
+    space = one.space_dimension()
+    return mapped(both, np.hstack([np.eye(space), np.eye(space)]), np.zeros(space))
+
+
+def difference(one: Any, other: Any) -> Any:
+    """Return {x: x + y in one for all y of the other}: each half-space holds for the lowest y."""
+    import ppl
+
+    space = one.space_dimension()
+    result = ppl.C_Polyhedron(space, "universe")
+    for row in one.minimized_constraints():
+        normal = [int(row.coefficient(ppl.Variable(i))) for i in range(space)]
+        for sign in (1, -1) if row.is_equality() else (1,):
+            # sign (normal . x + b) >= 0 must hold at x + y: the least value of sign normal . y counts.
+            terms = linear([sign * entry for entry in normal])
+            least = other.minimize(terms)
+            if not least["bounded"]:
+                return ppl.C_Polyhedron(space, "empty")
+            low, divisor = int(least["inf_n"]), int(least["inf_d"])
+            limit = sign * int(row.inhomogeneous_term())
+            result.add_constraint(divisor * terms + divisor * limit + low >= 0)
+    return result
+
+
+@needs_ppl
+@pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("space", [2, 3])
+def test_operations_equal_exact_ones(space: int, count: int) -> None:
+    import ppl
+
+    unbounded = compared = 0
+    for seed in range(count):
+        random = np.random.default_rng([seed, space])
+        (one, first), (two, second) = random_set(random, space), random_set(random, space)
+        unbounded += not one.is_bounded
+        need_equal(one, first, f"set {seed}")
+        if not (is_exact(one, first) and is_exact(two, second)):
+            continue
+        compared += 1
+        matrix = random.integers(-2, 3, (int(random.integers(1, 4)), space)).astype(float)
+        offset = random.integers(-2, 3, len(matrix)).astype(float)
+        back = random.integers(-2, 3, (space, int(random.integers(1, 4)))).astype(float)
+        back_offset = random.integers(-2, 3, space).astype(float)
+
+        common = ppl.C_Polyhedron(first)
+        common.intersection_assign(second)
+        need_equal(one & two, common, f"intersection {seed}")
+        need_equal(one.preimage(back, back_offset), source_of(first, back, back_offset), f"preimage {seed}")
+        if one.is_empty or two.is_empty:
+            continue
+        hull = ppl.C_Polyhedron(first)
+        hull.poly_hull_assign(second)
+        need_equal(one.convex_hull(two), hull, f"hull {seed}")
+        need_equal(one + two, summed(first, second), f"sum {seed}")
+        need_equal(one.minkowski_difference(two), difference(first, second), f"difference {seed}")
+        need_equal(one.affine_map(matrix, offset), mapped(first, matrix, offset), f"image {seed}")
+    assert unbounded > count / 2
+    assert compared > count / 2
