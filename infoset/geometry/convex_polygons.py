@@ -26,6 +26,7 @@ from infoset.geometry._set_arguments import (
 )
 from infoset.geometry.convex_set import ConvexSet, need_convex_set
 from infoset.geometry.drawing import draw_polygons
+from infoset.geometry.zonotope_arrays import ZonotopeArrays, need_zonotope
 from infoset.limits import Limits, real_values, shown
 
 if TYPE_CHECKING:
@@ -199,19 +200,20 @@ class ConvexPolygons(ConvexSet):
         return cls.from_points(middle[..., None, :] + radii[..., None, None] * unit)
 
     @classmethod
-    def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Self:
-        """Return {centre + sum of z_i generators[i]: -1 <= z_i <= 1}, with a row of `generators` for each i.
+    def from_zonotope(cls, zonotope: ZonotopeArrays) -> Self:
+        """Return a `Zonotope` of R^2 as a single polygon. O(g^2) for g generators; coordinates are rounded g times.
 
-        `centre` has the shape (2,) or (..., 2), and `generators` (g, 2) or (..., g, 2). O(g^2); each coordinate is
-        rounded g times.
+        Raises
+        ------
+        ValueError
+            If the zonotope is in another space.
         """
-        middle = finite_values("centre", centre, "...", 2)
-        rows = finite_values("generators", generators, "...", "g", 2)
-        shape = np.broadcast_shapes(middle.shape[:-1], rows.shape[:-2])
+        if need_zonotope("zonotope", zonotope).space != 2:
+            raise ValueError(f"zonotope must be in R^2: got {zonotope!r}")
 
-        centres = cls.unchecked(middle[..., None, :], np.ones(middle.shape[:-1], dtype=np.int64)).broadcast_to(shape)
-        halves = np.broadcast_to(rows, (*shape, *rows.shape[-2:])).reshape(centres.counts.size, *rows.shape[-2:])
-        return centres._make(2 * rows.shape[-2], kernels.add_segments, np.ascontiguousarray(halves))
+        centre = cls.unchecked(zonotope.centre[None], np.ones((), dtype=np.int64))
+        halves = zonotope.generators[None].copy()
+        return centre._make(2 * len(zonotope.generators), kernels.add_segments, halves)
 
     @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Self:

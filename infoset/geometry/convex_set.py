@@ -13,7 +13,7 @@ from infoset.limits import shown
 
 
 class ConvexSet:
-    """What `ConvexPolygons` and `Polytope` share: operators and equality in terms of their methods.
+    """What `ConvexPolygons`, `Polytope` and `Zonotope` share: operators and equality in terms of their methods.
 
     An operation of sets of two classes is that of `Polytope` for both: each class has the method `polytope`.
     """
@@ -28,6 +28,11 @@ class ConvexSet:
     minkowski_sum: Any
     polytope: Any
 
+    @property
+    def space(self) -> int:
+        """Dimension n of the space."""
+        return int(self.vertices.shape[-1])
+
     def equals(self, other: ConvexSet, tolerance: float = 0.0) -> Any:
         """Return whether each set is a subset of the other one, with the tolerance of `is_subset`."""
         return self.is_subset(other, tolerance) & other.is_subset(self, tolerance)
@@ -39,8 +44,7 @@ class ConvexSet:
 
     def translate(self, offset: ArrayLike) -> Self:
         """Return the set moved by an offset, shape (n,), at the cost of `affine_map`."""
-        space = self.vertices.shape[-1]
-        moved: Self = self.affine_map(np.eye(space), finite_values("offset", offset, space))
+        moved: Self = self.affine_map(np.eye(self.space), finite_values("offset", offset, self.space))
         return moved
 
     # The second signatures are those of sets of two classes: mypy looks only at this class, where `Self` is any set.
@@ -63,7 +67,7 @@ class ConvexSet:
     def __mul__(self, factor: float) -> Self:
         if not isinstance(factor, Real):
             return NotImplemented
-        return self.linear_map(float(factor) * np.eye(self.vertices.shape[-1]))
+        return self.linear_map(float(factor) * np.eye(self.space))
 
     __rmul__ = __mul__
 

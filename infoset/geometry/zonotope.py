@@ -1,22 +1,48 @@
-"""Zonotopes: boxes, disturbances and initial sets of observers."""
+"""Zonotopes: boxes, disturbances and initial sets of observers, and sets whose generators are carried."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain, combinations, islice
+from math import comb
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.arrays import Floats
-from infoset.geometry._set_arguments import box_ends, finite_values
+from infoset.arrays import Flags, Floats
+from infoset.geometry._set_arguments import (
+    axis_numbers,
+    bound_values,
+    finite_values,
+    need_set,
+    not_negative,
+    offset_values,
+    present_axes,
+)
+from infoset.geometry.convex_set import ConvexSet
+from infoset.geometry.double_words import EPS, affine_image
+from infoset.geometry.polytope import EmptyPolytopeError, Polytope
+from infoset.geometry.polytope._measures import triangle_of
+from infoset.geometry.polytope.arrays import FLAT
+from infoset.geometry.polytope.generators import Span, exact_determinant
+from infoset.geometry.zonotope_arrays import ZonotopeArrays, box_generators
+from infoset.geometry.zonotope_membership import are_inside
+from infoset.limits import Limits, real_values, shown
+
+_MAX_SUBSETS = 1_000_000
+"""Number of determinants up to which `volume` is their sum: about a second."""
+_SUBSETS_AT_ONCE = 20_000
+"""Number of determinants that are computed together: a few MB."""
+_SINGULAR = 1e-12
+"""Share of the largest singular value below which strips count as dependent; any gain is sound."""
 
 
-@dataclass(frozen=True, eq=False, init=False)
-class Zonotope:
+class Zonotope(ZonotopeArrays, ConvexSet):
     """The set of centre + t_1 g_1 + ... + t_m g_m with all -1 <= t_i <= 1.
 
-    An argument of `LinearObserver`. For operations on sets, `Polytope.from_zonotope(z.centre, z.generators)` or the
-    same method of `ConvexPolygons` converts it. `A @ Z` is the linear map.
+    The generators are the set: sums and maps take O(m n) steps in any dimension, where a `Polytope` has O(m^(n - 1))
+    facets. It is also an argument of `LinearObserver`. It may be flat, a segment or a point, and is never empty.
 
     Parameters
     ----------
@@ -29,32 +55,347 @@ class Zonotope:
     ------
     ValueError
         If the shapes do not agree, or a number is not finite.
+
+    Notes
+    -----
+    Operations return new objects and have the names of those of `Polytope`. Sums, maps, projections and multiples of
+    zonotopes are zonotopes, whose centre and generators are rounded once, to nearest. `reduce_outward`, `cut` and
+    `bounding_box` are rounded outward: they contain the set of the stored numbers, or its part. What is not a zonotope
+    is computed by `polytope()`, which is rounded outward too, and may take long in more than three dimensions:
+    intersection, hull, difference, `margin`, `is_subset` and `equals`. Then the other set is a zonotope or a polytope.
+
+    Operators: `Z + Y` (Minkowski sum), `Z + vector` (translation), `A @ Z` (linear map), `2 * Z`, `-Z`, `point in Z`,
+    `Z & Y` (a `Polytope`), `Z <= Y` (subset, to rounding). `Z == Y` compares objects; `equals` compares sets.
     """
 
-    centre: Floats
-    generators: Floats
+    # Sets -----------------------------------------------------------------------------------------------------------
 
-    __array_ufunc__ = None
+    def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Zonotope:
+        """Return {matrix x + offset}, with a matrix of shape (k, n), singular or not, and an offset of shape (k,) or 0.
 
-    def __init__(self, centre: ArrayLike, generators: ArrayLike) -> None:
-        middle = finite_values("centre", centre, "n")
-        object.__setattr__(self, "centre", middle)
-        object.__setattr__(self, "generators", finite_values("generators", generators, "g", len(middle)))
+        O(m n k); centre and generators are rounded once.
+        """
+        rows = finite_values("matrix", matrix, "m", self.space).copy()  # kernels are compiled once, for such arrays
+        moved = offset_values(offset, len(rows)).copy()
+        centre, _ = affine_image(self.centre[None].copy(), rows, moved)
+        generators, _ = affine_image(self.generators.copy(), rows, np.zeros(len(rows)))
+        return Zonotope(centre[0], generators)
 
-    @classmethod
-    def box(cls, lower: ArrayLike, upper: ArrayLike) -> Zonotope:
-        """Return {x: lower <= x <= upper}; equal ends give a flat box."""
-        minimum, maximum = box_ends(lower, upper, "n")
-        centre = 0.5 * minimum + 0.5 * maximum
-        # Rounding of the centre must not lose an end.
-        half = np.maximum(maximum - centre, centre - minimum)
-        return cls(centre, np.diag(half)[half > 0.0])
+    def minkowski_sum(self, other: Zonotope) -> Zonotope:
+        """Return {x + y: x in the set, y in the other}: all generators of both. O(m n).
 
-    def __rmatmul__(self, matrix: ArrayLike) -> Zonotope:
-        rows = finite_values("matrix", matrix, "m", self.space)
-        return Zonotope(rows @ self.centre, self.generators @ rows.T)
+        Raises
+        ------
+        ValueError
+            If the other set is in another space.
+        """
+        if need_set("other", other, Zonotope).space != self.space:
+            raise ValueError(f"other must be a zonotope in R^{self.space}, as this one: got {other!r}")
+        return Zonotope(self.centre + other.centre, np.vstack([self.generators, other.generators]))
+
+    def add_segment(self, half: ArrayLike) -> Zonotope:
+        """Return the Minkowski sum with the segment from -half to +half, shape (n,): one more generator. Exact."""
+        along = finite_values("half", half, self.space)
+        if not along.any():
+            return self
+        return Zonotope(self.centre, np.vstack([self.generators, along]))
+
+    def enlarged(self, by: ArrayLike) -> Zonotope:
+        """Return {x + e: |e_i| <= by_i}, with `by` of the shape (n,): up to n more generators. Exact."""
+        margin = finite_values("by", by, self.space)
+        not_negative("by", float(margin.min()))
+        if not margin.any():
+            return self
+        return Zonotope(self.centre, np.vstack([self.generators, box_generators(margin)]))
+
+    def project(self, axes: ArrayLike) -> Zonotope:
+        """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions.
+
+        Exact; generators that become zero go.
+        """
+        numbers = axis_numbers(axes, self.space, self.space)
+        rows = self.generators[:, numbers]
+        return Zonotope(self.centre[numbers], rows[rows.any(axis=1)])
+
+    def reduce_outward(self, order: float) -> Zonotope:
+        """Return a zonotope with at most `order` n generators (`order` >= 1) that contains the set.
+
+        The longest generators stay. The others, those with the least |g|_1 - |g|_inf in units of the widths of the
+        set, become a box around their sum. O(m n).
+
+        References
+        ----------
+        A. Girard, Reachability of uncertain linear systems using zonotopes, in HSCC (2005).
+        """
+        Limits(minimum=1.0).need("order", order)
+        if len(self.generators) <= order * self.space:
+            return self
+        widths = np.abs(self.generators).sum(axis=0)
+        sizes = np.abs(self.generators) / np.where(widths > 0.0, widths, 1.0)
+        ranks = np.argsort(sizes.max(axis=1) - sizes.sum(axis=1), kind="stable")
+        kept = int(order * self.space) - self.space
+        box = box_generators(_sums_up(self.generators[ranks[kept:]]))
+        return Zonotope(self.centre, np.vstack([self.generators[np.sort(ranks[:kept])], box]))
+
+    def cut(
+        self,
+        normals: ArrayLike,
+        lower: ArrayLike = -np.inf,
+        upper: ArrayLike = np.inf,
+        *,
+        slack_ulp: float = 0.0,
+    ) -> Zonotope:
+        """Return an outer set: a zonotope that contains the part in strips lower <= normals x <= upper.
+
+        The part itself, which is no zonotope, is that of `polytope().cut`. The result need not be inside the strips,
+        nor inside this set; it is the one with the smallest sum of squares of the generators that a linear correction
+        by the strips gives. It is this set if the strips contain it.
+
+        `normals`, shape (n,) or (k, n), have any length. The bounds have the shape () or (k,); infinite ones give
+        half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x. A strip has one
+        more generator, and rounding up to n: see `reduce_outward`. O((m + n) n k + k^3) for k strips.
+
+        Raises
+        ------
+        EmptyPolytopeError
+            If a strip is empty or certainly misses the set. Of several strips that only together miss it, nothing is
+            known.
+
+        Notes
+        -----
+        x = c + G t and y = C x + v with |v| <= V give x in c + K (y - C c) + (I - K C) G [-1, 1]^m + K diag(V)
+        [-1, 1]^k for every matrix K; K = P C' (C P C' + diag V^2)^-1 with P = G G' has the smallest sum of squares.
+
+        References
+        ----------
+        T. Alamo, J. M. Bravo and E. F. Camacho, Guaranteed state estimation by zonotopes, Automatica 41 (2005).
+        C. Combastel, Zonotopes and Kalman observers, Automatica 55 (2015).
+        """
+        rows = real_values("normals", normals)
+        rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
+        minimum = bound_values("lower", lower, (), (len(rows),))
+        most = bound_values("upper", upper, (), (len(rows),))
+
+        terms = np.abs(rows) @ (np.abs(self.centre) + np.abs(self.generators).sum(axis=0))
+        wider = not_negative("slack_ulp", slack_ulp) * EPS * terms
+        # Ends of the set along the normals, farther out than rounding.
+        rounding = self._operations * EPS * terms
+        middles = rows @ self.centre
+        reach = np.abs(rows @ self.generators.T).sum(axis=1) + rounding
+        low = np.maximum(minimum - wider, middles - reach)
+        high = np.minimum(most + wider, middles + reach)
+        if (low > high).any():
+            worst = int(np.argmax(low - high))
+            least, greatest = (np.broadcast_to(bound, len(rows))[worst] for bound in (minimum, most))
+            raise EmptyPolytopeError(f"no point of the zonotope is in strip {worst}, from {least:g} to {greatest:g}")
+        is_cut = (low > middles - reach) | (high < middles + reach)
+        if not is_cut.any():
+            return self
+        return self._corrected(rows[is_cut], low[is_cut], high[is_cut])
+
+    def _corrected(self, rows: Floats, low: Floats, high: Floats) -> Zonotope:
+        """Return the outer set of the part in strips low <= rows x <= high, by the gain in the notes of `cut`."""
+        y = 0.5 * low + 0.5 * high
+        # Rounding of the middle must not lose an end.
+        half = np.nextafter(np.maximum(high - y, y - low), np.inf)
+
+        # In units of the widths of the strips' normals the matrix to invert has ones on its diagonal.
+        images = self.generators @ rows.T
+        covariance = images.T @ images + np.diag(half**2)
+        units = np.sqrt(np.diag(covariance))
+        units = np.where(units > 0.0, units, 1.0)
+        inverse = np.linalg.pinv(covariance / np.outer(units, units), rcond=_SINGULAR, hermitian=True)
+        gain = self.generators.T @ (images / units) @ inverse / units
+
+        error = y - rows @ self.centre
+        centre = self.centre + gain @ error
+        remaining = np.eye(self.space) - gain @ rows
+        generators = np.vstack([self.generators @ remaining.T, (gain * half).T])
+
+        # Each number is a sum of at most so many products, of these sizes.
+        factor = np.eye(self.space) + np.abs(gain) @ np.abs(rows)
+        sizes = np.abs(self.generators).sum(axis=0)
+        terms = factor @ (np.abs(self.centre) + sizes) + np.abs(gain) @ (np.abs(y) + half)
+        unsure = (self._operations + len(rows)) * EPS * terms
+        return Zonotope(centre, generators[generators.any(axis=1)]).enlarged(unsure)
 
     @property
-    def space(self) -> int:
-        """Dimension n of the space."""
-        return len(self.centre)
+    def _operations(self) -> int:
+        """Number of roundings in a sum over generators of scalar products, at most."""
+        return sum(self.generators.shape) + 8
+
+    def polytope(self) -> Polytope:
+        """Return the set as a `Polytope`, by `Polytope.from_zonotope`; it is kept."""
+        return self._polytope
+
+    @cached_property
+    def _polytope(self) -> Polytope:
+        return Polytope.from_zonotope(self)
+
+    @cached_property
+    def _span(self) -> Span:
+        """Scaled coordinates and the affine hull."""
+        return Span(self.centre, self.generators)
+
+    @cached_property
+    def _in_own(self) -> Zonotope:
+        """The projection on the coordinates that are independent in the set."""
+        return self if self.dimension == self.space else self.project(self._span.own)
+
+    def intersection(self, *others: Zonotope | Polytope) -> Polytope:
+        """Return the intersection with one or more zonotopes or polytopes, by `polytope()`."""
+        return self.polytope().intersection(*map(_polytope_of, others))
+
+    def convex_hull(self, *others: Zonotope | Polytope) -> Polytope:
+        """Return the convex hull of the union with one or more zonotopes or polytopes, by `polytope()`."""
+        return self.polytope().convex_hull(*map(_polytope_of, others))
+
+    def minkowski_difference(self, other: Zonotope | Polytope) -> Polytope:
+        """Return the Pontryagin difference {x: x + y in the set for all y in the other}, by `polytope()`."""
+        return self.polytope().minkowski_difference(_polytope_of(other))
+
+    # Measures ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def dimension(self) -> int:
+        """Dimension of the affine hull."""
+        return len(self._span.own)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the set is empty: never."""
+        return False
+
+    @property
+    def vertices(self) -> Floats:
+        """Vertices, shape (v, n), by `polytope()`."""
+        return self.polytope().vertices
+
+    def support_function(self, directions: ArrayLike) -> Floats:
+        """Return max direction . x, shape (...), for `directions`, shape (..., n). O(m n)."""
+        rows = finite_values("directions", directions, "...", self.space)
+        return np.asarray(rows @ self.centre + np.abs(rows @ self.generators.T).sum(axis=-1))
+
+    def support_vector(self, direction: ArrayLike) -> Floats:
+        """Return a vertex farthest along a `direction`, both of shape (n,). O(m n)."""
+        row = finite_values("direction", direction, self.space)
+        heights = self.generators @ row
+        # A generator across the direction counts by its first coordinate that is not zero: the point is a vertex.
+        first = (self.generators != 0.0).argmax(axis=1)
+        leading = np.take_along_axis(self.generators, first[:, None], axis=1)[:, 0]
+        signs = np.sign(np.where(heights != 0.0, heights, leading))
+        return np.asarray(self.centre + signs @ self.generators)
+
+    def bounding_box(self) -> tuple[Floats, Floats]:
+        """Return the minimum and the maximum coordinates, each of shape (n,), rounded outward. O(m n)."""
+        ones = np.ones((1, len(self.generators)))
+        rows = np.ascontiguousarray(np.abs(self.generators).T)
+        upper, high = affine_image(ones, rows, self.centre.copy())
+        lower, low = affine_image(ones, -rows, self.centre.copy())
+        return (
+            np.where(low > 0.0, np.nextafter(lower[0], -np.inf), lower[0]),
+            np.where(high > 0.0, np.nextafter(upper[0], np.inf), upper[0]),
+        )
+
+    def margin(self, points: ArrayLike) -> Floats:
+        """Return the minimum distance of `points`, shape (..., n), from the facets; `Polytope.margin` of `polytope()`.
+
+        `contains` needs no facets.
+        """
+        return self.polytope().margin(points)
+
+    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> Flags:
+        """Return whether `points`, shape (..., n), are in the set, to rounding, or within a `tolerance` on each axis.
+
+        In the plane it is decided by the sides. In more dimensions, a point that is not decided by the bounding box or
+        by coefficients of least squares needs a linear program (HiGHS, about 2 ms). It only proposes coefficients, or a
+        plane between the point and the set; a point is outside if the plane holds to rounding. The facets are not
+        needed.
+        """
+        x = finite_values("points", points, "...", self.space)
+        if not_negative("tolerance", tolerance):
+            return self.enlarged(np.full(self.space, float(tolerance))).contains(x)
+        span = self._span
+        listed = x.reshape(-1, self.space)
+        away = (listed - self.centre) / span.scale
+        terms = np.abs(listed) + np.abs(self.centre) + np.abs(self.generators).sum(axis=0)
+        rounding = self._operations * EPS * terms / span.scale
+
+        # In the affine hull of a flat set, or as near to it as its own points may be.
+        inner = away[:, span.own]
+        missing = np.abs(away[:, span.others] - inner @ span.slopes.T)
+        allowed = rounding[:, span.others] + rounding[:, span.own] @ np.abs(span.slopes).T + FLAT
+        found = (missing <= allowed).all(axis=1)
+
+        if self.dimension > 2:
+            # Coordinates in which no set is thin, for the program.
+            back = np.linalg.inv(span.base)
+            unsure = rounding[found][:, span.own] @ np.abs(back)
+            found[found] = are_inside(inner[found] @ back, span.coefficients, span.basis, unsure)
+        elif self.dimension > 0:
+            found[found] = self._in_own.polytope().contains(listed[found][:, span.own])
+        return np.asarray(found.reshape(x.shape[:-1]))
+
+    def is_subset(self, other: Zonotope | Polytope, tolerance: float = 0.0) -> bool:
+        """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
+        return self.polytope().is_subset(_polytope_of(other), tolerance)
+
+    def volume(self) -> float:
+        """Return the volume within the affine hull, of its dimension d; 1 for a point.
+
+        It is 2^d times the sum of the determinants, without signs, of all d generators out of m; of the polytope if
+        these are over 1e6.
+        """
+        span = self._span
+        space = self.dimension
+        if not space:
+            return 1.0
+        if comb(len(self.generators), space) > _MAX_SUBSETS:
+            return self.polytope().volume()
+        # In coordinates along the basis a determinant is exact to rounding of the volume, also of a thin set.
+        total = 0.0
+        subsets = combinations(range(len(self.generators)), space)
+        while chosen := list(islice(subsets, _SUBSETS_AT_ONCE)):
+            numbers = np.fromiter(chain.from_iterable(chosen), np.int64).reshape(-1, space)
+            total += float(np.abs(np.linalg.det(span.coefficients[numbers])).sum())
+        stretch = np.prod(np.abs(np.diag(triangle_of(span.steps)[0])))
+        return float(2.0**space * total * exact_determinant(span.base) * stretch)
+
+    def area(self) -> float:
+        """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
+        return self.polytope().area()
+
+    def centroid(self) -> Floats:
+        """Return the centroid, shape (n,): the centre."""
+        return self.centre.copy()
+
+    def plot(self, ax: Any = None, **style: Any) -> list[Any]:
+        """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`.
+
+        Returns
+        -------
+        list of matplotlib.patches.Polygon
+            The artists.
+        """
+        corners = self.polytope()._polygon().polygon()
+        return list(present_axes(ax).fill(*corners.T, **style))
+
+    def __and__(self, other: Zonotope | Polytope) -> Any:
+        return self.intersection(other) if isinstance(other, Zonotope | Polytope) else NotImplemented
+
+    __rand__ = __and__
+
+
+def _polytope_of(other: Zonotope | Polytope) -> Polytope:
+    """Return a zonotope or a polytope as a polytope."""
+    if isinstance(other, Zonotope):
+        return other.polytope()
+    if not isinstance(other, Polytope):
+        raise TypeError(f"other must be a Zonotope or a Polytope: got {shown(other)}")
+    return other
+
+
+def _sums_up(rows: Floats) -> Floats:
+    """Return the sums of the absolute values of each column, rounded up."""
+    sums, lost = affine_image(np.ones((1, len(rows))), np.ascontiguousarray(np.abs(rows).T), np.zeros(rows.shape[1]))
+    return np.asarray(np.where(lost > 0.0, np.nextafter(sums[0], np.inf), sums[0]))

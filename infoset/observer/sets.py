@@ -324,7 +324,7 @@ def polygon_of(shape: Set) -> ConvexPolygons:
         return shape
     if isinstance(shape, Polytope):
         return ConvexPolygons.from_points(shape.vertices)
-    return ConvexPolygons.from_zonotope(shape.centre, shape.generators)
+    return ConvexPolygons.from_zonotope(shape)
 
 
 def polytope_of(shape: Set) -> Polytope:
@@ -332,7 +332,7 @@ def polytope_of(shape: Set) -> Polytope:
     if isinstance(shape, Polytope):
         return shape
     if isinstance(shape, Zonotope):
-        return Polytope.from_zonotope(shape.centre, shape.generators)
+        return shape.polytope()
     return Polytope.from_vertices(shape.polygon())
 
 

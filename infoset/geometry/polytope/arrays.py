@@ -173,15 +173,6 @@ class PolytopeArrays:
         return cls.from_vertices(middle + size * rows)
 
     @classmethod
-    def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Self:
-        """Return {centre + sum of z_i generators[i]: |z_i| <= 1}, generators of shape (g, n). O(g^(n-1)) vertices."""
-        middle = finite_values("centre", centre, "n")
-        zonotope = cls.from_vertices(middle[None, :])
-        for row in finite_values("generators", generators, "g", len(middle)):
-            zonotope = cls.from_vertices(np.vstack([zonotope.vertices - row, zonotope.vertices + row]))
-        return zonotope
-
-    @classmethod
     def from_shapely(cls, geometry: BaseGeometry) -> Self:
         """Return a convex shapely Point, LineString or Polygon as a set of R^2; see `ConvexPolygons.from_shapely`."""
         ring = conversion.ring_of_geometry(geometry)

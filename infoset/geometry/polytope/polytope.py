@@ -28,8 +28,10 @@ from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, simplices_of, triangle_of
 from infoset.geometry.polytope.arrays import PolytopeArrays
 from infoset.geometry.polytope.errors import UncertainHullError
+from infoset.geometry.polytope.generators import polytope_of
 from infoset.geometry.polytope.nearest import nearest_pair
 from infoset.geometry.polytope.reduction import reduced_outward
+from infoset.geometry.zonotope_arrays import ZonotopeArrays, need_zonotope
 from infoset.limits import Limits, real_values
 
 _CLEAR_PIVOT = 1e-6
@@ -72,6 +74,18 @@ class Polytope(PolytopeArrays, ConvexSet):
     def polytope(self) -> Polytope:
         """Return the set itself; every class of sets has this method."""
         return self
+
+    @classmethod
+    def from_zonotope(cls, zonotope: ZonotopeArrays) -> Polytope:
+        """Return a `Zonotope` as a polytope, which contains it and exceeds it by about 1e-12 of its size.
+
+        Parallel generators are summed first. In up to three dimensions of the affine hull, all facets and vertices of
+        the g generators follow from signs of determinants: O(g^2) facets, O(g^3). In more, or where rounding decides
+        which generators are coplanar, it is a chain of `add_segment`.
+        """
+        given = need_zonotope("zonotope", zonotope)
+        found: Polytope = polytope_of(cls, given.centre, given.generators)
+        return found
 
     def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0, *, hull: bool = True) -> Polytope:
         """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.

@@ -16,7 +16,7 @@ VOCABULARY = {
     "vertices", "constraints", "area", "volume", "centroid", "chebyshev_centre", "bounding_box", "diameter",
     "hausdorff_distance", "distance", "closest_point", "project", "slice", "sample", "reduce_outward", "plot",
     "add_segment", "from_vertices", "from_constraints", "from_box", "from_ball", "from_zonotope", "from_shapely",
-    "to_shapely", "margin", "empty", "isdisjoint", "polytope",
+    "to_shapely", "margin", "empty", "isdisjoint", "polytope", "space",
 }  # fmt: skip
 """The names of both classes."""
 
@@ -28,7 +28,7 @@ ONLY_POLYGONS = {
 }
 ONLY_POLYTOPES = {
     **dict.fromkeys(["normals", "offsets", "across", "levels"], "stored facets and affine hull; polygons compute them"),
-    **dict.fromkeys(["space", "dimension"], "a polygon is in R^2, and its number of vertices shows its dimension"),
+    "dimension": "the number of vertices of a polygon shows its dimension",
     "needed": "the set itself, or an error: members of a batch that are empty are masked",
     **dict.fromkeys(["points", "facets", "equations", "incidence", "centre", "scale"], "arrays in scaled coordinates"),
     "separating_direction": "a witness; polygons decide exactly whether they meet",

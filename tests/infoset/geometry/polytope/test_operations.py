@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from infoset import ConvexPolygons
+from infoset import ConvexPolygons, Zonotope
 from infoset.arrays import Floats
 from infoset.geometry.polytope import EmptyPolytopeError, Polytope
 from infoset.geometry.polytope import double_description as dd
@@ -265,11 +265,11 @@ def test_balls_and_zonotopes() -> None:
     for around in (True, False):
         assert Polytope.from_ball([1e10, 1.0], 1e-8, outer=around).dimension < 2
     generators = np.random.default_rng(0).normal(size=(5, 3))
-    zonotope = Polytope.from_zonotope([1.0, 2.0, 3.0], generators)
+    zonotope = Polytope.from_zonotope(Zonotope([1.0, 2.0, 3.0], generators))
     directions = np.random.default_rng(1).normal(size=(20, 3))
     wanted = directions @ [1.0, 2.0, 3.0] + np.abs(directions @ generators.T).sum(axis=1)
     np.testing.assert_allclose(zonotope.support_function(directions), wanted, rtol=1e-12)
-    assert Polytope.from_zonotope([1.0, 2.0], []).dimension == 0
+    assert Polytope.from_zonotope(Zonotope([1.0, 2.0], [])).dimension == 0
 
 
 # Published cases ----------------------------------------------------------------------------------------------------

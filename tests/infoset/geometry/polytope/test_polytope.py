@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from infoset import Zonotope
 from infoset.arrays import Floats
 from infoset.geometry.polytope import (
     EmptyPolytopeError,
@@ -262,7 +263,7 @@ def test_coordinates_that_are_equal_at_all_points_stay_exact(seed: int) -> None:
     points = 1e9 * np.random.default_rng(seed).normal(size=(9, 5))
     points[:, [1, 3]] = 5e-9, 0.0
     steps = points - points[0]
-    for flat in (Polytope.from_vertices(points), Polytope.from_zonotope(points[0], steps)):
+    for flat in (Polytope.from_vertices(points), Polytope.from_zonotope(Zonotope(points[0], steps))):
         assert flat.dimension == 3
         np.testing.assert_array_equal(flat.vertices[:, [1, 3]], np.tile([5e-9, 0.0], (len(flat.vertices), 1)))
         assert not flat.normals[:, [1, 3]].any()
