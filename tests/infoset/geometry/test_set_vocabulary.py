@@ -1,4 +1,4 @@
-"""`ConvexPolygons` and `Polytope` have the same names, and each operation refuses mistaken arguments clearly."""
+"""`ConvexPolygons`, `Polytope` and `Zonotope` share names, and each operation refuses mistaken arguments clearly."""
 
 from __future__ import annotations
 
@@ -41,6 +41,13 @@ ONLY_POLYTOPES = {
 }
 
 
+ONLY_ZONOTOPES = {
+    "generators": "the stored set, with its centre; polytopes store vertices and facets",
+    "box": "a centre and generators along axes",
+    "polytope": "conversion; the reverse does not exist",
+}
+
+
 def names(kind: type) -> set[str]:
     fields = {name for base in kind.__mro__ for name in getattr(base, "__annotations__", {})}
     return {name for name in {*dir(kind), *fields} if not name.startswith("_")}
@@ -50,6 +57,11 @@ def test_both_classes_have_the_same_names() -> None:
     assert names(ConvexPolygons) & names(Polytope) >= VOCABULARY
     assert names(ConvexPolygons) - names(Polytope) == set(ONLY_POLYGONS)
     assert names(Polytope) - names(ConvexPolygons) == set(ONLY_POLYTOPES)
+
+
+def test_zonotopes_have_names_of_polytopes() -> None:
+    assert names(Zonotope) - names(Polytope) == set(ONLY_ZONOTOPES)
+    assert names(Zonotope) - set(ONLY_ZONOTOPES) >= {"affine_map", "cut", "enlarged", "reduce_outward", "volume"}
 
 
 def test_projections_and_slices_take_a_number_or_several() -> None:
