@@ -67,7 +67,7 @@ nitpick_ignore = [
         "infoset.geometry.convex_set": ("ConvexSet",),
         "infoset.geometry.polytope.nearest": ("NearestPair",),
         "infoset.sim.scenario": ("_Speed",),
-        "infoset.observer.sets": ("Polygons", "Polytopes", "Motion"),
+        "infoset.observer.sets": ("Polygons", "Polytopes", "Sets", "Motion"),
         "infoset.observer.steps": ("Strips",),
         "infoset.rendezvous.relative_motion.time_varying": ("HeldSegment",),
         "infoset.limits": ("Line",),

@@ -6,23 +6,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry._set_arguments import finite_values
+from infoset.geometry._set_arguments import bound_values, finite_values, present_axes
 from infoset.geometry.convex_polygons import ConvexPolygons
 from infoset.geometry.polytope import Polytope
 from infoset.geometry.zonotope import Zonotope
 from infoset.limits import COUNT, Limits, real_values, shown
-from infoset.observer.programs import exact_hull
 from infoset.observer.sets import Motion, Polygons, Polytopes, Set, Sets, polytope_of, sizes_of
 from infoset.observer.steps import Strips
+from infoset.observer.window import WINDOW, Windows, exact_hull
 
-MAX_STATES = 6
+MAX_POLYTOPE_STATES = 6
+"""Number of states up to which the sets are polytopes: one of seven states takes a second a step."""
+Known = TypeVar("Known")
+
 MAX_RECORD = 20_000
 """Number of steps and measurements up to which they are kept, so that the memory of an observer is bounded."""
+_OUTLINE_SIDES = 32
+"""Sides of a polygon around a projection: around an ellipse it has 0.3 % more area."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +82,7 @@ class Estimate:
 
     @property
     def reduced(self) -> Flags:
-        """Whether the set is larger than the exact one, because it was reduced to a bounded number of facets.
+        """Whether the set is larger than the exact one: of a bounded number of facets, or of the last steps only.
 
         Shape () or (B,). Polygons of two states are exact up to 512 vertices, and not counted here.
         """
@@ -85,8 +91,9 @@ class Estimate:
     def excess_widths(self) -> Floats:
         """Return by how much the width of the set along each state exceeds the exact one, shape (n,) or (B, n).
 
-        2 n linear programs over the whole record for each reduced run, with errors of about 1e-9 of a state; 0 for
-        other runs, and NaN for the empty set.
+        2 n linear programs over the whole record for each reduced run; the exact widths are at most 1e-7 of a state
+        smaller than those that they find. 0 for other runs, and NaN for the empty set and where a program has no
+        solution.
 
         Raises
         ------
@@ -96,11 +103,9 @@ class Estimate:
         lower, upper = (np.atleast_2d(end) for end in self._hull)
         excess = np.where(np.isnan(lower), np.nan, 0.0)
         for run in np.flatnonzero(np.atleast_1d(self.reduced) & ~np.atleast_1d(self.is_empty)):
-            sizes = np.maximum(np.abs(lower[run]), np.abs(upper[run]))
             if len(self.events) < self.count:
                 raise ValueError(f"exact widths are known for {MAX_RECORD} steps and measurements, not more")
-            sizes = np.where(sizes > 0.0, sizes, 1.0)
-            hull = exact_hull(self.initial, self.events[: self.count], int(run), self.step, sizes)
+            hull = exact_hull(self.initial, self.events[: self.count], int(run), self.step)
             excess[run] = np.maximum(upper[run] - lower[run] - (hull[1] - hull[0]), 0.0)
         return self._runs(excess)
 
@@ -114,7 +119,8 @@ class Estimate:
             If the system has another number of states.
         """
         if not isinstance(self.sets, Polygons):
-            raise ValueError(f"the set has {self.states} states, not two: use .polytopes")
+            instead = ".polytopes" if isinstance(self.sets, Polytopes) else ".lower, .upper or .output_hull"
+            raise ValueError(f"the set has {self.states} states, not two: use {instead}")
         counts = self.sets.counts
         used = np.arange(counts.max(initial=0)) < counts[:, None]
         vertices = np.where(used[..., None], self.sets.vertices[:, : used.shape[1]], np.nan)
@@ -123,10 +129,20 @@ class Estimate:
 
     @property
     def polytopes(self) -> tuple[Polytope, ...]:
-        """The set of each run; a tuple of one set for a single run."""
+        """The set of each run; a tuple of one set for a single run.
+
+        Raises
+        ------
+        ValueError
+            If the system has more than six states: their polytopes are not computed.
+        """
         if isinstance(self.sets, Polytopes):
             return tuple(member.polytope for member in self.sets.members)
-        assert isinstance(self.sets, Polygons)
+        if not isinstance(self.sets, Polygons):
+            raise ValueError(
+                f"sets of {self.states} states have too many facets for a polytope, at most {MAX_POLYTOPE_STATES} "
+                "states are possible: use .lower, .upper or .output_hull"
+            )
         pairs = zip(self.sets.vertices, self.sets.counts, strict=True)
         return tuple(Polytope.from_vertices(points[:count]) if count else Polytope.empty(2) for points, count in pairs)
 
@@ -141,7 +157,13 @@ class Estimate:
         return self._hull[1]
 
     def chebyshev_centre(self) -> Floats:
-        """Return the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty set."""
+        """Return the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty set.
+
+        Raises
+        ------
+        ValueError
+            If the system has more than six states: their facets are not known.
+        """
         return self._runs(self.sets.chebyshev_centres())
 
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
@@ -157,6 +179,82 @@ class Estimate:
         lower, upper = (np.where(np.isinf(end), np.nan, end) for end in ends)
         return self._runs(0.0 - lower), self._runs(upper)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return step, bounds and, up to six states, the vertices, as Python numbers and lists.
+
+        The keys are `step`, `is_empty`, `lower`, `upper` and `vertices`. The bounds of the empty set are None, and its
+        vertices are an empty list. In a batch all values but the step are lists with a member for each run.
+        """
+        lower = np.atleast_2d(self.lower)
+        is_empty: Flags = np.asarray(np.isnan(lower).any(axis=1))
+        columns: dict[str, list[Any]] = {"is_empty": is_empty.tolist()}
+        for name, ends in (("lower", lower), ("upper", np.atleast_2d(self.upper))):
+            columns[name] = [None if empty else row.tolist() for row, empty in zip(ends, is_empty, strict=True)]
+        if not isinstance(self.sets, Windows):
+            columns["vertices"] = [points.tolist() for points in self._vertices()]
+        if self.single:
+            return {"step": self.step, **{name: values[0] for name, values in columns.items()}}
+        return {"step": self.step, **columns}
+
+    def plot(self, ax: Any = None, states: tuple[int, int] = (0, 1), **style: Any) -> list[Any]:
+        """Fill the projections of the sets on the plane of two states; return the artists, one for each set.
+
+        Of seven and more states the picture is a polygon of 32 sides that contains the projection, from a linear
+        program each. Empty sets have no artist.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes; the default are the present ones.
+        states : tuple of int
+            Numbers of the states along the horizontal and the vertical axis, from 0.
+        **style : Any
+            Options of matplotlib's `fill`.
+
+        Raises
+        ------
+        ValueError
+            If the states are not two different ones of the system.
+        """
+        numbers = [number for number in np.ravel(states).tolist() if number in range(self.states)]
+        if np.shape(states) != (2,) or len(set(numbers)) != 2:
+            raise ValueError(f"states must be two different numbers from 0 to {self.states - 1}: got {shown(states)}")
+        artists = list[Any]()
+        axes = present_axes(ax)
+        for outline in self._outlines(numbers):
+            if len(outline):
+                artists.extend(axes.fill(*outline.T, **style))
+        return artists
+
+    def _vertices(self) -> list[Floats]:
+        """Return the vertices of each run, shape (v, n)."""
+        if isinstance(self.sets, Polygons):
+            pairs = zip(self.sets.vertices, self.sets.counts, strict=True)
+            return [points[:count] for points, count in pairs]
+        return [polytope.vertices for polytope in self.polytopes]
+
+    def _outlines(self, numbers: list[int]) -> list[Floats]:
+        """Return the polygon of each run in the plane of two states, shape (m, 2)."""
+        if not isinstance(self.sets, Windows):
+            return [
+                ConvexPolygons.from_points(points[:, numbers]).polygon() if len(points) else np.zeros((0, 2))
+                for points in self._vertices()
+            ]
+        lower, upper = (np.atleast_2d(end)[:, numbers] for end in self._hull)
+        widths = np.nanmax(np.where(upper > lower, upper - lower, 0.0), axis=0)
+        angles = np.linspace(0.0, 2.0 * np.pi, _OUTLINE_SIDES, endpoint=False)
+        normals = np.column_stack([np.cos(angles), np.sin(angles)]) / np.where(widths > 0.0, widths, 1.0)
+        directions = np.zeros((len(normals), self.states))
+        directions[:, numbers] = normals
+        heights = np.array([self.sets.support(direction) for direction in directions]).T
+        outlines = []
+        for limits in heights:
+            if np.isinf(limits).any():
+                outlines.append(np.zeros((0, 2)))
+            else:
+                outlines.append(ConvexPolygons.from_constraints(normals, limits).polygon())
+        return outlines
+
     @cached_property
     def _hull(self) -> tuple[Floats, Floats]:
         return self.output_hull(np.eye(self.states))
@@ -170,7 +268,9 @@ class LinearObserver:
 
     Two states: polygons, compiled, batched over runs. One, and three to six states: polytopes, each run after the
     other. A polytope of more than `max_facets` facets is replaced by a larger one with fewer, so that the time of a
-    step is bounded; `Estimate.reduced` and `excess_widths` give the effect.
+    step is bounded. Seven and more states: a zonotope that contains the set is carried, and the bounds of an estimate
+    are those of linear programs over the last `window` steps, solved when they are asked for.
+    `Estimate.reduced` and `excess_widths` give the effect.
 
     Parameters
     ----------
@@ -180,10 +280,10 @@ class LinearObserver:
         C.
     initial : ConvexPolygons, Polytope or Zonotope
         Set of the state at step 0, before its measurement; for two states also one polygon for each run, shape (B,).
-    noise : array_like, shape () or (q,), or ConvexPolygons, Polytope or Zonotope
-        Half-widths of the box V, or V.
-    disturbance : ConvexPolygons, Polytope or Zonotope, optional
-        W; without it the point 0.
+    noise : array_like, shape (), (q,) or (K, q), or ConvexPolygons, Polytope or Zonotope, or a sequence of these sets
+        Half-widths of the box V, those of each step, V, or V of each step.
+    disturbance : ConvexPolygons, Polytope or Zonotope, or a sequence of them, or array_like, shape (n,) or (K, n)
+        W, W of each step, or half-widths of a box W; without it (optional) the point 0.
     input_matrix : array_like, shape (n, p) or (K, n, p), optional
         B.
     offset : array_like, shape (n,) or (K, n), optional
@@ -192,7 +292,11 @@ class LinearObserver:
         Number B of runs. Without it there is one run, and its arrays have no axis of runs.
     max_facets : int or None, optional
         Maximum number of facets of a polytope after a measurement, at least 2n; it then has at most 700 vertices. None
-        keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError.
+        keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError. Not used for more than six
+        states.
+    window : int or None, optional
+        Number of steps of the linear programs of seven and more states. None is the whole record: bounds are then
+        exact, and their time grows with the record. Not used for fewer states.
 
     Raises
     ------
@@ -201,9 +305,15 @@ class LinearObserver:
 
     Notes
     -----
-    The computed sets contain the exact ones. Without reduction they are larger by a few ulp (two states) or by 1e-12 of
-    the coordinates (polytopes), so that errors exactly at their bounds do not lose the true state. Polygons of more
-    than 512 vertices are reduced outward.
+    The computed sets contain the exact ones. Without reduction they are larger by a few ulp (two states), by 1e-12 of
+    the coordinates (polytopes) or by 1e-7 of the widths (programs), so that errors exactly at their bounds do not lose
+    the true state. Polygons of more than 512 vertices are reduced outward.
+
+    A bound of seven and more states is a sum that is an upper bound for all multipliers of the measurements; the solver
+    (HiGHS) only proposes the multipliers, so that its tolerances enlarge a bound and never make it wrong. Where it
+    fails, the bound is that of the carried zonotope. That no state is possible is proved in the same way, by one
+    program for each estimate that is asked for it: a contradiction that the zonotope does not show is found if
+    `inconsistency`, `is_empty` or a bound is asked for within `window` steps.
 
     Examples
     --------
@@ -221,15 +331,16 @@ class LinearObserver:
         output_matrix: ArrayLike,
         initial: Set,
         *,
-        noise: ArrayLike | Set,
-        disturbance: Set | None = None,
+        noise: ArrayLike | Set | Sequence[Set],
+        disturbance: ArrayLike | Set | Sequence[Set] | None = None,
         input_matrix: ArrayLike | None = None,
         offset: ArrayLike | None = None,
         runs: int | None = None,
         max_facets: int | None = 36,
+        window: int | None = WINDOW,
     ) -> None:
         self.states = n = (real_values("state_matrix", state_matrix).shape or (0,))[-1]
-        Limits(minimum=1, maximum=MAX_STATES, whole=True).need("the number of states", n)
+        COUNT.need("the number of states", n)
         self._a = _by_step("state_matrix", state_matrix, n, n)
         self._c = _by_step("output_matrix", output_matrix, "q", n)
         self._b = np.zeros((n, 0)) if input_matrix is None else _by_step("input_matrix", input_matrix, n, "p")
@@ -237,70 +348,122 @@ class LinearObserver:
         self.outputs, self.inputs = self._c.shape[-2], self._b.shape[-1]
         if runs is not None:
             COUNT.need("runs", runs)
-        if max_facets is not None:
+        if max_facets is not None and n <= MAX_POLYTOPE_STATES:
             Limits(minimum=2 * n, whole=True).need("max_facets", max_facets)
+        if window is not None:
+            COUNT.need("window", window)
         self._single = runs is None
         self._runs = runs or 1
-        self._disturbance = Zonotope(np.zeros(n), []) if disturbance is None else disturbance
-        _need_set("disturbance", self._disturbance, n)
+        self._disturbance = _disturbances(disturbance, n)
+        self._replaced = dict[int, Set]()
         _need_set("initial", initial, n, (self._runs,) if runs else ())
-        self._noise = _Noise.of(noise, self.outputs)
-        self._sets: Sets = (
-            Polygons.of(initial, self._runs)
-            if n == 2
-            else Polytopes.of(initial, self._runs, max_facets, sizes_of(self._disturbance))
-        )
-        self.max_facets, self._initial, self._events, self._count = max_facets, initial, list[Motion | Strips](), 0
+        self._noise = _noises(noise, self.outputs)
+        self.max_facets = max_facets
+        self.window = window
+        self._initial = initial
+        self._events = list[Motion | Strips]()
+        self._count = 0
+        self._sets = self._first_sets()
         self.step = 0
         self._empty = np.full(self._runs, -1), np.zeros(self._runs, dtype=np.int64), np.zeros(self._runs)
 
-    def predict(self, inputs: ArrayLike | None = None) -> None:
+    def _first_sets(self) -> Sets:
+        if self.states == 2:
+            return Polygons.of(self._initial, self._runs)
+        if self.states > MAX_POLYTOPE_STATES:
+            return Windows.of(self._initial, self._runs, self.window)
+        sizes = np.max([sizes_of(each) for each in self._disturbance.values], axis=0)
+        return Polytopes.of(self._initial, self._runs, self.max_facets, sizes)
+
+    @property
+    def _may_be_reduced(self) -> bool:
+        """Whether the sets may be larger than the exact ones, whose widths then need the record."""
+        if self.states > MAX_POLYTOPE_STATES:
+            return self.window is not None
+        return self.states != 2 and self.max_facets is not None
+
+    def predict(self, inputs: ArrayLike | None = None, *, disturbance: Set | None = None) -> None:
         """Move the sets to the next step.
 
         Parameters
         ----------
         inputs : array_like, shape (p,) or (B, p), or a number for one input, optional
             u between this step and the next one; without it zero.
+        disturbance : ConvexPolygons, Polytope or Zonotope, optional
+            W of this step, in place of that of the observer. `smooth` uses it too.
 
         Raises
         ------
-        ValueError
-            If the inputs have another shape or are not finite, or a matrix for this step is missing.
+        TypeError, ValueError
+            If the inputs have another shape or are not finite, the disturbance is not such a set of n coordinates, or
+            a matrix or a disturbance for this step is missing.
         ArithmeticError
             If a polytope has more than 5000 vertices and no `max_facets`, or rounding decides which are vertices.
         """
+        if disturbance is not None:
+            _need_set("disturbance", disturbance, self.states)
+            self._replaced[self.step] = disturbance
         motion = self._motion(self.step, inputs)
         self._sets = self._sets.predicted(motion)
         self._note(motion)
         self.step += 1
 
-    def update(self, measurement: ArrayLike) -> None:
+    def update(self, measurement: ArrayLike | Sequence[Any] | None) -> None:
         """Cut the sets by the measurement of this step.
 
         Parameters
         ----------
         measurement : array_like, shape (q,) or (B, q), or a number for one output
-            y; NaN is a missing measurement.
+            y; NaN or None is a missing measurement, and None in place of the array that all are missing.
 
         Raises
         ------
         ValueError
-            If it has another shape, or is infinite.
+            If it has another shape, or is infinite, or the noise of this step is missing.
         """
-        y = self._rows("measurement", measurement, self.outputs, missing=True)
+        values = np.full(self.outputs, np.nan) if measurement is None else _with_nan(measurement)
+        y = self._rows("measurement", values, self.outputs, missing=True)
         matrix = self._at(self._c, "output_matrix", self.step)
-        for runs, strips in self._noise.strips(matrix, y):
+        for runs, strips in self._noise.at("noise", self.step).strips(matrix, y):
             self._cut(runs, strips)
+
+    def cut(self, normals: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf) -> None:
+        """Cut the sets of this step by strips, from what else is known of the states.
+
+        Parameters
+        ----------
+        normals : array_like, shape (n,) or (r, n)
+            Normals of the strips lower <= normals x <= upper.
+        lower, upper : array_like, shape (), (r,) or (B, r), optional
+            Ends, which may be infinite.
+
+        Raises
+        ------
+        ValueError
+            If the shapes do not agree, a normal is not finite, or an end is NaN.
+
+        Notes
+        -----
+        `Inconsistency.output` is the row of `normals` if these strips make the set empty.
+        """
+        rows = finite_values("normals", np.atleast_2d(real_values("normals", normals)), "r", self.states)
+        shapes = ((), (len(rows),), (self._runs, len(rows)))
+        ends = []
+        for name, values in (("lower", lower), ("upper", upper)):
+            end = bound_values(name, values, *(shapes[:2] if self._single else shapes))
+            ends.append(np.array(np.broadcast_to(end, (self._runs, len(rows)))))
+        sizes = [np.where(np.isinf(end), 0.0, np.abs(end)) for end in ends]
+        self._cut(np.ones(self._runs, dtype=bool), Strips(rows, ends[0], ends[1], np.maximum(*sizes)))
 
     def _cut(self, runs: Flags, strips: Strips) -> None:
         exists = runs[:, None] & ~np.isnan(strips.lower)
         lower, upper = np.where(exists, strips.lower, -np.inf), np.where(exists, strips.upper, np.inf)
         excess = np.zeros((self._runs, len(strips.normals)))
-        before = self._sets.is_empty
+        before = self._sets.is_known_empty
         strips = Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0))
         self._sets = self._sets.cut(strips, excess)
         self._note(strips)
-        lost = np.flatnonzero(self._sets.is_empty & ~before)
+        lost = np.flatnonzero(self._sets.is_known_empty & ~before)
         if len(lost):
             step, output, amount = self._empty
             step[lost], output[lost] = self.step, excess[lost].argmax(axis=1)
@@ -309,7 +472,7 @@ class LinearObserver:
     def _note(self, event: Motion | Strips) -> None:
         """Keep a step or a measurement, of sets that may be reduced, for their exact widths."""
         self._count += 1
-        if self.states != 2 and self.max_facets is not None and self._count <= MAX_RECORD:
+        if self._may_be_reduced and self._count <= MAX_RECORD:
             self._events.append(event)
         else:
             self._events = []
@@ -321,17 +484,25 @@ class LinearObserver:
 
     @property
     def inconsistency(self) -> Inconsistency:
-        """Where the measurements contradict the model."""
+        """Where the measurements contradict the model: of seven and more states, by programs over the last steps."""
+        if isinstance(self._sets, Windows):
+            step, output, excess = self._empty
+            for run in np.flatnonzero(step == -1):
+                where = self._sets.members[run].located()
+                if where is not None:
+                    step[run] = where.step
+                    output[run] = where.output
+                    excess[run] = where.excess
         parts = [part[0] if self._single else part.copy() for part in self._empty]
         return Inconsistency(*(np.asarray(part) for part in parts))
 
-    def run(self, measurements: ArrayLike, inputs: ArrayLike | None = None) -> list[Estimate]:
+    def run(self, measurements: ArrayLike | Sequence[Any], inputs: ArrayLike | None = None) -> list[Estimate]:
         """Process the measurements of several steps; return the estimate after each of them.
 
         Parameters
         ----------
         measurements : array_like, shape (N, q) or (N, B, q)
-            y of this step and of the next ones.
+            y of this step and of the next ones; NaN and None as in `update`.
         inputs : array_like, shape (N, p) or (N, B, p), optional
             u after each measurement; one row less is enough.
 
@@ -341,7 +512,11 @@ class LinearObserver:
             As `predict` and `update`, or if there are too few inputs.
         """
         estimates = []
-        rows = np.atleast_1d(real_values("measurements", measurements))
+        rows: Sequence[Any] | Floats
+        if isinstance(measurements, list | tuple) and any(row is None for row in measurements):
+            rows = measurements
+        else:
+            rows = np.atleast_1d(real_values("measurements", _with_nan(measurements)))
         series = _series(inputs, len(rows) - 1)
         for k, measurement in enumerate(rows):
             if k:
@@ -354,7 +529,8 @@ class LinearObserver:
         """Return the sets of earlier states given also the later measurements.
 
         The exact backward pass: a state is possible if it is in its own estimate and leads, for some disturbance, to a
-        possible state of the next step.
+        possible state of the next step. Of seven and more states, the programs of a step also have the measurements
+        of the next `window` steps.
 
         Parameters
         ----------
@@ -382,10 +558,11 @@ class LinearObserver:
     def _motion(self, step: int, inputs: ArrayLike | None) -> Motion:
         matrix = self._at(self._a, "state_matrix", step)
         offset = self._at(self._offset, "offset", step, 1)[None]
+        w = self._replaced[step] if step in self._replaced else self._disturbance.at("disturbance", step)
         if inputs is None:
-            return Motion(matrix, offset, np.abs(offset), self._disturbance)
+            return Motion(matrix, offset, np.abs(offset), w)
         u, b = self._rows("inputs", inputs, self.inputs), self._at(self._b, "input_matrix", step)
-        return Motion(matrix, u @ b.T + offset, np.abs(u) @ np.abs(b).T + np.abs(offset), self._disturbance)
+        return Motion(matrix, u @ b.T + offset, np.abs(u) @ np.abs(b).T + np.abs(offset), w)
 
     def _rows(self, name: str, values: ArrayLike, size: int, *, missing: bool = False) -> Floats:
         """Return measurements or inputs of all runs, shape (B, size)."""
@@ -408,6 +585,21 @@ class LinearObserver:
         return np.asarray(values[step])
 
 
+@dataclass(frozen=True)
+class _Schedule(Generic[Known]):
+    """A value for all steps, or a value for each step."""
+
+    values: tuple[Known, ...]
+    varies: bool
+
+    def at(self, name: str, step: int) -> Known:
+        if not self.varies:
+            return self.values[0]
+        if step >= len(self.values):
+            raise ValueError(f"{name} has {len(self.values)} steps, none for step {step}")
+        return self.values[step]
+
+
 @dataclass(frozen=True, eq=False)
 class _Noise:
     """The set V as lower <= rows v <= upper; `polytope` is V if it is not a box."""
@@ -418,19 +610,15 @@ class _Noise:
     polytope: Polytope | None = None
 
     @classmethod
-    def of(cls, noise: ArrayLike | Set, outputs: int) -> _Noise:
-        if isinstance(noise, ConvexPolygons | Polytope | Zonotope):
-            _need_set("noise", noise, outputs)
-            polytope = polytope_of(noise)
-            rows, limits = polytope.constraints()
-            return cls(rows, np.full(len(rows), -np.inf), limits, polytope)
-        half = finite_values("noise", noise, "...")
-        if half.shape not in ((), (outputs,)) or (half < 0.0).any():
-            raise ValueError(
-                f"noise must be half-widths of at least 0, a number or of shape ({outputs},): got {shown(noise)}"
-            )
-        half = np.broadcast_to(half, (outputs,))
-        return cls(np.eye(outputs), -half, half)
+    def of_set(cls, noise: Set, outputs: int) -> _Noise:
+        _need_set("noise", noise, outputs)
+        polytope = polytope_of(noise)
+        rows, limits = polytope.constraints()
+        return cls(rows, np.full(len(rows), -np.inf), limits, polytope)
+
+    @classmethod
+    def of_box(cls, half: Floats) -> _Noise:
+        return cls(np.eye(len(half)), -half, half)
 
     def strips(self, matrix: Floats, y: Floats) -> list[tuple[Flags, Strips]]:
         """Return the strips of C x = y - v for groups of runs in which the same outputs are measured."""
@@ -453,7 +641,66 @@ class _Noise:
         return groups
 
 
-def _need_set(name: str, value: Set, space: int, shape: tuple[int, ...] = ()) -> None:
+def _noises(noise: ArrayLike | Set | Sequence[Set], outputs: int) -> _Schedule[_Noise]:
+    """Return V, or V of each step."""
+    sets = _sets_of(noise)
+    if sets is not None:
+        return _Schedule(tuple(_Noise.of_set(each, outputs) for each in sets), isinstance(noise, Sequence))
+    values: Any = noise
+    half = finite_values("noise", values, "...")
+    is_possible = half.shape in ((), (outputs,)) or half.shape[1:] == (outputs,)
+    if not is_possible or not half.size or (half < 0.0).any():
+        raise ValueError(
+            f"noise must be half-widths of at least 0, a number or of shape ({outputs},) or (K, {outputs}): "
+            f"got {shown(noise)}"
+        )
+    rows = np.broadcast_to(half, (len(half) if half.ndim == 2 else 1, outputs))
+    return _Schedule(tuple(map(_Noise.of_box, rows)), half.ndim == 2)
+
+
+def _disturbances(disturbance: ArrayLike | Set | Sequence[Set] | None, states: int) -> _Schedule[Set]:
+    """Return W, or W of each step."""
+    if disturbance is None:
+        return _Schedule((Zonotope(np.zeros(states), []),), varies=False)
+    sets = _sets_of(disturbance)
+    if sets is not None:
+        for each in sets:
+            _need_set("disturbance", each, states)
+        return _Schedule(sets, isinstance(disturbance, Sequence))
+    if not isinstance(disturbance, Sequence | np.ndarray):
+        _need_set("disturbance", disturbance, states)  # raises TypeError
+    values: Any = disturbance
+    half = finite_values("disturbance", values, "...")
+    is_possible = half.shape == (states,) or half.shape[1:] == (states,)
+    if not is_possible or not half.size or (half < 0.0).any():
+        raise ValueError(
+            f"disturbance must be a set, or half-widths of at least 0 of shape ({states},) or (K, {states}): "
+            f"got {shown(disturbance)}"
+        )
+    return _Schedule(tuple(Zonotope.box(-row, row) for row in np.atleast_2d(half)), half.ndim == 2)
+
+
+def _sets_of(value: object) -> tuple[Set, ...] | None:
+    """Return a set, or a sequence that contains one, as a tuple; None for anything else."""
+    if isinstance(value, ConvexPolygons | Polytope | Zonotope):
+        return (value,)
+    if isinstance(value, list | tuple) and any(
+        isinstance(each, ConvexPolygons | Polytope | Zonotope) for each in value
+    ):
+        return tuple(value)
+    return None
+
+
+def _with_nan(values: Any) -> Any:
+    """Return measurements with NaN in place of None."""
+    if values is None:
+        return np.nan
+    if isinstance(values, np.ndarray) and values.dtype == object:
+        values = values.tolist()
+    return [_with_nan(each) for each in values] if isinstance(values, list | tuple) else values
+
+
+def _need_set(name: str, value: object, space: int, shape: tuple[int, ...] = ()) -> None:
     if not isinstance(value, ConvexPolygons | Polytope | Zonotope):
         raise TypeError(f"{name} must be a ConvexPolygons, a Polytope or a Zonotope: got {type(value).__name__}")
     found = 2 if isinstance(value, ConvexPolygons) else value.space

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -47,11 +47,55 @@ class Motion:
     terms: Floats
     disturbance: Set
 
+    def of_run(self, run: int) -> Motion:
+        """Return the step of one run."""
+        if len(self.shifts) == 1:
+            return self
+        return replace(self, shifts=self.shifts[run : run + 1], terms=self.terms[run : run + 1])
+
+    def sums_of_terms(self, sizes: Floats) -> Floats:
+        """Return the sums of the sizes of the terms of a state after the step of one run, shape (n,).
+
+        `sizes`, shape (n,), bound the state before it.
+        """
+        return np.asarray(np.abs(self.matrix) @ sizes + self.terms[0] + sizes_of(self.disturbance))
+
     @property
     def reversed_sum(self) -> Motion:
         """The step x - shift - w."""
         unit = np.eye(len(self.matrix))
         return Motion(unit, -self.shifts, self.terms, -unit @ self.disturbance)
+
+
+class Sets(Protocol):
+    """The sets of B runs; methods return new sets."""
+
+    @property
+    def is_empty(self) -> Flags:
+        """Whether each set is empty, shape (B,)."""
+
+    @property
+    def is_known_empty(self) -> Flags:
+        """The same as far as it is known without linear programs."""
+
+    @property
+    def reduced(self) -> Flags:
+        """Whether each set was replaced by a larger one, shape (B,)."""
+
+    def predicted(self, motion: Motion) -> Sets:
+        """Return the sets after a step; raise ArithmeticError if one has too many vertices."""
+
+    def cut(self, strips: Strips, excess: Floats) -> Sets:
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
+
+    def preimage_cut(self, later: Sets, motion: Motion) -> Sets:
+        """Return the states that lead to a state of the later set for some disturbance."""
+
+    def support(self, direction: Floats) -> Floats:
+        """Return max direction . x of each set, shape (B,); -inf for the empty set."""
+
+    def chebyshev_centres(self) -> Floats:
+        """Return the centres of largest balls, shape (B, n); NaN for the empty set."""
 
 
 class Polygons(Batch):
@@ -72,6 +116,11 @@ class Polygons(Batch):
     def is_empty(self) -> Flags:
         """Whether each set is empty, shape (B,)."""
         return np.asarray(self.counts == 0)
+
+    @property
+    def is_known_empty(self) -> Flags:
+        """The same."""
+        return self.is_empty
 
     @property
     def reduced(self) -> Flags:
@@ -272,6 +321,11 @@ class Polytopes:
         return np.array([member.polytope.is_empty for member in self.members])
 
     @property
+    def is_known_empty(self) -> Flags:
+        """The same."""
+        return self.is_empty
+
+    @property
     def reduced(self) -> Flags:
         """Whether each set was reduced, shape (B,)."""
         return np.array([member.reduced for member in self.members])
@@ -312,10 +366,6 @@ class Polytopes:
         """Return the centres of largest balls, shape (B, n), by a linear program each; NaN for the empty set."""
         polytopes = [member.polytope for member in self.members]
         return np.array([np.full(p.space, np.nan) if p.is_empty else p.chebyshev_centre()[0] for p in polytopes])
-
-
-Sets = Polygons | Polytopes
-"""The sets of B runs; both classes have the same methods, which return new sets."""
 
 
 def polygon_of(shape: Set) -> ConvexPolygons:

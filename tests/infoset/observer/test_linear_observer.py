@@ -493,6 +493,150 @@ def test_noise_in_a_polytope_keeps_its_projection_if_an_output_is_missing(missin
     np.testing.assert_allclose(observer.estimate().polygons.area(), wanted)
 
 
+# What varies with time, and what else is known --------------------------------------------------------------------
+
+
+def drifting(states: int, **options: Any) -> LinearObserver:
+    """Return an observer of a chain of integrators of some states, whose first one is measured."""
+    a, c, generators = chain(1, states)
+    box = Zonotope.box(-np.ones(states), np.ones(states))
+    settings = {"noise": 0.2, "disturbance": Zonotope(np.zeros(states), generators)}
+    return LinearObserver(a, c, box, **(settings | options))
+
+
+@pytest.mark.parametrize("states", [2, 3, 7])
+def test_noise_and_disturbance_of_each_step_equal_their_boxes_and_sets(states: int) -> None:
+    half = np.outer([0.0, 0.1, 0.3], np.ones(states))
+    sets = [Zonotope.box(-row, row) for row in half]
+    noise = np.array([[0.2], [0.4], [0.1], [0.3]])
+    boxes = [Polytope.from_box(-row, row) for row in noise]
+    y = [[0.1], [0.3], [0.2], [0.4]]
+
+    one = drifting(states, noise=noise, disturbance=half)
+    other = drifting(states, noise=boxes, disturbance=sets)
+    by_hand = drifting(states, noise=0.2, disturbance=None)
+    results = [observer.run(y)[-1] for observer in (one, other)]
+    for k, value in enumerate(y):
+        if k:
+            by_hand.predict(disturbance=sets[k - 1])
+        by_hand.cut(np.eye(1, states), value[0] - noise[k], value[0] + noise[k])
+    results.append(by_hand.estimate())
+
+    for estimate in results[1:]:
+        np.testing.assert_allclose(estimate.lower, results[0].lower, rtol=0.0, atol=1e-7)
+        np.testing.assert_allclose(estimate.upper, results[0].upper, rtol=0.0, atol=1e-7)
+    with pytest.raises(ValueError, match="disturbance has 3 steps, none for step 3"):
+        one.predict()
+
+
+def test_sets_of_each_step_enter_the_exact_sum() -> None:
+    observer = LinearObserver(
+        np.eye(2), np.eye(2), Zonotope([0.0, 0.0], []), noise=9.0, disturbance=[[0.5, 0.0], [0.25, 2.0]]
+    )
+    observer.predict()
+    observer.predict()
+    np.testing.assert_allclose(observer.estimate().upper, [0.75, 2.0], rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("states", [2, 3, 7])
+def test_smoothing_uses_the_disturbance_of_a_prediction(states: int) -> None:
+    still = drifting(states, disturbance=None)
+    estimates = [still.estimate()]
+    still.predict(disturbance=Zonotope.box(np.zeros(states), 5.0 * np.eye(1, states)[0]))
+    still.cut(np.eye(1, states), lower=3.0)
+    estimates.append(still.estimate())
+
+    smoothed = still.smooth(estimates)
+
+    # x1 + 0.5 x2 + w is at least 3 for w of at most 5: all initial states are possible; without w, none is.
+    np.testing.assert_allclose(smoothed[0].lower, -1.0, rtol=0.0, atol=1e-6)
+    assert not smoothed[0].is_empty
+
+
+@pytest.mark.parametrize("states", [2, 3, 7])
+def test_cut_that_leaves_nothing_is_a_contradiction(states: int) -> None:
+    observer = drifting(states)
+    observer.cut([np.eye(states)[0], np.eye(states)[1]], [-np.inf, 1.5], np.inf)
+
+    where = observer.inconsistency
+    assert [int(where.step), int(where.output)] == [0, 1]
+    np.testing.assert_allclose(where.excess, 0.5)
+    with pytest.raises(ValueError, match="lower must have the shape"):
+        observer.cut(np.eye(states), [0.0] * (states + 1))
+    with pytest.raises(ValueError, match="normals must have the shape"):
+        observer.cut([1.0], 0.0)
+
+
+def test_cut_of_a_batch_has_ends_for_each_run() -> None:
+    observer = drifting(2, runs=2)
+    observer.cut([1.0, 0.0], upper=[[0.0], [0.5]])
+    np.testing.assert_allclose(observer.estimate().upper[:, 0], [0.0, 0.5], rtol=0.0, atol=1e-14)
+
+
+def test_none_is_a_missing_measurement() -> None:
+    box = Zonotope.box(-np.ones(2), np.ones(2))
+    settings = {"noise": 0.1, "disturbance": Zonotope([0.0, 0.0], [[0.0, 0.1]])}
+    rows = [[0.5, None], None, [None, 0.2]]
+    with_nan = [[0.5, np.nan], [np.nan, np.nan], [np.nan, 0.2]]
+    one, other = (LinearObserver(DRIFT, np.eye(2), box, **settings).run(y) for y in (rows, with_nan))
+    for ours, wanted in zip(one, other, strict=True):
+        np.testing.assert_array_equal(ours.polygons.polygon(), wanted.polygons.polygon())
+    single = LinearObserver(DRIFT, [[1.0, 0.0]], box, **settings)
+    assert len(single.run([0.5, None, 0.6])) == 3
+    single.update(None)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"noise": [[0.1, 0.2]]}, r"noise must be half-widths of at least 0, a number or of shape \(1,\) or \(K, 1\)"),
+        ({"noise": [-0.1]}, "noise must be half-widths of at least 0"),
+        ({"disturbance": [[0.1], [0.2]]}, r"disturbance must be a set, or half-widths of at least 0 of shape \(3,\)"),
+        ({"disturbance": [Zonotope([0.0], []), Zonotope([0.0], [])]}, "disturbance must have 3 coordinates"),
+    ],
+)
+def test_wrong_noise_or_disturbance_of_steps_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        drifting(3, **options)
+
+
+@pytest.mark.parametrize("states", [2, 3, 7])
+def test_estimate_is_drawn_and_written(states: int) -> None:
+    from matplotlib.figure import Figure
+
+    observer = drifting(states)
+    observer.update(0.9)
+    estimate = observer.estimate()
+    (artist,) = estimate.plot(Figure().subplots(), states=(1, 0), color="0.5")
+
+    corners = artist.get_xy()
+    # The set is a box: within 0.7 to 1 of x1 and within -1 to 1 of x2. Of 7 states the polygon is around it.
+    inner = np.array([[-1.0, 0.7], [1.0, 1.0]])
+    around = 1e-6 if states < 7 else 0.01
+    assert (corners.min(axis=0) <= inner[0] + 1e-9).all()
+    assert (corners.min(axis=0) >= inner[0] - around).all()
+    assert (corners.max(axis=0) <= inner[1] + around).all()
+    written = estimate.to_dict()
+    assert written["step"] == 0
+    assert written["lower"] == estimate.lower.tolist()
+    assert ("vertices" in written) == (states < 7)
+    assert json.loads(json.dumps(written)) == written
+    with pytest.raises(ValueError, match="two different numbers"):
+        estimate.plot(states=(1, 1, 0))  # type: ignore[arg-type]
+
+
+def test_batch_is_drawn_and_written_run_by_run() -> None:
+    from matplotlib.figure import Figure
+
+    observer = drifting(2, runs=3)
+    observer.update([[0.9], [5.0], [0.5]])
+    assert len(observer.estimate().plot(Figure().subplots())) == 2
+    written = observer.estimate().to_dict()
+    assert written["is_empty"] == [False, True, False]
+    assert written["upper"][1] is None
+    assert written["vertices"][1] == []
+
+
 # The enlargement of a prediction --------------------------------------------------------------------------------
 
 coordinates = st.integers(-4, 4).map(float) | st.floats(-1.0, 1.0, width=32)

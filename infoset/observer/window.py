@@ -1,0 +1,324 @@
+"""Sets of seven and more states: a zonotope that is carried, and linear programs over the last steps on demand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from infoset.arrays import Flags, Floats
+from infoset.engine.section_life import CUT_SLACK, SUM_SLACK
+from infoset.geometry.zonotope import Zonotope
+from infoset.observer.programs import EPSILON, Program, Stage
+from infoset.observer.sets import Motion, Set, Sets, sizes_of
+from infoset.observer.steps import Strips
+
+ORDER = 5
+"""Generators of a carried zonotope for each state. More are not tighter: on chains of masses, 30 gave wider sets."""
+WINDOW = 10
+"""Steps of a program. For up to 20 states the widths are then within 6 % of those of the whole record."""
+_SINGULAR = 1e-10
+"""Eigenvalue of the scaled matrix of a gain below which it counts as zero: a gain may not enlarge rounding errors to
+more than 1e-6 of a state. Every gain is correct, so that the value only matters for the size of the set."""
+
+
+class Contradiction(NamedTuple):
+    """Step and strip that leave no state possible, and the minimum enlargement of the strip for which one exists."""
+
+    step: int
+    output: int
+    excess: float
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """The set of one run at a step: the states that agree with the last steps, and with later ones if it is smoothed.
+
+    Parameters
+    ----------
+    stages : tuple of Stage
+        Successive steps.
+    at : int
+        Number of the stage whose state is described.
+    carried : Zonotope
+        A set that contains these states.
+    length : int or None
+        Maximum number of steps before the present one, and after it; None is no limit.
+    is_whole : bool
+        Whether the stages are the whole record.
+    contradiction : Contradiction or None
+        Where the set became empty, if a strip did not meet the carried zonotope or an earlier program showed it.
+    """
+
+    stages: tuple[Stage, ...]
+    at: int
+    carried: Zonotope
+    length: int | None
+    is_whole: bool = True
+    contradiction: Contradiction | None = None
+
+    @classmethod
+    def of(cls, start: Set, length: int | None) -> Window:
+        """Return the window at step 0, before its measurement."""
+        carried = _with_box(_zonotope_of(start), SUM_SLACK * sizes_of(start))
+        return cls((Stage.at_first(0, start),), 0, carried, length)
+
+    @cached_property
+    def program(self) -> Program:
+        """The linear program over the stages."""
+        return Program(self.stages, self.at)
+
+    @cached_property
+    def is_empty(self) -> bool:
+        """Whether no state is possible: proved, by one linear program."""
+        return self.contradiction is not None or self.program.is_infeasible()
+
+    @property
+    def is_known_empty(self) -> bool:
+        """The same if it is known without a program."""
+        return self.contradiction is not None or bool(vars(self).get("is_empty", False))
+
+    @cached_property
+    def _heights(self) -> dict[bytes, float]:
+        return {}
+
+    def support(self, direction: Floats) -> float:
+        """Return an upper bound of direction . x, by a linear program the first time; -inf for the empty set."""
+        if self.is_empty:
+            return -np.inf
+        key = direction.tobytes()
+        if key not in self._heights:
+            top, _ = extent(self.carried, direction[None])
+            self._heights[key] = min(float(top[0]), self.program.bound(direction))
+        return self._heights[key]
+
+    def predicted(self, motion: Motion) -> Window:
+        """Return the window at the next step; the first stage goes if there are more than allowed."""
+        if self.is_known_empty:
+            return self
+        image = moved(self.carried, motion)
+        last = replace(self.stages[-1], motion=motion)
+        stages = (*self.stages[:-1], last, Stage.at_first(last.step + 1, image))
+        too_many = self.length is not None and len(stages) > self.length + 1
+        if too_many:
+            stages = stages[1:]
+        return Window(stages, len(stages) - 1, image, self.length, self.is_whole and not too_many)
+
+    def cut(self, strips: Strips, run: int) -> Window:
+        """Return the window after a measurement, the strips of a `run`."""
+        exists = np.isfinite(strips.lower[run]) | np.isfinite(strips.upper[run])
+        if self.is_known_empty or not exists.any():
+            return self
+        outputs = np.flatnonzero(exists)
+        normals = strips.normals[outputs]
+        slack = CUT_SLACK * (np.abs(normals) @ sizes_of(self.carried) + strips.terms[run, outputs])
+        lower = strips.lower[run, outputs] - slack
+        upper = strips.upper[run, outputs] + slack
+
+        stage = self.stages[-1]
+        top, bottom = extent(self.carried, normals)
+        excess = np.maximum(lower - top, bottom - upper)
+        if (excess > 0.0).any():
+            first = int(np.argmax(excess > 0.0))
+            where = Contradiction(stage.step, int(outputs[first]), float(excess[first]))
+            return replace(self, contradiction=where)
+
+        cut = stage.with_strips(normals, lower, upper, outputs)
+        carried = cut_outward(self.carried, normals, np.maximum(lower, bottom), np.minimum(upper, top))
+        return replace(self, stages=(*self.stages[:-1], cut), carried=carried)
+
+    def before(self, later: Window, motion: Motion) -> Window:
+        """Return this set given also the measurements of a later one, of the next step."""
+        if self.is_empty:
+            return self
+        # A program of each smoothed set would find the same: those of the estimates are enough.
+        is_estimate = later.at == len(later.stages) - 1
+        if later.is_empty if is_estimate else later.is_known_empty:
+            return replace(self, contradiction=later.located())
+        after = later.stages[later.at :]
+        left_out = self.length is not None and len(after) > self.length
+        if left_out:
+            after = after[: self.length]
+        stages = (*self.stages[:-1], replace(self.stages[-1], motion=motion), *after)
+        return replace(self, stages=stages, is_whole=self.is_whole and later.is_whole and not left_out)
+
+    def located(self) -> Contradiction | None:
+        """Return the first strip after which no state is possible, by linear programs; None if the set is not empty."""
+        if self.contradiction is not None or not self.is_empty:
+            return self.contradiction
+        strips = [(k, row) for k, stage in enumerate(self.stages) for row in range(len(stage.normals))]
+        # The first `possible` strips leave a state, the first `impossible` ones leave none.
+        possible = 0
+        impossible = len(strips)
+        while impossible - possible > 1:
+            middle = (possible + impossible) // 2
+            if self._up_to(*strips[middle - 1]).is_infeasible():
+                impossible = middle
+            else:
+                possible = middle
+        last, row = strips[impossible - 1]
+        stage = self.stages[last]
+        normal = stage.normals[row]
+        program = self._up_to(last, row - 1)
+        below = stage.lower[row] - program.bound(normal)
+        above = -program.bound(-normal) - stage.upper[row]
+        return Contradiction(stage.step, int(stage.outputs[row]), max(float(below), float(above), 0.0))
+
+    def _up_to(self, last: int, row: int) -> Program:
+        """Return the program of the strips up to a row of a stage."""
+        stage = self.stages[last].first_strips(row + 1)
+        return Program((*self.stages[:last], stage), last)
+
+
+def exact_hull(initial: Set, record: Sequence[Motion | Strips], run: int, step: int) -> Floats:
+    """Return the minimum and the maximum of each state of a `run` at a `step`, shape (2, n); NaN if none is possible.
+
+    Linear programs over the whole record. Bounds that the solver does not find are NaN.
+    """
+    window = Window.of(initial, None)
+    for event in record:
+        window = window.predicted(event.of_run(run)) if isinstance(event, Motion) else window.cut(event, run)
+    n = len(window.carried.centre)
+    if window.is_known_empty:
+        return np.full((2, n), np.nan)
+    program = Program(window.stages, step)
+    hull = [[-program.bound(-unit) for unit in np.eye(n)], [program.bound(unit) for unit in np.eye(n)]]
+    return np.where(np.isinf(hull), np.nan, hull)
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Sets of seven and more states, a window for each run."""
+
+    members: tuple[Window, ...]
+
+    @classmethod
+    def of(cls, start: Set, runs: int, length: int | None) -> Windows:
+        """Return the same set for all runs."""
+        return cls((Window.of(start, length),) * runs)
+
+    @property
+    def is_empty(self) -> Flags:
+        """Whether each set is empty, shape (B,): a linear program each."""
+        return np.array([member.is_empty for member in self.members])
+
+    @property
+    def is_known_empty(self) -> Flags:
+        """The same without programs: whether it is known so far."""
+        return np.array([member.is_known_empty for member in self.members])
+
+    @property
+    def reduced(self) -> Flags:
+        """Whether each set is that of a part of the record, shape (B,)."""
+        return np.array([not member.is_whole for member in self.members])
+
+    def predicted(self, motion: Motion) -> Windows:
+        """Return the sets after a step."""
+        return Windows(tuple(member.predicted(motion.of_run(run)) for run, member in enumerate(self.members)))
+
+    def cut(self, strips: Strips, excess: Floats) -> Windows:
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
+        members = tuple(member.cut(strips, run) for run, member in enumerate(self.members))
+        for run, (before, member) in enumerate(zip(self.members, members, strict=True)):
+            if member.contradiction is not None and before.contradiction is None:
+                excess[run, member.contradiction.output] = member.contradiction.excess
+        return Windows(members)
+
+    def preimage_cut(self, later: Sets, motion: Motion) -> Windows:
+        """Return the states that lead to a state of the later set for some disturbance."""
+        assert isinstance(later, Windows)
+        pairs = zip(self.members, later.members, strict=True)
+        return Windows(tuple(member.before(after, motion.of_run(run)) for run, (member, after) in enumerate(pairs)))
+
+    def support(self, direction: Floats) -> Floats:
+        """Return max direction . x of each set, shape (B,); -inf for the empty set."""
+        return np.array([member.support(direction) for member in self.members])
+
+    def chebyshev_centres(self) -> Floats:
+        """Refuse with a ValueError: the facets are not known."""
+        raise ValueError("the largest ball of a set of 7 and more states is not known: use the bounds of the states")
+
+
+def moved(one: Zonotope, motion: Motion) -> Zonotope:
+    """Return a zonotope that contains matrix x + shift + w for all x of a zonotope, of at most `ORDER` n generators."""
+    matrix = motion.matrix
+    w = _zonotope_of(motion.disturbance)
+    terms = motion.sums_of_terms(sizes_of(one))
+    slack = (SUM_SLACK + len(matrix) * EPSILON) * terms
+    centre = matrix @ one.centre + motion.shifts[0] + w.centre
+    generators = np.vstack([one.generators @ matrix.T, w.generators, np.diag(slack)])
+    return Zonotope(centre, fewer(generators, ORDER))
+
+
+def fewer(generators: Floats, order: int) -> Floats:
+    """Return at most `order` n generators of a zonotope that contains the one of the given ones.
+
+    The generators that are nearest to an axis, or short, become a box (Girard 2005), in units of the widths.
+    """
+    count, n = generators.shape
+    if count <= order * n:
+        return generators
+    sizes = np.abs(generators)
+    widths = sizes.sum(axis=0)
+    shares = sizes / np.where(widths > 0.0, widths, 1.0)
+    lengths = shares.sum(axis=1) - shares.max(axis=1)
+    by_length = np.argsort(lengths, kind="stable")
+    short = by_length[: count - (order - 1) * n]
+    box = (1.0 + count * EPSILON) * sizes[short].sum(axis=0)
+    return np.vstack([generators[by_length[len(short) :]], np.diag(box)])
+
+
+def extent(one: Zonotope, normals: Floats) -> tuple[Floats, Floats]:
+    """Return the maximum and the minimum of each normal . x, rounded outward."""
+    half = np.abs(normals @ one.generators.T).sum(axis=1)
+    middle = normals @ one.centre
+    terms = np.abs(normals) @ sizes_of(one)
+    rounding = (sum(one.generators.shape) + 4) * EPSILON * terms
+    return middle + half + rounding, middle - half - rounding
+
+
+def cut_outward(one: Zonotope, normals: Floats, lower: Floats, upper: Floats) -> Zonotope:
+    """Return a zonotope that contains the part of a zonotope within strips.
+
+    x = x + K (y - C x - v) holds for each x of the part, with y the middles of the strips and |v| at most half of
+    their widths, and for every matrix K. The gain that is used minimises the sum of the squared generators.
+    """
+    n = len(one.centre)
+    middle = 0.5 * lower + 0.5 * upper
+    half = np.maximum(upper - middle, middle - lower)
+
+    products = one.generators @ normals.T
+    spread = products.T @ products + np.diag(half**2)
+    units = np.sqrt(np.diag(spread))
+    units = np.where(units > 0.0, units, 1.0)
+    gain = one.generators.T @ (products / units) @ _inverse(spread / units / units[:, None]) / units
+
+    centre = one.centre + gain @ (middle - normals @ one.centre)
+    generators = np.vstack([one.generators - products @ gain.T, half[:, None] * gain.T])
+    sizes = sizes_of(one)
+    terms = sizes + np.abs(gain) @ (np.abs(normals) @ sizes + np.abs(middle) + half)
+    rounding = (SUM_SLACK + (n + len(normals)) * EPSILON) * terms
+    return _with_box(Zonotope(centre, generators), rounding)
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Return the inverse of a symmetric matrix with a diagonal of ones, on the eigenvectors that are not singular."""
+    values, vectors = np.linalg.eigh(matrix)
+    used = values > _SINGULAR
+    return np.asarray((vectors[:, used] / values[used]) @ vectors[:, used].T)
+
+
+def _with_box(one: Zonotope, half: Floats) -> Zonotope:
+    """Return the sum of a zonotope and a box."""
+    return Zonotope(one.centre, np.vstack([one.generators, np.diag(half)]))
+
+
+def _zonotope_of(shape: Set) -> Zonotope:
+    """Return a zonotope, or the bounding box of another set."""
+    if isinstance(shape, Zonotope):
+        return shape
+    points = shape.vertices.reshape(-1, shape.vertices.shape[-1])
+    return Zonotope.box(points.min(axis=0), points.max(axis=0))
