@@ -7,6 +7,7 @@ const graphs = element("div", { class: "columns" });
 main.append(top_, graphs);
 let frame = 0;
 
+const centres = DATA.steps.some((step) => step.centre);
 const points = (step) => [...step.vertices, ...(step.state ? [step.state] : [])];
 
 /** Limits of a state over all steps. */
@@ -21,7 +22,8 @@ function rows(step) {
     ["step", String(step.k)],
     ...DATA.names.map((name, index) => [name,
       step.lower ? `${shown(step.lower[index])} to ${shown(step.upper[index])}` : "no state is possible"]),
-    ...DATA.names.map((name, index) => [`centre: ${name}`, step.centre ? shown(step.centre[index]) : "none"]),
+    ...(centres ? DATA.names.map((name, index) => [`centre: ${name}`, step.centre ? shown(step.centre[index]) : "none"])
+      : []),
     ...(step.state ? DATA.names.map((name, index) => [`true state: ${name}`, shown(step.state[index])]) : []),
     ...step.measured.map((value, index) => [`y${index + 1}`, value === null ? "missing" : shown(value)]),
     ...step.inputs.map((value, index) => [`u${index + 1}`, shown(value)]),

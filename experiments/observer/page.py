@@ -6,8 +6,17 @@ from importlib import resources
 
 import numpy as np
 
+from infoset.arrays import Floats
 from infoset.experiments.common.page_document import page
 from infoset.experiments.observer.report import Report, shown_bounds, times
+from infoset.observer.linear_observer import MAX_POLYTOPE_STATES, Estimate
+
+
+def _centre(estimate: Estimate) -> Floats | None:
+    """Return the centre of a largest ball in a set; None if it is empty, or its facets are not known."""
+    if estimate.is_empty or estimate.states > MAX_POLYTOPE_STATES:
+        return None
+    return estimate.chebyshev_centre()
 
 
 def observer_page(report: Report) -> str:
@@ -35,7 +44,7 @@ def observer_page(report: Report) -> str:
                 "lower": None if estimate.is_empty else bounds[index, 0],
                 "upper": None if estimate.is_empty else bounds[index, 1],
                 "later": None if later is None or np.isnan(later[index]).any() else later[index],
-                "centre": None if estimate.is_empty else estimate.chebyshev_centre(),
+                "centre": _centre(estimate),
                 "vertices": estimate.polygons.polygon() if estimate.states == 2 else [],
                 "smoothed": []
                 if report.smoothed is None or estimate.states != 2

@@ -13,7 +13,7 @@ from infoset.arrays import Floats
 from infoset.experiments.common.screen import Part, number_table
 from infoset.experiments.observer.data import Data
 from infoset.experiments.observer.file import ObserverProblem
-from infoset.observer.linear_observer import Estimate, Inconsistency
+from infoset.observer.linear_observer import MAX_POLYTOPE_STATES, Estimate, Inconsistency
 from infoset.sim.columns import Cell, csv_text
 
 _SHOWN_STEPS = 12
@@ -44,7 +44,9 @@ class Report:
 
 
 def contains(estimate: Estimate, state: Floats) -> bool:
-    """Whether a state is in a set."""
+    """Whether a state is in a set; of seven and more states, within its bounds."""
+    if estimate.states > MAX_POLYTOPE_STATES:
+        return bool((estimate.lower <= state).all() and (state <= estimate.upper).all())
     shape = estimate.polygons if estimate.states == 2 else estimate.polytopes[0]
     return bool(shape.contains(state))
 
@@ -136,10 +138,14 @@ def report_lines(report: Report) -> Iterator[Part]:
         yield _bounds_table(problem.names, report.smoothed)
     if report.data.states is not None:
         inside = sum(map(contains, report.estimates, report.data.states))
-        yield f"true state inside the set: {inside} of {count} steps"
+        place = "the set" if len(problem.names) <= MAX_POLYTOPE_STATES else "its bounds"
+        yield f"true state inside {place}: {inside} of {count} steps"
     if report.excess_widths is not None:
         excess = ", ".join(f"{each:.3g}" for each in report.excess_widths)
-        yield f"the sets have a bounded number of facets; the last one is wider than the exact one by {excess}"
+        reason = "the sets have a bounded number of facets"
+        if len(problem.names) > MAX_POLYTOPE_STATES:
+            reason = "the bounds are those of the last measurements"
+        yield f"{reason}; the last one is wider than the exact one by {excess}"
     if report.contradicted:
         where = report.inconsistency
         yield (

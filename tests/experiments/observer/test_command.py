@@ -205,6 +205,46 @@ def test_six_states_are_polytopes(infoset: Command) -> None:
         assert (np.array(step["upper"]) >= step["state"]).all()
 
 
+EIGHT_STATES = """kind = "observer"
+name = "eight"
+[system]
+A = [[1, 0.5, 0, 0, 0, 0, 0, 0], [0, 0.9, 0, 0, 0, 0, 0, 0], [0, 0, 1, 0.5, 0, 0, 0, 0], [0, 0, 0, 0.9, 0, 0, 0, 0],
+     [0, 0, 0, 0, 1, 0.5, 0, 0], [0, 0, 0, 0, 0, 0.9, 0, 0], [0, 0, 0, 0, 0, 0, 1, 0.5], [0, 0.1, 0, 0, 0, 0, 0, 0.9]]
+C = [[1, 0, 0, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 0, 0, 0, 1, 0]]
+[initial]
+lower = [-1, -1, -1, -1, -1, -1, -1, -1]
+upper = [1, 1, 1, 1, 1, 1, 1, 1]
+[disturbance]
+center = [0, 0, 0, 0, 0, 0, 0, 0]
+generators = [[0, 0.1, 0, 0.1, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0.1, 0, -0.1]]
+[noise]
+half_width = [0.2, 0.2, 0.2, 0.2]
+[simulation]
+steps = 13
+missing = [3]
+"""
+
+
+def test_eight_states_have_bounds_figures_and_a_page(infoset: Command) -> None:
+    Path("eight.toml").write_text(EIGHT_STATES)
+
+    code, out, _ = infoset("observe", "eight.toml", "--smooth", "--out", "o", "--html", "page.html")
+
+    assert code == 0
+    assert "true state inside its bounds: 13 of 13 steps" in out
+    assert "the bounds are those of the last measurements" in out
+    results = strict(Path("o/results.json").read_text())
+    assert "vertices" not in results["steps"][0]
+    assert all(0.0 <= excess < 0.1 for excess in results["excess_widths"])
+    for step in results["steps"]:
+        for ends in (step, step["smoothed"]):
+            assert (np.array(ends["lower"]) <= step["state"]).all()
+            assert (np.array(ends["upper"]) >= step["state"]).all()
+    assert '"centre":null' in Path("page.html").read_text(encoding="utf-8")
+    assert list(Path("o").glob("figure-bounds*"))
+    assert not list(Path("o").glob("figure-sets*"))
+
+
 @pytest.mark.parametrize("states", [2, 3])
 @pytest.mark.parametrize("data", ["simulated", "measured"])
 def test_unstable_systems_are_refused_before_numbers_overflow(infoset: Command, data: str, states: int) -> None:
