@@ -91,7 +91,7 @@ class Window:
             return -np.inf
         key = direction.tobytes()
         if key not in self._heights:
-            top, _ = extent(self.carried, direction[None])
+            top, _ = extent(self.carried, direction[None], sizes_of(self.carried))
             self._heights[key] = min(float(top[0]), self.program.bound(direction))
         return self._heights[key]
 
@@ -114,12 +114,13 @@ class Window:
             return self
         outputs = np.flatnonzero(exists)
         normals = strips.normals[outputs]
-        slack = CUT_SLACK * (np.abs(normals) @ sizes_of(self.carried) + strips.terms[run, outputs])
+        sizes = sizes_of(self.carried)
+        slack = CUT_SLACK * (np.abs(normals) @ sizes + strips.terms[run, outputs])
         lower = strips.lower[run, outputs] - slack
         upper = strips.upper[run, outputs] + slack
 
         stage = self.stages[-1]
-        top, bottom = extent(self.carried, normals)
+        top, bottom = extent(self.carried, normals, sizes)
         excess = np.maximum(lower - top, bottom - upper)
         if (excess > 0.0).any():
             first = int(np.argmax(excess > 0.0))
@@ -127,7 +128,7 @@ class Window:
             return replace(self, contradiction=where)
 
         cut = stage.with_strips(normals, lower, upper, outputs)
-        carried = cut_outward(self.carried, normals, np.maximum(lower, bottom), np.minimum(upper, top))
+        carried = cut_outward(self.carried, normals, np.maximum(lower, bottom), np.minimum(upper, top), sizes)
         return replace(self, stages=(*self.stages[:-1], cut), carried=carried)
 
     def before(self, later: Window, motion: Motion) -> Window:
@@ -249,7 +250,7 @@ def moved(one: Zonotope, motion: Motion) -> Zonotope:
     terms = motion.sums_of_terms(sizes_of(one))
     slack = (SUM_SLACK + len(matrix) * EPSILON) * terms
     centre = matrix @ one.centre + motion.shifts[0] + w.centre
-    generators = np.vstack([one.generators @ matrix.T, w.generators, np.diag(slack)])
+    generators = np.concatenate([one.generators @ matrix.T, w.generators, np.diag(slack)])
     return Zonotope(centre, fewer(generators, ORDER))
 
 
@@ -268,20 +269,20 @@ def fewer(generators: Floats, order: int) -> Floats:
     by_length = np.argsort(lengths, kind="stable")
     short = by_length[: count - (order - 1) * n]
     box = (1.0 + count * EPSILON) * sizes[short].sum(axis=0)
-    return np.vstack([generators[by_length[len(short) :]], np.diag(box)])
+    return np.concatenate([generators[by_length[len(short) :]], np.diag(box)])
 
 
-def extent(one: Zonotope, normals: Floats) -> tuple[Floats, Floats]:
-    """Return the maximum and the minimum of each normal . x, rounded outward."""
+def extent(one: Zonotope, normals: Floats, sizes: Floats) -> tuple[Floats, Floats]:
+    """Return the maximum and the minimum of each normal . x, rounded outward; `sizes` are those of the zonotope."""
     half = np.abs(normals @ one.generators.T).sum(axis=1)
     middle = normals @ one.centre
-    terms = np.abs(normals) @ sizes_of(one)
+    terms = np.abs(normals) @ sizes
     rounding = (sum(one.generators.shape) + 4) * EPSILON * terms
     return middle + half + rounding, middle - half - rounding
 
 
-def cut_outward(one: Zonotope, normals: Floats, lower: Floats, upper: Floats) -> Zonotope:
-    """Return a zonotope that contains the part of a zonotope within strips.
+def cut_outward(one: Zonotope, normals: Floats, lower: Floats, upper: Floats, sizes: Floats) -> Zonotope:
+    """Return a zonotope that contains the part of a zonotope, of some `sizes`, within strips.
 
     x = x + K (y - C x - v) holds for each x of the part, with y the middles of the strips and |v| at most half of
     their widths, and for every matrix K. The gain that is used minimises the sum of the squared generators.
@@ -297,11 +298,10 @@ def cut_outward(one: Zonotope, normals: Floats, lower: Floats, upper: Floats) ->
     gain = one.generators.T @ (products / units) @ _inverse(spread / units / units[:, None]) / units
 
     centre = one.centre + gain @ (middle - normals @ one.centre)
-    generators = np.vstack([one.generators - products @ gain.T, half[:, None] * gain.T])
-    sizes = sizes_of(one)
     terms = sizes + np.abs(gain) @ (np.abs(normals) @ sizes + np.abs(middle) + half)
     rounding = (SUM_SLACK + (n + len(normals)) * EPSILON) * terms
-    return _with_box(Zonotope(centre, generators), rounding)
+    generators = [one.generators - products @ gain.T, half[:, None] * gain.T, np.diag(rounding)]
+    return Zonotope(centre, np.concatenate(generators))
 
 
 def _inverse(matrix: Floats) -> Floats:

@@ -500,7 +500,7 @@ def drifting(states: int, **options: Any) -> LinearObserver:
     """Return an observer of a chain of integrators of some states, whose first one is measured."""
     a, c, generators = chain(1, states)
     box = Zonotope.box(-np.ones(states), np.ones(states))
-    settings = {"noise": 0.2, "disturbance": Zonotope(np.zeros(states), generators)}
+    settings: dict[str, Any] = {"noise": 0.2, "disturbance": Zonotope(np.zeros(states), generators)}
     return LinearObserver(a, c, box, **(settings | options))
 
 
@@ -575,7 +575,7 @@ def test_cut_of_a_batch_has_ends_for_each_run() -> None:
 
 def test_none_is_a_missing_measurement() -> None:
     box = Zonotope.box(-np.ones(2), np.ones(2))
-    settings = {"noise": 0.1, "disturbance": Zonotope([0.0, 0.0], [[0.0, 0.1]])}
+    settings: dict[str, Any] = {"noise": 0.1, "disturbance": Zonotope([0.0, 0.0], [[0.0, 0.1]])}
     rows = [[0.5, None], None, [None, 0.2]]
     with_nan = [[0.5, np.nan], [np.nan, np.nan], [np.nan, 0.2]]
     one, other = (LinearObserver(DRIFT, np.eye(2), box, **settings).run(y) for y in (rows, with_nan))
