@@ -90,5 +90,5 @@ class ConvexSet:
 def need_convex_set(name: str, value: object) -> ConvexSet:
     """Return an argument that is a set of any class, or raise a TypeError."""
     if not isinstance(value, ConvexSet):
-        raise TypeError(f"{name} must be a set, ConvexPolygons or a Polytope: got {shown(value)}")
+        raise TypeError(f"{name} must be a set (ConvexPolygons, Polytope or Zonotope): got {shown(value)}")
     return value

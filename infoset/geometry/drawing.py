@@ -113,7 +113,13 @@ def _next_colour(axes: Any) -> Any:
 
 
 def axes_of(ax: Any, space: int) -> Any:
-    """Return axes for sets of R^2 or R^3: those given, the present ones of pyplot, or new ones if these do not fit."""
+    """Return axes for sets of R^2 or R^3: those given, the present ones of pyplot, or new ones if these do not fit.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the given ones are no axes, or have another number of dimensions.
+    """
     if ax is not None:
         if not isinstance(ax, import_module("matplotlib.axes").Axes):
             raise TypeError(f"ax must be axes of matplotlib: got {shown(ax)}")

@@ -15,10 +15,8 @@ from infoset.geometry._set_arguments import (
     axis_numbers,
     bound_values,
     finite_values,
-    need_set,
     not_negative,
     offset_values,
-    present_axes,
 )
 from infoset.geometry.convex_set import ConvexSet
 from infoset.geometry.double_words import EPS, affine_image
@@ -28,7 +26,7 @@ from infoset.geometry.polytope.arrays import FLAT
 from infoset.geometry.polytope.generators import Span, exact_determinant
 from infoset.geometry.zonotope_arrays import ZonotopeArrays, box_generators
 from infoset.geometry.zonotope_membership import are_inside
-from infoset.limits import Limits, real_values, shown
+from infoset.limits import Limits, real_values
 
 _MAX_SUBSETS = 1_000_000
 """Number of determinants up to which `volume` is their sum: about a second."""
@@ -81,16 +79,20 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         generators, _ = affine_image(self.generators.copy(), rows, np.zeros(len(rows)))
         return Zonotope(centre[0], generators)
 
-    def minkowski_sum(self, other: Zonotope) -> Zonotope:
-        """Return {x + y: x in the set, y in the other}: all generators of both. O(m n).
+    def minkowski_sum(self, other: ConvexSet) -> Any:
+        """Return {x + y: x in the set, y in the other}: a zonotope with all generators of both, O(m n).
+
+        With a set of another class it is a `Polytope`, by `polytope()`.
 
         Raises
         ------
         ValueError
             If the other set is in another space.
         """
-        if need_set("other", other, Zonotope).space != self.space:
-            raise ValueError(f"other must be a zonotope in R^{self.space}, as this one: got {other!r}")
+        if not isinstance(other, Zonotope):
+            return self.polytope().minkowski_sum(other)
+        if other.space != self.space:
+            raise ValueError(f"other must be a set in R^{self.space}, as this one: got {other!r}")
         return Zonotope(self.centre + other.centre, np.vstack([self.generators, other.generators]))
 
     def add_segment(self, half: ArrayLike) -> Zonotope:
@@ -242,17 +244,17 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         """The projection on the coordinates that are independent in the set."""
         return self if self.dimension == self.space else self.project(self._span.own)
 
-    def intersection(self, *others: Zonotope | Polytope) -> Polytope:
-        """Return the intersection with one or more zonotopes or polytopes, by `polytope()`."""
-        return self.polytope().intersection(*map(_polytope_of, others))
+    def intersection(self, *others: ConvexSet) -> Polytope:
+        """Return the intersection with one or more sets of any class, by `polytope()`."""
+        return self.polytope().intersection(*others)
 
-    def convex_hull(self, *others: Zonotope | Polytope) -> Polytope:
-        """Return the convex hull of the union with one or more zonotopes or polytopes, by `polytope()`."""
-        return self.polytope().convex_hull(*map(_polytope_of, others))
+    def convex_hull(self, *others: ConvexSet) -> Polytope:
+        """Return the convex hull of the union with one or more sets of any class, by `polytope()`."""
+        return self.polytope().convex_hull(*others)
 
-    def minkowski_difference(self, other: Zonotope | Polytope) -> Polytope:
+    def minkowski_difference(self, other: ConvexSet) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}, by `polytope()`."""
-        return self.polytope().minkowski_difference(_polytope_of(other))
+        return self.polytope().minkowski_difference(other)
 
     # Measures ---------------------------------------------------------------------------------------------------------
 
@@ -336,9 +338,9 @@ class Zonotope(ZonotopeArrays, ConvexSet):
             found[found] = self._in_own.polytope().contains(listed[found][:, span.own])
         return np.asarray(found.reshape(x.shape[:-1]))
 
-    def is_subset(self, other: Zonotope | Polytope, tolerance: float = 0.0) -> bool:
+    def is_subset(self, other: ConvexSet, tolerance: float = 0.0) -> bool:
         """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets."""
-        return self.polytope().is_subset(_polytope_of(other), tolerance)
+        return self.polytope().is_subset(other, tolerance)
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension d; 1 for a point.
@@ -370,29 +372,11 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         return self.centre.copy()
 
     def plot(self, ax: Any = None, **style: Any) -> list[Any]:
-        """Fill a set of R^2 on matplotlib axes (default: the present ones), with options of matplotlib's `fill`.
+        """Draw a set of R^2 or R^3 on matplotlib axes, and return the artists: `Polytope.plot` of `polytope()`."""
+        return self.polytope().plot(ax, **style)
 
-        Returns
-        -------
-        list of matplotlib.patches.Polygon
-            The artists.
-        """
-        corners = self.polytope()._polygon().polygon()
-        return list(present_axes(ax).fill(*corners.T, **style))
-
-    def __and__(self, other: Zonotope | Polytope) -> Any:
-        return self.intersection(other) if isinstance(other, Zonotope | Polytope) else NotImplemented
-
-    __rand__ = __and__
-
-
-def _polytope_of(other: Zonotope | Polytope) -> Polytope:
-    """Return a zonotope or a polytope as a polytope."""
-    if isinstance(other, Zonotope):
-        return other.polytope()
-    if not isinstance(other, Polytope):
-        raise TypeError(f"other must be a Zonotope or a Polytope: got {shown(other)}")
-    return other
+    def __and__(self, other: Any) -> Any:
+        return self.intersection(other) if isinstance(other, ConvexSet) else NotImplemented
 
 
 def _sums_up(rows: Floats) -> Floats:

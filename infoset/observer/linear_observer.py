@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry._set_arguments import bound_values, finite_values, present_axes
+from infoset.geometry._set_arguments import bound_values, finite_values
 from infoset.geometry.convex_polygons import ConvexPolygons
+from infoset.geometry.drawing import draw_polygons
 from infoset.geometry.polytope import Polytope
 from infoset.geometry.zonotope import Zonotope
 from infoset.limits import COUNT, Limits, real_values, shown
@@ -219,12 +220,7 @@ class Estimate:
         numbers = [number for number in np.ravel(states).tolist() if number in range(self.states)]
         if np.shape(states) != (2,) or len(set(numbers)) != 2:
             raise ValueError(f"states must be two different numbers from 0 to {self.states - 1}: got {shown(states)}")
-        artists = list[Any]()
-        axes = present_axes(ax)
-        for outline in self._outlines(numbers):
-            if len(outline):
-                artists.extend(axes.fill(*outline.T, **style))
-        return artists
+        return draw_polygons(ax, self._outlines(numbers), style)
 
     def _vertices(self) -> list[Floats]:
         """Return the vertices of each run, shape (v, n)."""

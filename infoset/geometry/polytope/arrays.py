@@ -106,7 +106,13 @@ class PolytopeArrays:
 
     @classmethod
     def halfspace(cls, normal: ArrayLike, offset: float) -> Self:
-        """Return {x: normal . x <= offset}, with a `normal` of shape (n,) that is not zero."""
+        """Return {x: normal . x <= offset}, with a `normal` of shape (n,).
+
+        Raises
+        ------
+        ValueError
+            If the normal is zero.
+        """
         row = finite_values("normal", normal, "n")
         if not row.any():
             raise ValueError("normal must not be zero")

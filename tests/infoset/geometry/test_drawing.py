@@ -12,7 +12,7 @@ import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
-from infoset import ConvexPolygons, Polytope
+from infoset import ConvexPolygons, Polytope, Zonotope
 from infoset.geometry.drawing import ring_order
 
 CUBE = Polytope.from_box([0, 0, 0], [1, 1, 1])
@@ -144,7 +144,7 @@ def test_order_around_a_polygon_in_space_is_that_of_its_angles_in_the_plane(seed
 def test_edges_of_facets_join_vertices_with_two_common_facets(seed: int) -> None:
     """The order around a facet agrees with the incidence: neighbours in it are on another common facet."""
     random = np.random.default_rng(seed)
-    polytope = Polytope.from_zonotope([0, 0, 0], random.normal(size=(4, 3)))
+    polytope = Zonotope([0, 0, 0], random.normal(size=(4, 3))).polytope()
 
     for on in polytope.incidence.T:
         ring = np.flatnonzero(on)[ring_order(polytope.points[on])]

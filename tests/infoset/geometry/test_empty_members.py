@@ -78,7 +78,7 @@ CASES: dict[str, tuple[Operation, Any]] = {
 OTHERS = {
     "empty": "makes empty sets",
     "unchecked": "takes arrays of kernels",
-    **dict.fromkeys(["vertices", "counts", "shape"], "attributes"),
+    **dict.fromkeys(["vertices", "counts", "shape", "space"], "attributes"),
     **dict.fromkeys(["from_vertices", "from_points", "from_constraints", "from_box"], "make sets of numbers"),
     **dict.fromkeys(["from_ball", "from_zonotope", "from_shapely"], "make sets of numbers"),
     **dict.fromkeys(["polygon", "polytope", "to_shapely"], "of a single polygon"),

@@ -44,7 +44,6 @@ ONLY_POLYTOPES = {
 ONLY_ZONOTOPES = {
     "generators": "the stored set, with its centre; polytopes store vertices and facets",
     "box": "a centre and generators along axes",
-    "polytope": "conversion; the reverse does not exist",
 }
 
 

@@ -383,6 +383,14 @@ def test_area_of_the_plane() -> None:
     assert Zonotope([1, 2], [[1, 1]]).area() == 0.0
 
 
+def test_sum_with_a_set_of_another_class_is_a_polytope() -> None:
+    box = Polytope.from_box([-1.0, -1.0], [2.0, 3.0])
+
+    for found in (SQUARE + box, box + SQUARE, SQUARE + ConvexPolygons.from_box([-1.0, -1.0], [2.0, 3.0])):
+        assert isinstance(found, Polytope)
+        assert found.equals(SQUARE.polytope() + box, 1e-12)
+
+
 def test_plot_returns_the_artists() -> None:
     import matplotlib.pyplot as plt
 
@@ -395,7 +403,7 @@ def test_plot_returns_the_artists() -> None:
     assert len(zonotope.plot()) == 1
     assert len(ax.patches) == 2
     plt.close(figure)
-    with pytest.raises(ValueError, match=r"a set of R\^2 is needed: project this one, of R\^3"):
+    with pytest.raises(ValueError, match=r"a set of R\^3 is drawn on axes of 3 dimensions"):
         rotated_boxes(1).plot(ax)
 
 
@@ -581,7 +589,6 @@ def test_strip_that_misses_the_set_is_refused(lower: float, upper: float) -> Non
 # Mistaken arguments ---------------------------------------------------------------------------------------------------
 
 SQUARE = Zonotope([0, 0], [[1, 0], [0, 1]])
-UNIT_BOX: Any = Polytope.from_box([0, 0], [1, 1])
 
 
 @pytest.mark.parametrize(
@@ -589,10 +596,9 @@ UNIT_BOX: Any = Polytope.from_box([0, 0], [1, 1])
     [
         (lambda: Zonotope([0, 0], [[1, 0, 0]]), ValueError, "generators must have the shape"),
         (lambda: Zonotope([0, np.nan], []), ValueError, "centre must be finite"),
-        (lambda: SQUARE + Zonotope([0], []), ValueError, r"other must be a zonotope in R\^2"),
-        (lambda: SQUARE + UNIT_BOX, TypeError, "other must be of the type Zonotope"),
-        (lambda: SQUARE.intersection("x"), TypeError, "other must be a Zonotope or a Polytope"),  # type: ignore[arg-type]
-        (lambda: SQUARE & rotated_boxes(1), ValueError, r"other must be a polytope in R\^2"),
+        (lambda: SQUARE + Zonotope([0], []), ValueError, r"other must be a set in R\^2"),
+        (lambda: SQUARE.intersection("x"), TypeError, r"other must be a set \(ConvexPolygons, Polytope or Zonotope\)"),  # type: ignore[arg-type]
+        (lambda: SQUARE & rotated_boxes(1), ValueError, r"other must be a set in R\^2"),
         (lambda: SQUARE + np.ones(3), ValueError, r"offset must have the shape \(2,\)"),
         (lambda: np.eye(3) @ SQUARE, ValueError, "matrix must have the shape"),
         (lambda: SQUARE.enlarged([-1, 0]), ValueError, "by must be at least 0"),

@@ -223,7 +223,7 @@ def test_initial_polytope_and_disturbance_are_exact_within_the_window() -> None:
     system = WideSystem.random(7, 4)
     _, measured = system.simulated(5, 1, 0.8, extremal=False)
     box = Polytope.from_box(-np.ones(7), np.ones(7))
-    disturbance = Polytope.from_zonotope(np.zeros(7), system.generators)
+    disturbance = Zonotope(np.zeros(7), system.generators).polytope()
 
     observer = LinearObserver(system.a, system.c, box, noise=system.noise, disturbance=disturbance)
     estimate = observer.run(measured)[-1]
