@@ -61,6 +61,8 @@ nitpick_ignore = [
         "infoset.experiments.pursuit.file": ("PursuitProblem",),
         "infoset.experiments.reachability.file": ("Rendezvous",),
         "infoset.experiments.reachability.system_file": ("ReachableSystem",),
+        "infoset.geometry.polytope.polyhedron": ("Polyhedron",),
+        "infoset.geometry.zonotope_arrays": ("ZonotopeArrays",),
         "infoset.guidance.predictive": ("ManoeuvreState",),
         "infoset.guidance.proportional_navigation": ("PulseState",),
         "infoset.geometry.convex_polygons": ("PolygonsOrPolytope",),
