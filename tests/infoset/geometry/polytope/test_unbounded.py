@@ -370,7 +370,7 @@ def difference(one: Any, other: Any) -> Any:
 
 
 @needs_ppl
-@pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("space", [2, 3])
 def test_operations_equal_exact_ones(space: int, count: int) -> None:
     import ppl
