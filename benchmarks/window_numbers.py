@@ -1,9 +1,10 @@
 """Observers of seven and more states: times of zonotopes and of programs, and widths compared with the exact ones.
 
 ``python -m benchmarks.window_numbers [STATES ..]``, 8, 12 and 20 by default. The systems are those of
-`tests/infoset/observer/test_window.py`: a random one, and masses in a row whose positions are measured; 40 steps with
-errors within their bounds. The ratios are geometric means over the states at steps 29 and 39, of the width to that of
-the whole record. Times are processor times of one thread: of a step of the zonotope, and of one bound.
+`tests/infoset/observer/test_window.py`: a random one, masses in a row whose positions are measured, and undamped masses
+between springs, of which every other position is measured; 40 steps with errors within their bounds. The ratios are
+geometric means over the states at steps 29 and 39, of the width to that of the whole record. Times are processor times
+of one thread: of a step of the zonotope, and of one bound.
 
 ``python -m benchmarks.window_numbers small`` compares windows with the polytopes of `max_facets`, for random systems
 of three to six states of `benchmarks/observer_numbers.py` with 30 steps.
@@ -136,6 +137,7 @@ def main() -> None:
     for states in map(int, sys.argv[1:] or ("8", "12", "20")):
         print_system(f"{states} random", WideSystem.random(states, 1))
         print_system(f"{states} chain", WideSystem.chain(states))
+        print_system(f"{states} springs", WideSystem.springs(states))
 
 
 if __name__ == "__main__":

@@ -26,14 +26,13 @@ from infoset.geometry.polytope.arrays import FLAT
 from infoset.geometry.polytope.generators import Span, exact_determinant
 from infoset.geometry.zonotope_arrays import ZonotopeArrays, box_generators
 from infoset.geometry.zonotope_membership import are_inside
+from infoset.geometry.zonotope_outer import corrected_by_strips, fewer_generators
 from infoset.limits import Limits, real_values
 
 _MAX_SUBSETS = 1_000_000
 """Number of determinants up to which `volume` is their sum: about a second."""
 _SUBSETS_AT_ONCE = 20_000
 """Number of determinants that are computed together: a few MB."""
-_SINGULAR = 1e-12
-"""Share of the largest singular value below which strips count as dependent; any gain is sound."""
 
 
 class Zonotope(ZonotopeArrays, ConvexSet):
@@ -132,12 +131,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         Limits(minimum=1.0).need("order", order)
         if len(self.generators) <= order * self.space:
             return self
-        widths = np.abs(self.generators).sum(axis=0)
-        sizes = np.abs(self.generators) / np.where(widths > 0.0, widths, 1.0)
-        ranks = np.argsort(sizes.max(axis=1) - sizes.sum(axis=1), kind="stable")
-        kept = int(order * self.space) - self.space
-        box = box_generators(_sums_up(self.generators[ranks[kept:]]))
-        return Zonotope(self.centre, np.vstack([self.generators[np.sort(ranks[:kept])], box]))
+        return Zonotope(self.centre, fewer_generators(self.generators, int(order * self.space)))
 
     def cut(
         self,
@@ -193,33 +187,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         is_cut = (low > middles - reach) | (high < middles + reach)
         if not is_cut.any():
             return self
-        return self._corrected(rows[is_cut], low[is_cut], high[is_cut])
-
-    def _corrected(self, rows: Floats, low: Floats, high: Floats) -> Zonotope:
-        """Return the outer set of the part in strips low <= rows x <= high, by the gain in the notes of `cut`."""
-        y = 0.5 * low + 0.5 * high
-        # Rounding of the middle must not lose an end.
-        half = np.nextafter(np.maximum(high - y, y - low), np.inf)
-
-        # In units of the widths of the strips' normals the matrix to invert has ones on its diagonal.
-        images = self.generators @ rows.T
-        covariance = images.T @ images + np.diag(half**2)
-        units = np.sqrt(np.diag(covariance))
-        units = np.where(units > 0.0, units, 1.0)
-        inverse = np.linalg.pinv(covariance / np.outer(units, units), rcond=_SINGULAR, hermitian=True)
-        gain = self.generators.T @ (images / units) @ inverse / units
-
-        error = y - rows @ self.centre
-        centre = self.centre + gain @ error
-        remaining = np.eye(self.space) - gain @ rows
-        generators = np.vstack([self.generators @ remaining.T, (gain * half).T])
-
-        # Each number is a sum of at most so many products, of these sizes.
-        factor = np.eye(self.space) + np.abs(gain) @ np.abs(rows)
-        sizes = np.abs(self.generators).sum(axis=0)
-        terms = factor @ (np.abs(self.centre) + sizes) + np.abs(gain) @ (np.abs(y) + half)
-        unsure = (self._operations + len(rows)) * EPS * terms
-        return Zonotope(centre, generators[generators.any(axis=1)]).enlarged(unsure)
+        return Zonotope(*corrected_by_strips(self.centre, self.generators, rows[is_cut], low[is_cut], high[is_cut]))
 
     @property
     def _operations(self) -> int:
@@ -377,9 +345,3 @@ class Zonotope(ZonotopeArrays, ConvexSet):
 
     def __and__(self, other: Any) -> Any:
         return self.intersection(other) if isinstance(other, ConvexSet) else NotImplemented
-
-
-def _sums_up(rows: Floats) -> Floats:
-    """Return the sums of the absolute values of each column, rounded up."""
-    sums, lost = affine_image(np.ones((1, len(rows))), np.ascontiguousarray(np.abs(rows).T), np.zeros(rows.shape[1]))
-    return np.asarray(np.where(lost > 0.0, np.nextafter(sums[0], np.inf), sums[0]))

@@ -12,6 +12,8 @@ import numpy as np
 from infoset.arrays import Flags, Floats
 from infoset.engine.section_life import CUT_SLACK, SUM_SLACK
 from infoset.geometry.zonotope import Zonotope
+from infoset.geometry.zonotope_arrays import box_generators
+from infoset.geometry.zonotope_outer import corrected_by_strips, fewer_generators
 from infoset.observer.programs import EPSILON, Program, Stage
 from infoset.observer.sets import Motion, Set, Sets, sizes_of
 from infoset.observer.steps import Strips
@@ -20,10 +22,7 @@ ORDER = 5
 """Generators of a carried zonotope for each state. More are not tighter: on chains of masses, 30 gave wider sets."""
 WINDOW = 10
 """Steps of a program. For up to 20 states the widths are then within 6 % of those of the whole record in random systems
-and chains, and within 35 % in masses with springs, whose motion is hardly damped (docs/estimation.md)."""
-_SINGULAR = 1e-10
-"""Eigenvalue of the scaled matrix of a gain below which it counts as zero: a gain may not enlarge rounding errors to
-more than 1e-6 of a state. Every gain is correct, so that the value only matters for the size of the set."""
+and chains of masses, and within 12 % in undamped masses between springs (benchmarks/window_numbers.py)."""
 
 
 class Contradiction(NamedTuple):
@@ -64,7 +63,7 @@ class Window:
     @classmethod
     def of(cls, start: Set, length: int | None) -> Window:
         """Return the window at step 0, before its measurement."""
-        carried = _with_box(_zonotope_of(start), SUM_SLACK * sizes_of(start))
+        carried = _zonotope_of(start).enlarged(SUM_SLACK * sizes_of(start))
         return cls((Stage.at_first(0, start),), 0, carried, length)
 
     @cached_property
@@ -129,7 +128,10 @@ class Window:
             return replace(self, contradiction=where)
 
         cut = stage.with_strips(normals, lower, upper, outputs)
-        carried = cut_outward(self.carried, normals, np.maximum(lower, bottom), np.minimum(upper, top), sizes)
+        low = np.maximum(lower, bottom)
+        high = np.minimum(upper, top)
+        part = corrected_by_strips(self.carried.centre, self.carried.generators, normals, low, high)
+        carried = Zonotope(*part)
         return replace(self, stages=(*self.stages[:-1], cut), carried=carried)
 
     def before(self, later: Window, motion: Motion) -> Window:
@@ -250,27 +252,10 @@ def moved(one: Zonotope, motion: Motion) -> Zonotope:
     w = _zonotope_of(motion.disturbance)
     terms = motion.sums_of_terms(sizes_of(one))
     slack = (SUM_SLACK + len(matrix) * EPSILON) * terms
+
     centre = matrix @ one.centre + motion.shifts[0] + w.centre
-    generators = np.concatenate([one.generators @ matrix.T, w.generators, np.diag(slack)])
-    return Zonotope(centre, fewer(generators, ORDER))
-
-
-def fewer(generators: Floats, order: int) -> Floats:
-    """Return at most `order` n generators of a zonotope that contains the one of the given ones.
-
-    The generators that are nearest to an axis, or short, become a box (Girard 2005), in units of the widths.
-    """
-    count, n = generators.shape
-    if count <= order * n:
-        return generators
-    sizes = np.abs(generators)
-    widths = sizes.sum(axis=0)
-    shares = sizes / np.where(widths > 0.0, widths, 1.0)
-    lengths = shares.sum(axis=1) - shares.max(axis=1)
-    by_length = np.argsort(lengths, kind="stable")
-    short = by_length[: count - (order - 1) * n]
-    box = (1.0 + count * EPSILON) * sizes[short].sum(axis=0)
-    return np.concatenate([generators[by_length[len(short) :]], np.diag(box)])
+    generators = np.concatenate([one.generators @ matrix.T, w.generators, box_generators(slack)])
+    return Zonotope(centre, fewer_generators(generators, ORDER * len(matrix)))
 
 
 def extent(one: Zonotope, normals: Floats, sizes: Floats) -> tuple[Floats, Floats]:
@@ -280,41 +265,6 @@ def extent(one: Zonotope, normals: Floats, sizes: Floats) -> tuple[Floats, Float
     terms = np.abs(normals) @ sizes
     rounding = (sum(one.generators.shape) + 4) * EPSILON * terms
     return middle + half + rounding, middle - half - rounding
-
-
-def cut_outward(one: Zonotope, normals: Floats, lower: Floats, upper: Floats, sizes: Floats) -> Zonotope:
-    """Return a zonotope that contains the part of a zonotope, of some `sizes`, within strips.
-
-    x = x + K (y - C x - v) holds for each x of the part, with y the middles of the strips and |v| at most half of
-    their widths, and for every matrix K. The gain that is used minimises the sum of the squared generators.
-    """
-    n = len(one.centre)
-    middle = 0.5 * lower + 0.5 * upper
-    half = np.maximum(upper - middle, middle - lower)
-
-    products = one.generators @ normals.T
-    spread = products.T @ products + np.diag(half**2)
-    units = np.sqrt(np.diag(spread))
-    units = np.where(units > 0.0, units, 1.0)
-    gain = one.generators.T @ (products / units) @ _inverse(spread / units / units[:, None]) / units
-
-    centre = one.centre + gain @ (middle - normals @ one.centre)
-    terms = sizes + np.abs(gain) @ (np.abs(normals) @ sizes + np.abs(middle) + half)
-    rounding = (SUM_SLACK + (n + len(normals)) * EPSILON) * terms
-    generators = [one.generators - products @ gain.T, half[:, None] * gain.T, np.diag(rounding)]
-    return Zonotope(centre, np.concatenate(generators))
-
-
-def _inverse(matrix: Floats) -> Floats:
-    """Return the inverse of a symmetric matrix with a diagonal of ones, on the eigenvectors that are not singular."""
-    values, vectors = np.linalg.eigh(matrix)
-    used = values > _SINGULAR
-    return np.asarray((vectors[:, used] / values[used]) @ vectors[:, used].T)
-
-
-def _with_box(one: Zonotope, half: Floats) -> Zonotope:
-    """Return the sum of a zonotope and a box."""
-    return Zonotope(one.centre, np.vstack([one.generators, np.diag(half)]))
 
 
 def _zonotope_of(shape: Set) -> Zonotope:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from infoset import LinearObserver, Polytope, Zonotope
 from infoset.arrays import Floats
@@ -45,6 +46,19 @@ class WideSystem:
         """Return masses in a row, of an even number of states, whose positions are measured."""
         a, c, generators = chain(states // 2, 2)
         return cls(a, c, generators, 0.2)
+
+    @classmethod
+    def springs(cls, states: int) -> WideSystem:
+        """Return undamped masses in a row between springs, of an even number of states; every other position is seen.
+
+        The slowest oscillation of four masses takes 34 steps.
+        """
+        masses = states // 2
+        springs = 0.09 * (2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1))
+        rates = np.block([[np.zeros((masses, masses)), np.eye(masses)], [-springs, np.zeros((masses, masses))]])
+        c = np.eye(states)[:masses:2]
+        generators = 0.05 * np.eye(states)[masses:]
+        return cls(expm(rates), c, generators, 0.2)
 
     def observer(self, **options: Any) -> LinearObserver:
         states = len(self.a)
@@ -86,7 +100,9 @@ def geometric_mean(ratios: Floats) -> float:
 # The true state ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("system", [WideSystem.random(7, 1), WideSystem.chain(8), WideSystem.random(20, 1)])
+@pytest.mark.parametrize(
+    "system", [WideSystem.random(7, 1), WideSystem.chain(8), WideSystem.springs(8), WideSystem.random(20, 1)]
+)
 def test_true_state_with_errors_at_their_bounds_is_inside_the_window_bounds(system: WideSystem) -> None:
     states, measured = system.simulated(14, 3)
     every = 1 if len(system.a) < 10 else 13
