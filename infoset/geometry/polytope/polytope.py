@@ -57,7 +57,8 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     An unbounded set is the sum of the hull of its `vertices`, of the cone of its `directions` and of the span of its
     `lines`; one that contains lines has points of its smallest faces in the place of vertices. It is stored and
-    computed in exact integers (`exact`), which takes longer; a result that is bounded is rounded to nearest. What is infinite is inf; what does not exist, such as a centroid, raises an UnboundedPolytopeError.
+    computed in exact integers (`exact`), which takes longer; a result that is bounded is rounded to nearest. What is
+    infinite is inf; what does not exist, such as a centroid, raises an UnboundedPolytopeError.
 
     Operations on the empty set give the empty set; points such as its centroid do not exist (EmptyPolytopeError). All
     arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
