@@ -3,7 +3,7 @@
     python -m benchmarks.hard_observers
 
 The errors of all steps are at their bounds. The first rows are the 1 000 random systems of the thorough tests. The last
-one has 600 systems of five and six states: some have singular or rounded matrices, flat initial sets, exact
+one has 600 systems of three and four states: some have singular or rounded matrices, flat initial sets, exact
 measurements, or units of the states from 1e-9 to 1e9. A lost state is beyond a facet normal . x <= offset, by a
 distance relative to the terms of normal . x.
 """
@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import LinearObserver, Zonotope
-from infoset.geometry.polytope import UncertainHullError
 from tests.infoset.observer.test_random_observers import STEPS, System
 
 Floats = NDArray[np.float64]
@@ -36,9 +35,9 @@ def random_case(seed: int) -> Case:
 
 
 def degenerate_case(seed: int) -> Case:
-    """Return a system of five or six states that may be singular, flat, exact, or in different units."""
+    """Return a system of three or four states that may be singular, flat, exact, or in different units."""
     random = np.random.default_rng(seed + 100_000)
-    n, outputs = int(random.choice([5, 6])), int(random.integers(1, 4))
+    n, outputs = int(random.choice([3, 4])), int(random.integers(1, 4))
     a = random.normal(size=(n, n)) * random.choice([0.3, 0.6])
     if seed % 4 == 0:
         a[-1] = 0.0
@@ -82,7 +81,7 @@ def show(name: str, case_of: Callable[[int], Case], seeds: Iterable[int]) -> Non
                     terms = np.abs(rows) @ np.abs(state) + np.abs(limits)
                     lost.append(float(((rows @ state - limits) / np.maximum(terms, 1e-300)).max()))
                     break
-        except UncertainHullError:
+        except ArithmeticError:
             refused += 1
     ms = np.array(times_ms)
     print(
@@ -94,7 +93,7 @@ def show(name: str, case_of: Callable[[int], Case], seeds: Iterable[int]) -> Non
 
 
 if __name__ == "__main__":
-    show("of 3 to 6 states, with the time to compile", random_case, range(4))
-    for size in range(3, 7):
-        show(f"of {size} states, errors at their bounds", random_case, range(size - 3, 1000, 4))
+    show("of 3 and 4 states, with the time to compile", random_case, range(2))
+    for size in (3, 4):
+        show(f"of {size} states, errors at their bounds", random_case, range(size - 3, 1000, 2))
     show("singular, flat or in different units", degenerate_case, range(600))

@@ -44,7 +44,7 @@ class Report:
 
 
 def contains(estimate: Estimate, state: Floats) -> bool:
-    """Whether a state is in a set; of seven and more states, within its bounds."""
+    """Whether a state is in a set; of five and more states, within its bounds."""
     if estimate.states > MAX_POLYTOPE_STATES:
         return bool((estimate.lower <= state).all() and (state <= estimate.upper).all())
     shape = estimate.polygons if estimate.states == 2 else estimate.polytopes[0]

@@ -8,9 +8,9 @@ from infoset.arrays import Floats
 from infoset.experiments.common.errors import InputError, input_errors
 from infoset.experiments.common.options import choice
 from infoset.experiments.reachability.command import Reach
-from infoset.geometry.polytope import UncertainHullError
 from infoset.rendezvous.reachability import (
     Solution,
+    ThinSetError,
     TooManyVerticesError,
     analytic_centre,
     chebyshev_centre,
@@ -60,7 +60,7 @@ def select_controls(solution: Solution, options: Reach) -> dict[str, Floats]:
         elif name == VERTICES:
             try:
                 several = vertices(solution.optimal)
-            except (TooManyVerticesError, UncertainHullError) as error:
+            except (TooManyVerticesError, ThinSetError) as error:
                 raise InputError(f"--select vertices: {error}; choose for example --select samples:20") from None
             controls |= {f"vertex {number}": control for number, control in enumerate(several, start=1)}
         else:

@@ -10,9 +10,9 @@ from numba import types
 from numba.extending import intrinsic
 
 from infoset.arrays import Floats
+from infoset.geometry.tolerances import EPS
 from infoset.kernels import Kernels
 
-EPS = float(np.finfo(np.float64).eps)
 _kernels = Kernels()  # without fast-math: reordered sums would lose the errors
 
 

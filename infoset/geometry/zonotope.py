@@ -19,11 +19,11 @@ from infoset.geometry._set_arguments import (
     offset_values,
 )
 from infoset.geometry.convex_set import ConvexSet
-from infoset.geometry.double_words import EPS, affine_image
+from infoset.geometry.double_words import affine_image
 from infoset.geometry.polytope import EmptyPolytopeError, Polytope
 from infoset.geometry.polytope._measures import triangle_of
-from infoset.geometry.polytope.arrays import FLAT
 from infoset.geometry.polytope.generators import Span, exact_determinant
+from infoset.geometry.tolerances import EPS, SNAP
 from infoset.geometry.zonotope_arrays import ZonotopeArrays, box_generators
 from infoset.geometry.zonotope_membership import are_inside
 from infoset.geometry.zonotope_outer import corrected_by_strips, fewer_generators
@@ -294,7 +294,7 @@ class Zonotope(ZonotopeArrays, ConvexSet):
         # In the affine hull of a flat set, or as near to it as its own points may be.
         inner = away[:, span.own]
         missing = np.abs(away[:, span.others] - inner @ span.slopes.T)
-        allowed = rounding[:, span.others] + rounding[:, span.own] @ np.abs(span.slopes).T + FLAT
+        allowed = rounding[:, span.others] + rounding[:, span.own] @ np.abs(span.slopes).T + SNAP
         found = (missing <= allowed).all(axis=1)
 
         if self.dimension > 2:

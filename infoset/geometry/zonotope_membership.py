@@ -6,9 +6,9 @@ import numpy as np
 from scipy.optimize import linprog
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry.double_words import EPS
 from infoset.geometry.polytope._measures import HIGHS
-from infoset.geometry.polytope.errors import UncertainHullError
+from infoset.geometry.polytope.errors import SolverError
+from infoset.geometry.tolerances import EPS
 
 _REACH = 2.0
 """Multiple of a point up to which the program searches: all beyond one are inside, and two is clearly beyond."""
@@ -47,7 +47,7 @@ def _is_inside(point: Floats, generators: Floats, basis: Integers, rounding: Flo
     bounds = np.array([[-1.0, 1.0]] * count + [[0.0, _REACH]])
     optimum = linprog(cost, A_eq=equations, b_eq=np.zeros(space), bounds=bounds, method="highs-ds", options=HIGHS)
     if optimum.status != 0:
-        raise UncertainHullError(f"the linear program of membership was not solved: {optimum.message}")
+        raise SolverError(f"the linear program of membership was not solved: {optimum.message}")
 
     multiple = float(optimum.x[-1])
     if multiple > 1.0:

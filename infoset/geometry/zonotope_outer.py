@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset.arrays import Floats
-from infoset.geometry.double_words import EPS, affine_image
+from infoset.geometry.double_words import affine_image
+from infoset.geometry.tolerances import EPS, ON
 from infoset.geometry.zonotope_arrays import box_generators
 
-_SINGULAR = 1e-12
+_SINGULAR = ON
 """Share of the largest eigenvalue below which strips count as dependent; any gain is sound."""
 
 

@@ -22,8 +22,8 @@ from infoset.observer.sets import Motion, Polygons, Polytopes, Set, Sets, polyto
 from infoset.observer.steps import Strips
 from infoset.observer.window import WINDOW, Windows, exact_hull
 
-MAX_POLYTOPE_STATES = 6
-"""Number of states up to which the sets are polytopes: one of seven states takes a second a step."""
+MAX_POLYTOPE_STATES = 4
+"""Number of states up to which the sets are polytopes: of more, programs give tighter bounds than reduced polytopes."""
 Known = TypeVar("Known")
 
 MAX_RECORD = 20_000
@@ -135,7 +135,7 @@ class Estimate:
         Raises
         ------
         ValueError
-            If the system has more than six states: their polytopes are not computed.
+            If the system has more than four states: their polytopes are not computed.
         """
         if isinstance(self.sets, Polytopes):
             return tuple(member.polytope for member in self.sets.members)
@@ -163,7 +163,7 @@ class Estimate:
         Raises
         ------
         ValueError
-            If the system has more than six states: their facets are not known.
+            If the system has more than four states: their facets are not known.
         """
         return self._runs(self.sets.chebyshev_centres())
 
@@ -181,7 +181,7 @@ class Estimate:
         return self._runs(0.0 - lower), self._runs(upper)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return step, bounds and, up to six states, the vertices, as Python numbers and lists.
+        """Return step, bounds and, up to four states, the vertices, as Python numbers and lists.
 
         The keys are `step`, `is_empty`, `lower`, `upper` and `vertices`. The bounds of the empty set are None, and its
         vertices are an empty list. In a batch all values but the step are lists with a member for each run.
@@ -200,7 +200,7 @@ class Estimate:
     def plot(self, ax: Any = None, states: tuple[int, int] = (0, 1), **style: Any) -> list[Any]:
         """Fill the projections of the sets on the plane of two states; return the artists, one for each set.
 
-        Of seven and more states the picture is a polygon of 32 sides that contains the projection, from a linear
+        Of five and more states the picture is a polygon of 32 sides that contains the projection, from a linear
         program each. Empty sets have no artist.
 
         Parameters
@@ -262,9 +262,9 @@ class Estimate:
 class LinearObserver:
     """Exact sets of the states of x+ = A x + B u + c + w, y = C x + v, with w in W and v in V.
 
-    Two states: polygons, compiled, batched over runs. One, and three to six states: polytopes, each run after the
-    other. A polytope of more than `max_facets` facets is replaced by a larger one with fewer, so that the time of a
-    step is bounded. Seven and more states: a zonotope that contains the set is carried, and the bounds of an estimate
+    Two states: polygons, compiled, batched over runs. One, three and four states: polytopes, each run after the other.
+    A polytope of more than `max_facets` facets is replaced by a larger one with fewer, so that the time of a step is
+    bounded. Five and more states: a zonotope that contains the set is carried, and the bounds of an estimate
     are those of linear programs over the last `window` steps, solved when they are asked for.
     `Estimate.reduced` and `excess_widths` give the effect.
 
@@ -288,10 +288,10 @@ class LinearObserver:
         Number B of runs. Without it there is one run, and its arrays have no axis of runs.
     max_facets : int or None, optional
         Maximum number of facets of a polytope after a measurement, at least 2n; it then has at most 700 vertices. None
-        keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError. Not used for more than six
+        keeps the sets exact; a set of more than 5000 vertices is then an ArithmeticError. Not used for more than four
         states.
     window : int or None, optional
-        Number of steps of the linear programs of seven and more states. None is the whole record: bounds are then
+        Number of steps of the linear programs of five and more states. None is the whole record: bounds are then
         exact, and their time grows with the record. Not used for fewer states.
 
     Raises
@@ -301,11 +301,11 @@ class LinearObserver:
 
     Notes
     -----
-    The computed sets contain the exact ones. Without reduction they are larger by a few ulp (two states), by 1e-12 of
+    The computed sets contain the exact ones. Without reduction they are larger by a few ulp (two states), by 1e-11 of
     the coordinates (polytopes) or by 1e-7 of the widths (programs), so that errors exactly at their bounds do not lose
     the true state. Polygons of more than 512 vertices are reduced outward.
 
-    A bound of seven and more states is a sum that is an upper bound for all multipliers of the measurements; the solver
+    A bound of five and more states is a sum that is an upper bound for all multipliers of the measurements; the solver
     (HiGHS) only proposes the multipliers, so that its tolerances enlarge a bound and never make it wrong. Where it
     fails, the bound is that of the carried zonotope. That no state is possible is proved in the same way, by one
     program for each estimate that is asked for it: a contradiction that the zonotope does not show is found if
@@ -394,7 +394,7 @@ class LinearObserver:
             If the inputs have another shape or are not finite, the disturbance is not such a set of n coordinates, or
             a matrix or a disturbance for this step is missing.
         ArithmeticError
-            If a polytope has more than 5000 vertices and no `max_facets`, or rounding decides which are vertices.
+            If a polytope has more than 5000 vertices and no `max_facets`.
         """
         if disturbance is not None:
             _need_set("disturbance", disturbance, self.states)
@@ -480,7 +480,7 @@ class LinearObserver:
 
     @property
     def inconsistency(self) -> Inconsistency:
-        """Where the measurements contradict the model: of seven and more states, by programs over the last steps."""
+        """Where the measurements contradict the model: of five and more states, by programs over the last steps."""
         if isinstance(self._sets, Windows):
             step, output, excess = self._empty
             for run in np.flatnonzero(step == -1):
@@ -525,7 +525,7 @@ class LinearObserver:
         """Return the sets of earlier states given also the later measurements.
 
         The exact backward pass: a state is possible if it is in its own estimate and leads, for some disturbance, to a
-        possible state of the next step. Of seven and more states, the programs of a step also have the measurements
+        possible state of the next step. Of five and more states, the programs of a step also have the measurements
         of the next `window` steps.
 
         Parameters

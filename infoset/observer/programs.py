@@ -15,6 +15,7 @@ from scipy.optimize import linprog
 from infoset.arrays import Floats, Integers
 from infoset.engine.section_life import SUM_SLACK
 from infoset.geometry.polytope import HIGHS
+from infoset.geometry.tolerances import UNSURE
 from infoset.geometry.zonotope import Zonotope
 from infoset.observer.sets import Motion, Set, polytope_of, sizes_of
 
@@ -25,7 +26,7 @@ BLOCK = 25
 From 10 to 50, programs of 41 and 400 steps take the same time to 20 %."""
 _OPTIONS = HIGHS | {"presolve": False}
 """Options of HiGHS. Presolving finds nothing in dense rows: without it, programs of 20 states take half the time."""
-_NO_ROW = 1e-13
+_NO_ROW = 128.0 * UNSURE
 """Length of a row of a strip, relative to its terms, below which it consists of rounding errors of its products."""
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -12,25 +11,20 @@ import numpy as np
 from infoset.arrays import Flags, Floats
 from infoset.engine.section_life import SUM_SLACK
 from infoset.geometry.convex_polygons import ConvexPolygons
-from infoset.geometry.polytope import Polytope, UnboundedPolytopeError, UncertainHullError
+from infoset.geometry.polytope import Polytope
+from infoset.geometry.tolerances import REDUCED, SNAP
 from infoset.geometry.zonotope import Zonotope
 from infoset.observer.steps import Batch, Move, Strips, cut_to_preimage, predict_all, support_all, update_all
 
 Set = ConvexPolygons | Polytope | Zonotope
 
-POLYTOPE_SLACK = 1e-11
-"""Enlargement of polytopes, relative to the terms of normal . x of a measurement, or to the widths of a prediction:
-ten tolerances of one operation, of which the tip of a sharp corner may be missing."""
+POLYTOPE_SLACK = SNAP
+"""Enlargement of polytopes, relative to the terms of normal . x of a measurement, or to the widths of a prediction: the
+distance from a facet within which points are its vertices, so that the tip of a sharp corner may be missing."""
 MAX_POLYTOPE_VERTICES = 5000
 """A polytope with more vertices takes minutes a step."""
 _MAX_VERTICES = 700
-"""The same for sets that are reduced: those of five and six states have many more vertices than facets."""
-_THIN = 3e-8
-"""Thickness of a layer in place of a flat set, relative to the coordinates."""
-_MIN_DEPTH = 1e-9
-"""Thickness of a set, in coordinates in which it is about one wide, below which rounding decides about its facets."""
-_SMALL = 2.0**10
-"""Ratio of widths from which a part of a set is computed again by itself."""
+"""The same for sets that are reduced: those of four states have many more vertices than facets."""
 _TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -183,18 +177,15 @@ class Member:
         return np.asarray(np.abs(self.polytope.vertices).max(axis=0, initial=0.0))
 
     def solid(self, sizes: Floats) -> Member:
-        """Return the set; a flat or very thin one is enlarged to a layer that is thicker than rounding.
+        """Return the set; a flat one is enlarged to a layer that is thicker than rounding.
 
         `sizes`, shape (n,), are maximum terms of the coordinates of a flat set.
         """
         one = self.polytope
-        if one.is_empty or (one.dimension == one.space and not _is_thin(one)):
+        if one.is_empty or one.dimension == one.space:
             return self
-        if one.dimension < one.space:
-            sizes = np.maximum(self.sizes, sizes)
-            return self._apply("enlarged", _THIN * np.where(sizes > 0.0, sizes, 1.0))
-        same = self._apply("translate", np.zeros(one.space))  # in coordinates of its present widths
-        return same._apply("enlarged", _THIN * np.ptp(one.vertices, axis=0)) if _is_thin(same.polytope) else same
+        sizes = np.maximum(self.sizes, sizes)
+        return replace(self, polytope=one.enlarged(REDUCED * np.where(sizes > 0.0, sizes, 1.0)))
 
     def limited(self) -> Member:
         """Return a set that contains this one, with at most as many facets and vertices as allowed.
@@ -215,92 +206,65 @@ class Member:
         smaller = self.polytope.reduce_outward(self.max_facets, _MAX_VERTICES)
         return self if smaller is self.polytope else replace(self, polytope=smaller, reduced=True)
 
-    def _apply(self, operation: str, *arguments: Any, **options: Any) -> Member:
-        """Return the result of an operation; where rounding decides about facets, that of a larger set with fewer ones.
-
-        The last one is a box; its sum with a segment is then a larger box, and its image a box if need be.
-        """
-        polytope, box = self.polytope, 2 * self.polytope.space
-        if self.max_facets is not None:
-            for few in (max(self.max_facets // 2, box), box):
-                with suppress(UncertainHullError, UnboundedPolytopeError):
-                    moved = getattr(polytope, operation)(*arguments, **options)
-                    return replace(self, polytope=moved, reduced=self.reduced or polytope is not self.polytope)
-                polytope = polytope.reduce_outward(few)
-            if operation == "add_segment":
-                operation, arguments = "enlarged", (np.abs(arguments[0]),)
-            options = {}
-        try:
-            moved = getattr(polytope, operation)(*arguments, **options)
-        except UncertainHullError:
-            if self.max_facets is None or operation != "affine_map":
-                raise
-            image = polytope.vertices @ arguments[0].T + arguments[1]  # `predicted` adds the rounding of the terms
-            moved = Polytope.from_box(image.min(axis=0), image.max(axis=0))
-        return replace(self, polytope=moved, reduced=self.max_facets is not None)
-
-    def recomputed(self, whole: Member) -> Member:
-        """Return the set, a part of a `whole`; one that is much smaller is computed from its own few facets.
-
-        Otherwise its vertices are exact to 1e-12 of the widths of the whole. The facets move outward by ten times as
-        much.
-        """
-        if self.polytope.is_empty:
-            return self
-        before, widths = (np.ptp(one.polytope.vertices, axis=0) for one in (whole, self))
-        if not (_SMALL * widths < before).any():
-            return self
-        larger = self._apply("enlarged", POLYTOPE_SLACK * before)
-        return replace(larger, polytope=larger.polytope.recomputed())
-
     def predicted(self, matrix: Floats, shift: Floats, terms: Floats, disturbance: Set) -> Member:
         """Return the set of matrix x + shift + w; `terms` are the sums of the sizes of the terms of shift + w.
 
         It is not reduced after the last sum: most of its facets go with the next measurement.
         """
         terms = np.abs(matrix) @ self.sizes + terms
-        image = self.limited()._apply("affine_map", matrix, shift, hull=self.max_facets is None or len(shift) < 5)
+        start = self.limited()
+        image = replace(start, polytope=start.polytope.affine_map(matrix, shift))
         moved = image.solid(terms)
         was_solid = moved is image
+
+        one = moved.polytope
         if isinstance(disturbance, Zonotope):
-            for k, half in enumerate(disturbance.generators):
-                if k > 0 and len(shift) > 4:  # in many dimensions a sum has many facets
-                    moved = moved.limited()
-                moved = moved._apply("add_segment", half, hull=self.max_facets is None)
+            for half in disturbance.generators:
+                one = one.add_segment(half)
         else:
-            moved = moved._apply("minkowski_sum", polytope_of(disturbance))
+            one = one.minkowski_sum(polytope_of(disturbance))
+        moved = replace(moved, polytope=one)
         if self.max_facets is None:
             moved = moved.limited()
-        widths = np.ptp(moved.polytope.vertices, axis=0) if not moved.polytope.is_empty else 0.0
-        slack = POLYTOPE_SLACK if moved.solid(terms) is moved and was_solid else _THIN
-        return moved._apply("enlarged", SUM_SLACK * terms + slack * widths)
+
+        widths = np.ptp(one.vertices, axis=0) if not one.is_empty else 0.0
+        slack = POLYTOPE_SLACK if was_solid and moved.solid(terms) is moved else REDUCED
+        return replace(moved, polytope=moved.polytope.enlarged(SUM_SLACK * terms + slack * widths))
 
     def cut(self, strips: Strips, run: int = 0) -> tuple[Member, Floats]:
         """Return the part within strips, and the distances of strips from the set, shape (r,), if the part is empty."""
         terms = np.abs(strips.normals) @ self.sizes + strips.terms[run]
         # A row that is short in the units of the states counts like others; normals may have at most 1e60.
         unit = np.ldexp(1.0, -np.frexp(np.maximum(terms, 1e-50))[1])
-        normals, ends = strips.normals * unit[:, None], (strips.lower[run], strips.upper[run])
-        excess, facets = np.zeros(len(terms)), len(self.polytope.facets)
-        # It takes long to compute a small part from more facets than a set may have.
-        recompute = self.max_facets is None or facets <= self.max_facets
-        for slack in (POLYTOPE_SLACK, _THIN):  # a layer that is thicker than rounding, where a strip leaves a flat set
-            lower, upper = (ends[0] - slack * terms) * unit, (ends[1] + slack * terms) * unit
-            part = self._apply("cut", normals, lower, upper, recompute=recompute)
-            if part.polytope.is_empty or part.polytope.dimension == part.polytope.space:
+        normals = strips.normals * unit[:, None]
+        excess = np.zeros(len(terms))
+        for slack in (POLYTOPE_SLACK, REDUCED):  # a layer that is thicker than rounding, where a flat set is left
+            lower = (strips.lower[run] - slack * terms) * unit
+            upper = (strips.upper[run] + slack * terms) * unit
+            part = self.polytope.cut(normals, lower, upper)
+            if part.is_empty or part.dimension == part.space:
                 break
-        if part.polytope.is_empty and not self.polytope.is_empty:  # find the first strip that leaves nothing
-            part = self
-            for r, normal in enumerate(normals):
-                heights = part.polytope.vertices @ normal
-                part = part._apply("cut", normal, lower[r], upper[r])
-                if part.polytope.is_empty:
-                    excess[r] = max(heights.min() - upper[r], lower[r] - heights.max(), _TINY) / unit[r]
-                    break
-        if slack == _THIN and not part.polytope.is_empty:
+
+        if part.is_empty and not self.polytope.is_empty:
+            excess = self._excess(normals, lower, upper) / unit
+        found = replace(self, polytope=part)
+        if slack == REDUCED and not part.is_empty:
             widths = np.ptp(self.polytope.vertices, axis=0)
-            part = part.solid(self.sizes)._apply("enlarged", POLYTOPE_SLACK * widths)
-        return part.limited() if recompute else part.limited().recomputed(self), excess
+            found = found.solid(self.sizes)
+            found = replace(found, polytope=found.polytope.enlarged(POLYTOPE_SLACK * widths))
+        return found.limited(), excess
+
+    def _excess(self, normals: Floats, lower: Floats, upper: Floats) -> Floats:
+        """Return the distance, shape (r,), of the first strip that leaves nothing from what others leave; else 0."""
+        excess = np.zeros(len(normals))
+        part = self.polytope
+        for r, normal in enumerate(normals):
+            heights = part.vertices @ normal
+            part = part.cut(normal, lower[r], upper[r])
+            if part.is_empty:
+                excess[r] = max(heights.min() - upper[r], lower[r] - heights.max(), _TINY)
+                break
+        return excess
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,15 +348,6 @@ def polytope_of(shape: Set) -> Polytope:
     if isinstance(shape, Zonotope):
         return shape.polytope()
     return Polytope.from_vertices(shape.polygon())
-
-
-def _is_thin(one: Polytope) -> bool:
-    """Whether rounding decides about the facets of a set with an interior."""
-    rows, ends = one.facets[:, :-1], one.facets[:, -1]
-    least = _MIN_DEPTH * np.abs(rows).sum(axis=1)
-    if (ends - rows @ one.points.mean(axis=0) >= least).all():  # a point is deep inside
-        return False
-    return bool((ends - (one.points @ rows.T).min(axis=0) < least).any())
 
 
 def sizes_of(shape: Set) -> Floats:

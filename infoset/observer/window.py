@@ -1,4 +1,4 @@
-"""Sets of seven and more states: a zonotope that is carried, and linear programs over the last steps on demand."""
+"""Sets of five and more states: a zonotope that is carried, and linear programs over the last steps on demand."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def exact_hull(initial: Set, record: Sequence[Motion | Strips], run: int, step: 
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Sets of seven and more states, a window for each run."""
+    """Sets of five and more states, a window for each run."""
 
     members: tuple[Window, ...]
 

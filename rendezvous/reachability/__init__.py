@@ -27,7 +27,7 @@ from infoset.rendezvous.reachability.selection import (
     samples,
     vertices,
 )
-from infoset.rendezvous.reachability.sets import ReachableSets, SetCounts, SetKind, TooManyVerticesError
+from infoset.rendezvous.reachability.sets import ReachableSets, SetCounts, SetKind, ThinSetError, TooManyVerticesError
 from infoset.rendezvous.reachability.solve import OptimalControls, Route, Solution, min_periods, optimal_controls, solve
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
     "SetCounts",
     "SetKind",
     "Solution",
+    "ThinSetError",
     "ThrustShape",
     "TooManyVerticesError",
     "analytic_centre",

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from infoset.geometry.polytope import HIGHS, UncertainHullError, largest_ball
+from infoset.geometry.polytope import HIGHS, SolverError, largest_ball
 from infoset.rendezvous._arrays import Floats, Integers
 
 FLAT = 1e-9
@@ -48,7 +48,7 @@ def relative_interior(
 
     Raises
     ------
-    UncertainHullError
+    SolverError
         If a linear program was not solved.
     """
     lengths = np.linalg.norm(normals, axis=1)
@@ -72,7 +72,7 @@ def relative_interior(
             return RelativeInterior(point, basis, rows, limits, used[kept], centre)
         across = np.vstack([across, rows[tight] @ basis.T])
         levels = across @ member
-    raise UncertainHullError("the affine hull was not found")  # pragma: no cover - each pass lowers the dimension
+    raise SolverError("the affine hull was not found")  # pragma: no cover - each pass lowers the dimension
 
 
 def null_space_basis(across: Floats) -> Floats:
@@ -119,7 +119,7 @@ def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Integers:
             options=HIGHS,
         )
         if optimum.status != 0:
-            raise UncertainHullError("the affine hull was not found")
+            raise SolverError("the affine hull was not found")
         new = left[optimum.x[size:] > 30.0 * tolerance]
         if not len(new):
             return left

@@ -193,8 +193,8 @@ def vertices(optimal: OptimalControls, most: int = MAX_VERTICES) -> Floats:
     ------
     TooManyVerticesError
         If there are more than `most`, if the set has too many dimensions, or if thrust is in a ball.
-    UncertainHullError
-        If rounding decides which points are vertices.
+    ThinSetError
+        If the set is so thin that rounding leaves nothing of it.
     """
     corners = [optimal_polytope(part).vertices if part.optimal.size else np.zeros((1, 0)) for part in optimal.blocks]
     count = int(np.prod([len(block) for block in corners]))

@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UncertainHullError, polytope_from_support
+from infoset.geometry.polytope import EmptyPolytopeError, Polytope, polytope_from_support
 from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
 from infoset.rendezvous.reachability.conic import MAX_GAP
@@ -35,6 +35,10 @@ class SetKind(Enum):
 
 class TooManyVerticesError(ValueError):
     """A set has too many vertices, or none because thrust is in a ball."""
+
+
+class ThinSetError(ArithmeticError):
+    """An exact set is so thin that rounding decides about it."""
 
 
 @dataclass(frozen=True)
@@ -128,8 +132,8 @@ def exact_sets(optimum: BlockOptimum) -> ExactSets:
     ------
     TooManyVerticesError
         If a set has more than 1000 vertices.
-    UncertainHullError
-        If rounding decides which points are vertices of a set, or that it is empty.
+    ThinSetError
+        If a set is so thin that rounding leaves nothing of it.
     """
     block = optimum.block
     try:
@@ -148,7 +152,7 @@ def exact_sets(optimum: BlockOptimum) -> ExactSets:
             tube.insert(0, forward[t].cut(rows @ block.transition[t], upper=limits).needed())
         return ExactSets(tuple(forward), (forward[0], *tube))
     except EmptyPolytopeError as error:  # the programs show that it is not empty
-        raise UncertainHullError("a set is too thin: it is empty by rounding") from error
+        raise ThinSetError("a set is too thin: it is empty by rounding") from error
 
 
 def _with_thrust(states: Polytope, control: Floats) -> Polytope:
@@ -167,8 +171,8 @@ def optimal_polytope(optimum: BlockOptimum) -> Polytope:
     ------
     TooManyVerticesError
         If it has too many dimensions, or thrust is in a ball.
-    UncertainHullError
-        If rounding decides which points are vertices, or that it is empty.
+    ThinSetError
+        If the set is so thin that rounding leaves nothing of it.
     """
     optimal = optimum.optimal
     if optimal.ball:
@@ -181,7 +185,7 @@ def optimal_polytope(optimum: BlockOptimum) -> Polytope:
     try:
         return Polytope.from_constraints(optimal.rows, optimal.limits).needed().bounded()
     except EmptyPolytopeError as error:  # the centre is inside
-        raise UncertainHullError("the set of optimal controls of a block is too thin: it is empty") from error
+        raise ThinSetError("the set of optimal controls of a block is too thin: it is empty") from error
 
 
 class LiftedSets:

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset.geometry.polytope import UncertainHullError
 from infoset.rendezvous._arrays import Floats
 from infoset.rendezvous.reachability.admissible import Lifted, Maximiser, joined
 from infoset.rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
@@ -20,6 +19,7 @@ from infoset.rendezvous.reachability.sets import (
     LiftedSets,
     ReachableSets,
     SetKind,
+    ThinSetError,
     TooManyVerticesError,
     exact_sets,
     optimal_set,
@@ -143,7 +143,7 @@ def solve(problem: ReachabilityProblem) -> Solution:
         try:
             exact = tuple(exact_sets(optimum) for optimum in optimal.blocks)
             _need_agreement(exact, lifted)
-        except (TooManyVerticesError, UncertainHullError) as error:
+        except (TooManyVerticesError, ThinSetError) as error:
             reason = str(error)
         else:
             why = f"blocks of {', '.join(str(block.size) for block in problem.blocks)} states"
@@ -157,9 +157,7 @@ def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...])
         for kind in SetKind:
             apart = float(np.abs(one.bounds(kind) - other.bounds(kind)).max())
             if apart > AGREEMENT:
-                raise UncertainHullError(
-                    f"{kind.value} sets from hulls and from programs differ by {apart:.2g} of a bound"
-                )
+                raise ThinSetError(f"{kind.value} sets from hulls and from programs differ by {apart:.2g} of a bound")
 
 
 def _refusal(problem: ReachabilityProblem) -> str:

@@ -7,7 +7,7 @@ from scipy.linalg import qr, solve_triangular
 from scipy.optimize import linprog
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry.polytope.errors import UncertainHullError
+from infoset.geometry.polytope.errors import SolverError
 
 HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 """Options of HiGHS for linear programs on the scale of a polytope: feasibility tolerances of 1e-10."""
@@ -60,7 +60,7 @@ def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}.
 
     The distance of a facet is measured for rows as if of unit length. The radius is negative if the set is empty; its
-    absolute value is the minimum relaxation of the rows that has a point. An UncertainHullError is raised if the linear
+    absolute value is the minimum relaxation of the rows that has a point. An SolverError is raised if the linear
     program (HiGHS) was not solved, for example because the set has balls of any size.
     """
     units = np.abs(rows).max(axis=1, initial=1e-300)
@@ -70,7 +70,7 @@ def largest_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     cost[-1] = -1.0
     optimum = linprog(cost, A_ub=matrix, b_ub=limits / units, bounds=(None, None), method="highs", options=HIGHS)
     if optimum.status != 0:
-        raise UncertainHullError("the linear program of a largest ball inside was not solved: is the set unbounded?")
+        raise SolverError("the linear program of a largest ball inside was not solved: is the set unbounded?")
     return optimum.x[:-1], float(optimum.x[-1]) * minimum
 
 

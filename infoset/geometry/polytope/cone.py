@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry.polytope.double_description import Bits, common, packed
+from infoset.geometry.polytope.incidence import Bits, common, contains_common, packed
 from infoset.kernels import Kernels
 
 Row = list[int]
@@ -42,10 +42,12 @@ class Cone(NamedTuple):
 class Vertices(NamedTuple):
     """Vertices of a set of half-spaces, and directions and lines along which it is unbounded, as lists of n numbers.
 
-    Without vertices the set is empty, whatever the directions and lines are.
+    `on[i, j]` is whether vertex i is on the boundary of half-space j. Without vertices the set is empty, whatever the
+    directions and lines are.
     """
 
     points: list[Rationals]
+    on: Flags
     directions: list[Row]
     lines: list[Row]
 
@@ -67,9 +69,10 @@ def vertices_of(rows: list[Rationals], limits: Rationals) -> Vertices:
         table.append(whole([*(-entry for entry in row), limit]))
     cone = extreme_rays(table)
 
+    is_point = np.array([ray[-1] > 0 for ray in cone.rays], np.bool_)
     points = [[Fraction(entry, ray[-1]) for entry in ray[:-1]] for ray in cone.rays if ray[-1]]
     directions = [ray[:-1] for ray in cone.rays if not ray[-1]]
-    return Vertices(points, directions, [line[:-1] for line in cone.lines])
+    return Vertices(points, cone.on[is_point, 1:], directions, [line[:-1] for line in cone.lines])
 
 
 def null_space(matrix: list[Rationals]) -> list[Row]:
@@ -110,21 +113,6 @@ def rounded(row: Row) -> Floats:
 def _rounded(row: Row) -> list[float]:
     largest = max(map(abs, row)) or 1
     return [entry / largest for entry in row]
-
-
-def coordinates(box: Box, share: float) -> tuple[Floats, Floats]:
-    """Return a centre and scales, powers of two, shape (n,), of an exact box, however thin it is.
-
-    Along an axis without a width the scale is a `share` of the coordinate.
-    """
-    centre, scale = np.zeros(len(box[0])), np.empty(len(box[0]))
-    for j, (lower, upper) in enumerate(zip(*box, strict=True)):
-        size = float(max(abs(lower), abs(upper)))
-        width = float(upper - lower) or share * size or 1.0
-        scale[j] = math.ldexp(1.0, math.frexp(width)[1] - 1)
-        if size > 16.0 * scale[j]:
-            centre[j] = float((lower + upper) / 2)
-    return centre, scale
 
 
 def extreme_rays(rows: list[Row]) -> Cone:
@@ -208,10 +196,7 @@ def edges_across(bits: Bits, signs: Integers, least: int) -> Integers:
                 continue
             is_edge = True
             for k in near[:found]:
-                holds = k not in (p, q)
-                for word in range(bits.shape[1]):
-                    holds &= not bits[p, word] & bits[q, word] & ~bits[k, word]
-                is_edge &= not holds
+                is_edge &= k in (p, q) or not contains_common(bits[k], bits[p], bits[q])
             if is_edge:
                 if made == len(pairs):
                     pairs = np.concatenate((pairs, pairs))

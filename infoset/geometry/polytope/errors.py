@@ -22,5 +22,5 @@ class UnboundedPolytopeError(ValueError):
         self.direction = direction
 
 
-class UncertainHullError(ArithmeticError):
-    """Facets and vertices do not agree because of rounding."""
+class SolverError(ArithmeticError):
+    """A linear program was not solved."""

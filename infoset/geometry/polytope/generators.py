@@ -17,24 +17,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from infoset.arrays import Flags, Floats, Integers
-from infoset.geometry.double_words import EPS, affine_image, two_product, two_sum
+from infoset.geometry.double_words import affine_image, two_product, two_sum
 from infoset.geometry.polytope import double_description as dd
-from infoset.geometry.polytope.arrays import FLAT, PolytopeArrays
+from infoset.geometry.polytope.arrays import PolytopeArrays
+from infoset.geometry.polytope.outward import push_out
+from infoset.geometry.polytope.scaled_coordinates import coordinates
+from infoset.geometry.tolerances import EPS, ON, SNAP, UNSURE
 from infoset.kernels import Kernels
 
 _kernels = Kernels()
-PARALLEL = FLAT
+PARALLEL = SNAP
 """Sine of the angle between two generators that count as parallel: what differs is flat, relative to them."""
 _NEARLY_PARALLEL = 1.0 - 1e-6
 """Cosine from which the angle is computed: it does not show one of 1e-11."""
-COPLANAR = 1e-2 * PARALLEL
+COPLANAR = 128.0 * UNSURE
 """Determinant of three generators of length one that count as coplanar: 500 roundings.
 
 It is far below that of two generators that are nearly parallel and a third one that is not in a plane with them.
 """
 _BLUNT = 0.1
 """Cosine of the angles between a mean normal and normals, down to which a vertex moves by at most ten roundings."""
-SHORT = dd.TIP
+SHORT = ON
 """Sum of the sizes of generators, in scaled coordinates, that only move facets and vertices outward."""
 
 
@@ -64,7 +67,7 @@ class Span:
     def __init__(self, centre: Floats, generators: Floats) -> None:
         radius = np.abs(generators).sum(axis=0)
         # No width is too small, as for a box: nothing is known from rounded points.
-        self.middle, self.scale = dd.coordinates(centre - radius, centre + radius, 2.0 * radius, 0.0)
+        self.middle, self.scale = coordinates(centre - radius, centre + radius, 2.0 * radius, 0.0)
         self.start = (centre - self.middle) / self.scale
         self.generators = generators / self.scale
 
@@ -164,7 +167,7 @@ def _independent(generators: Floats) -> tuple[Integers, Integers]:
     while len(rows) < min(rest.shape):
         widths = 2.0 * np.abs(rest).sum(axis=0)
         column = int(widths.argmax())
-        if widths[column] <= FLAT:
+        if widths[column] <= SNAP:
             break
         row = int(np.abs(rest[:, column]).argmax())
         rest -= np.outer(rest[:, column] / rest[row, column], rest[row])
@@ -401,8 +404,8 @@ def _of_faces(kind: Any, faces: Faces, span: Span, kept: Distinct) -> Any:
         points, is_ahead = _ahead(points, facets, faces)
     incidence = faces.incidence()
     if not is_ahead.all():
-        most = dd.TIP + 32.0 * kept.missed.max()
-        points = dd.push_out(points, facets, incidence, np.int64(0), False, most)
+        most = ON + 32.0 * kept.missed.max()
+        points = push_out(points, facets, incidence, np.int64(0), False, most)
     return kind(points, facets, facets[:0], incidence, span.middle[span.own].copy(), span.scale[span.own].copy())
 
 

@@ -9,19 +9,20 @@ import numpy as np
 
 from infoset.arrays import Floats, Integers
 from infoset.geometry.double_words import two_product, two_sum
+from infoset.geometry.tolerances import EPS, ON
 from infoset.kernels import Kernels
 
 _kernels = Kernels()  # without fast-math: reordered sums would lose the errors
 
 _MAX_STEPS = 1000
 """Number of vertices that Wolfe's algorithm may add: it ends after a few of each hull."""
-_PRECISION = 1e-14
-"""Decrease of x . d, relative to the sizes of x and of the hulls, that a step must offer: a hundred roundings."""
+_PRECISION = 64.0 * EPS
+"""Decrease of x . d, relative to the sizes of x and of the hulls, that a step must offer: 64 roundings."""
 _REFINEMENTS = 3
 """Corrections of the shares, each of which divides their error by 1e16 over the squared condition of the edges."""
-_SMALL_STEP = 1e-16
+_SMALL_STEP = 0.5 * EPS
 """Change of the shares that is their rounding."""
-_DEPENDENT = 1e-12
+_DEPENDENT = ON
 """Part of an edge, relative to it, that is orthogonal to others, below which it is rounding."""
 _SMALLEST = 1e-90
 """Size of the hulls, relative to the coordinates, below which they count as points: squares do not overflow."""

@@ -10,9 +10,11 @@ from scipy.linalg import block_diag
 from infoset.arrays import Floats
 from infoset.geometry._set_arguments import need_set
 from infoset.geometry.polytope.polytope import Polytope
+from infoset.geometry.tolerances import ON, REDUCED
 
 _MAX_ROUNDS = 200
-_FLAT = 1e-7
+_FLAT = 4.0 * REDUCED
+"""Thickness of a flat set of points that a solver of linear programs found."""
 
 
 def polytope_from_support(
@@ -38,7 +40,7 @@ def polytope_from_support(
     known: set[tuple[float, ...]] = set()
     for _ in range(_MAX_ROUNDS):
         hull = Polytope.from_vertices(points, _FLAT)
-        size = max(float(np.ptp(points, axis=0).max()), 1e-12 * float(np.abs(points).max()))
+        size = max(float(np.ptp(points, axis=0).max()), ON * float(np.abs(points).max()))
         rows, limits = hull.constraints()
         if len(rows) > max_facets:
             raise ArithmeticError(f"the projection has over {max_facets} facets")

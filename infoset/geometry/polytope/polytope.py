@@ -2,40 +2,52 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from math import factorial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 
 from infoset.arrays import Flags, Floats, Integers
+from infoset.geometry import conversion
 from infoset.geometry._set_arguments import (
     axis_numbers,
     bound_values,
+    box_ends,
+    constraint_values,
     finite_values,
+    need_finite,
     not_negative,
     offset_values,
+    radius_values,
 )
 from infoset.geometry.convex_set import ConvexSet, need_convex_set
-from infoset.geometry.double_words import EPS, affine_image, supports
+from infoset.geometry.double_words import affine_image, supports
 from infoset.geometry.drawing import axes_of, draw_facets, draw_polygons, limits_of, ring_order
-from infoset.geometry.polytope import cone, polyhedron
+from infoset.geometry.polytope import cone, construction, polyhedron
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope._measures import largest_ball, simplices_of, triangle_of
-from infoset.geometry.polytope.arrays import PolytopeArrays
-from infoset.geometry.polytope.errors import UncertainHullError
+from infoset.geometry.polytope.arrays import PolytopeArrays, half_spaces, own_and_others
 from infoset.geometry.polytope.generators import polytope_of
 from infoset.geometry.polytope.nearest import nearest_pair
+from infoset.geometry.polytope.outward import image, swept
 from infoset.geometry.polytope.reduction import reduced_outward
+from infoset.geometry.tolerances import EPS, ON, REDUCED, SNAP, UNSURE
 from infoset.geometry.zonotope_arrays import ZonotopeArrays, need_zonotope
-from infoset.limits import Limits, real_values
+from infoset.limits import COUNT, Limits, real_values
 
-_CLEAR_PIVOT = 1e-6
-"""Pivot of a matrix with columns of size one that is certainly not zero: 1e9 times its rounding."""
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+_WIDE = 2.0**6
+"""Size of a sum, in coordinates in which a term is one wide, from which it gets its own: two digits are lost."""
+_MUCH_SMALLER = 2.0**14
+"""Ratio of widths from which an intersection is computed from all half-spaces, in its own coordinates."""
 
 
 class Polytope(PolytopeArrays, ConvexSet):
@@ -76,6 +88,119 @@ class Polytope(PolytopeArrays, ConvexSet):
         return self
 
     @classmethod
+    def _of(cls, arrays: PolytopeArrays) -> Polytope:
+        """Return a polytope with these arrays."""
+        if isinstance(arrays, cls):
+            return arrays
+        return cls(
+            arrays.points, arrays.facets, arrays.equations, arrays.incidence, arrays.centre, arrays.scale, arrays.exact
+        )
+
+    @classmethod
+    def empty(cls, space: int) -> Polytope:
+        """Return the empty set of R^n, n = `space`."""
+        COUNT.need("space", space)
+        return cls._of(construction.empty(space))
+
+    @classmethod
+    def from_vertices(cls, points: ArrayLike, flat: float = SNAP) -> Polytope:
+        """Return the convex hull of `points`, shape (m, n), at least one. Its vertices are points, bit for bit.
+
+        `flat` is the relative thickness below which a set counts as flat: greater for points that are known to fewer
+        digits. The facets are the rays of a double description: O(m f) for f facets in the plane, O(m f^2) at worst.
+        """
+        array = finite_values("points", points, "m", "n").copy()  # in the order for which kernels are compiled
+        return cls._of(construction.hull_of(array, flat))
+
+    @classmethod
+    def from_constraints(
+        cls, normals: ArrayLike, offsets: ArrayLike, across: ArrayLike | None = None, levels: ArrayLike = ()
+    ) -> Polytope:
+        """Return {x: normals x <= offsets, across x = levels}, with the shapes (m, n), (m,), (k, n) and (k,).
+
+        It may be empty or unbounded. Infinite offsets are no limit. One step of the double description for each row.
+        """
+        rows, limits = constraint_values(("normals", "offsets"), normals, offsets, "k", "n")
+        if across is not None:
+            flat, heights = constraint_values(("across", "levels"), across, levels, "k", rows.shape[1])
+            need_finite("levels", heights)
+            rows, limits = np.vstack([rows, flat, -flat]), np.concatenate([limits, heights, -heights])
+        return cls._of(construction.of_half_spaces(rows, limits))
+
+    @classmethod
+    def space_of(cls, space: int) -> Polytope:
+        """Return R^n, n = `space`."""
+        COUNT.need("space", space)
+        return cls.from_rays(np.zeros((1, space)), lines=np.eye(space))
+
+    @classmethod
+    def halfspace(cls, normal: ArrayLike, offset: float) -> Polytope:
+        """Return {x: normal . x <= offset}, with a `normal` of shape (n,).
+
+        Raises
+        ------
+        ValueError
+            If the normal is zero.
+        """
+        row = finite_values("normal", normal, "n")
+        if not row.any():
+            raise ValueError("normal must not be zero")
+        return cls.from_constraints(row[None], [offset])
+
+    @classmethod
+    def from_rays(cls, points: ArrayLike, directions: ArrayLike = (), lines: ArrayLike = ()) -> Polytope:
+        """Return the hull of `points` and of the rays from them along `directions`, and along both ends of `lines`.
+
+        The shapes are (m, n), m at least 1, (k, n) and (l, n). Without directions and lines it is `from_vertices`.
+        """
+        array = finite_values("points", points, "m", "n")
+        space = array.shape[1]
+        far = polyhedron.as_directions(finite_values("directions", directions, "k", space))
+        both = polyhedron.as_directions(finite_values("lines", lines, "k", space))
+        if not far and not both:
+            return cls.from_vertices(array)
+        found = polyhedron.of_generators(space, polyhedron.as_points(array), far, both)
+        return cls._of(construction.of_polyhedron(found))
+
+    @classmethod
+    def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Polytope:
+        """Return {x: lower <= x <= upper} for bounds of shape (n,); flat along axes whose bounds are equal. Exact."""
+        minimum, most = box_ends(lower, upper, "n")
+        return cls._of(construction.box(minimum, most))
+
+    @classmethod
+    def from_ball(cls, centre: ArrayLike, radius: float, *, outer: bool = True) -> Polytope:
+        """Return a polytope around the ball with `centre`, shape (n,), and `radius`, or in it.
+
+        Its facets, or its vertices if not `outer`, are in the 3^n - 1 directions whose components are in ratios of -1,
+        0 and 1; it has 2^n n! vertices, or facets: 3840 in R^5. It extends beyond the ball, or stays inside it, by the
+        factor 1.09 in two dimensions, 1.13 in three and 1.19 in five at most.
+        """
+        middle, size = finite_values("centre", centre, "n"), float(radius_values(radius))
+        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=len(middle)) if any(row)])
+        rows /= np.linalg.norm(rows, axis=1)[:, None]
+        if outer and size > ON * np.abs(middle).max():  # rounding of the coordinates is smaller
+            ends = middle - size, middle + size
+            return cls._of(construction.of_half_spaces(rows, np.full(len(rows), size), middle, ends))
+        return cls.from_vertices(middle + size * rows)
+
+    @classmethod
+    def from_shapely(cls, geometry: BaseGeometry) -> Polytope:
+        """Return a convex shapely Point, LineString or Polygon as a set of R^2; see `ConvexPolygons.from_shapely`."""
+        ring = conversion.ring_of_geometry(geometry)
+        return cls.from_vertices(ring) if len(ring) else cls.empty(2)
+
+    def to_shapely(self) -> BaseGeometry:
+        """Return a set of R^2 as a shapely Point, LineString or Polygon; the empty set is an empty Polygon."""
+        return conversion.geometry_of_ring(self._polygon())
+
+    def _polygon(self) -> Floats:
+        """Return the vertices of a set of R^2, shape (v, 2), counter-clockwise."""
+        if self.space != 2:
+            raise ValueError(f"a set of R^2 is needed: project this one, of R^{self.space}, on two axes first")
+        return conversion.ring_of_points(self.bounded().vertices)
+
+    @classmethod
     def from_zonotope(cls, zonotope: ZonotopeArrays) -> Polytope:
         """Return a `Zonotope` as a polytope, which contains it and exceeds it by about 1e-12 of its size.
 
@@ -87,11 +212,11 @@ class Polytope(PolytopeArrays, ConvexSet):
         found: Polytope = polytope_of(cls, given.centre, given.generators)
         return found
 
-    def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0, *, hull: bool = True) -> Polytope:
+    def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {matrix x + offset}, with a matrix of shape (m, n), singular or not, and an offset of shape (m,) or 0.
 
         Vertices are rounded once. Under a regular matrix facets and incidence are mapped; otherwise it is a hull, which
-        may take long; without `hull` it is an UncertainHullError.
+        may take long.
         """
         rows = finite_values("matrix", matrix, "m", self.space).copy()  # kernels are compiled once, for such arrays
         moved = offset_values(offset, len(rows)).copy()
@@ -99,11 +224,12 @@ class Polytope(PolytopeArrays, ConvexSet):
             return self.empty(len(rows))
         if self.exact is not None:
             mapped = polyhedron.image(self.exact, cone.rationals(rows), cone.rationals(moved[None])[0])
-            return self._of_polyhedron(mapped)
-        points, facets, centre, scale, errors = dd.image(self.points, self.facets, self.centre, self.scale, rows, moved)
+            return self._of(construction.of_polyhedron(mapped))
+        points, facets, centre, scale, errors = image(self.points, self.facets, self.centre, self.scale, rows, moved)
+        mapped_set = replace(self, points=points, facets=facets, centre=centre, scale=scale)
         if self.dimension < self.space or not len(facets):
-            return self._hull(points, centre, scale, allowed=hull)._around(errors)
-        return replace(self, points=points, facets=facets, centre=centre, scale=scale)._around(errors)
+            return self._of(construction.enlarged(construction.hull(points, centre, scale), errors))
+        return self._of(construction.enlarged(mapped_set, errors))
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m).
@@ -116,9 +242,12 @@ class Polytope(PolytopeArrays, ConvexSet):
             return self.empty(factor.shape[1])
         if self.exact is not None or _has_null_space(factor):
             return self._exact_preimage(factor, moved)
-        rows, limits = self._rows(moved)
+        rows, limits = half_spaces(self, moved)
         mapped, rounded = affine_image(rows, np.ascontiguousarray(factor.T), np.zeros(factor.shape[1]))
-        found = self._of_rows(mapped, limits)
+        # Along the image of the matrix an equation of this set may be zero, to the rounding of its own entries.
+        is_zero = np.abs(mapped) <= UNSURE * (self.space + 2) * (np.abs(rows) @ np.abs(factor))
+        mapped[is_zero.all(axis=1)] = 0.0
+        found = self._of(construction.of_half_spaces(mapped, limits))
         if found.dimension < found.space or not (rounded.any() or moved.any()):
             return found
         return found.enlarged(2.0 * EPS * np.abs(found.vertices).max(axis=0))
@@ -126,17 +255,17 @@ class Polytope(PolytopeArrays, ConvexSet):
     def _exact_preimage(self, matrix: Floats, offset: Floats) -> Polytope:
         """Return {x: matrix x + offset in the set} in exact integers.
 
-        The equations of a flat set are rounded, to either side: where they leave nothing, they are relaxed by the
-        rounding of n + 2 operations, as are its facets.
+        Facets and equations are rounded: where they leave nothing, they are relaxed by the rounding of n + 2
+        operations.
         """
         factor, (shift,) = cone.rationals(matrix), cone.rationals(offset[None])
         found = polyhedron.preimage(self._polyhedron.half_spaces, factor, shift)
-        if not found.points and self.exact is None and len(self.equations):
-            rows, limits = self._rows(offset)
+        if not found.points and self.exact is None:
+            rows, limits = half_spaces(self, offset)
             terms = np.abs(rows) @ (np.abs(self.vertices).max(axis=0) + np.abs(offset) + np.abs(self.centre))
-            relaxed = polyhedron.as_half_spaces(rows, limits + 4.0 * (self.space + 2) * EPS * terms)
+            relaxed = polyhedron.as_half_spaces(rows, limits + (self.space + 2) * UNSURE * terms)
             found = polyhedron.preimage(relaxed, factor, [Fraction(0)] * self.space)
-        return self._of_polyhedron(found)
+        return self._of(construction.of_polyhedron(found))
 
     def minkowski_sum(self, other: ConvexSet) -> Polytope:
         """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two vertices."""
@@ -144,31 +273,30 @@ class Polytope(PolytopeArrays, ConvexSet):
         if self.is_empty or two.is_empty:
             return self if self.is_empty else two
         if self._is_exact_with(two):
-            return self._of_polyhedron(polyhedron.total(self._polyhedron, two._polyhedron))
+            return self._of(construction.of_polyhedron(polyhedron.total(self._polyhedron, two._polyhedron)))
         pairs = [np.repeat(self.points, len(two.points), axis=0), np.tile(two.points, (len(self.points), 1))]
         centre, scale = np.append(self.centre, two.centre), np.append(self.scale, two.scale)
         product = replace(self, points=np.hstack(pairs), centre=centre, scale=scale)
         return product.affine_map(np.tile(np.eye(self.space), 2))
 
-    def add_segment(self, half: ArrayLike, *, hull: bool = True) -> Polytope:
+    def add_segment(self, half: ArrayLike) -> Polytope:
         """Return the Minkowski sum with the segment from -half to +half, shape (n,).
 
         Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet.
-        Where rounding decides which ridges do, the sum is a hull of points, which may take long; without `hull` it is
-        an UncertainHullError.
+        Where rounding decides which ridges do, the sum is a hull of points, which may take long.
         """
         along = finite_values("half", half, self.space)
         if self.is_empty or not (along / self.scale).any():
             return self
         if self.dimension < self.space or self.exact is not None:
             return self.minkowski_sum(self.from_vertices([-along, along]))
-        points, facets, incidence, errors = dd.swept(self.points, self.facets, self.incidence, along / self.scale)
-        whole = replace(self, points=points, facets=facets, incidence=incidence)
-        try:
-            whole = whole._around(errors)._reduced(len(facets))
-        except UncertainHullError:
-            return self._hull(points, self.centre, self.scale, allowed=hull)._around(errors)
-        return whole if np.abs(points).max() < 64.0 else whole.affine_map(np.eye(self.space))
+        points, facets, incidence, errors = swept(self.points, self.facets, self.incidence, along / self.scale)
+        rough = construction.enlarged(replace(self, points=points, facets=facets, incidence=incidence), errors)
+        found = construction.settled(rough, len(facets))
+        if found is None:
+            return self._of(construction.enlarged(construction.hull(points, self.centre, self.scale), errors))
+        whole = self._of(found)
+        return whole if np.abs(points).max() < _WIDE else whole.affine_map(np.eye(self.space))
 
     def enlarged(self, by: ArrayLike) -> Polytope:
         """Return a set that contains {x + e: |e_i| <= by_i}, shape (n,): each facet moves outward by as much.
@@ -181,26 +309,26 @@ class Polytope(PolytopeArrays, ConvexSet):
             return self
         if self.exact is not None:
             outward = polyhedron.moved_outward(self.exact.half_spaces, cone.rationals(margin[None])[0])
-            return self._of_polyhedron(polyhedron.of_half_spaces(self.space, outward))
-        start = self if self.dimension == self.space else self._prism(margin)
-        return start._around(margin / start.scale)
+            return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, outward)))
+        solid = self if self.dimension == self.space else self._layer(margin)
+        return self._of(construction.enlarged(solid, margin / solid.scale))
 
-    def _prism(self, margin: Floats) -> Polytope:
-        """Return a flat set, enlarged across its affine hull by a `margin`, shape (n,), or 3e-8 of its coordinates."""
-        # A coordinate that is zero in all points has no scale yet: that of the margin.
-        is_zero = (self.points == 0.0).all(axis=0) & (self.centre == 0.0) & (margin > 0.0)
-        scale = np.where(is_zero, np.ldexp(1.0, np.frexp(margin)[1]), self.scale)
-        sizes = np.maximum(margin / scale, 3e-8 * np.abs(self.vertices / scale).max(axis=0))
-        heights = np.maximum(np.abs(self.equations[:, :-1]) @ sizes, 3e-8)  # rounding does not lose it again
-        points, on = self.points, self.incidence
-        for axis, height in zip(self._own_and_others[1], heights, strict=True):
-            along, above = np.eye(self.space)[axis] * height, np.repeat([False, True], len(points))
-            points = np.vstack([points - along, points + along])
-            on = np.column_stack([np.vstack([on, on]), above, ~above])
-        ends = np.stack([self.equations, -self.equations], axis=1)
-        ends[:, :, -1] += heights[:, None]
-        sides, none = np.vstack([self.facets, ends.reshape(-1, self.space + 1)]), self.equations[:0]
-        return replace(self, points=points, facets=sides, equations=none, incidence=on, scale=scale)
+    def _layer(self, margin: Floats) -> Polytope:
+        """Return a flat set with an interior: its equations become two half-spaces each.
+
+        They are apart by a `margin`, shape (n,), or by REDUCED of its coordinates if this is more.
+        """
+        sizes = np.maximum(margin, REDUCED * np.abs(self.vertices).max(axis=0))
+        rows = self.equations[:, :-1] / self.scale
+        # Rounding does not lose a layer that is REDUCED thick in the coordinates in which the set is one wide.
+        heights = np.maximum(np.abs(rows) @ sizes, REDUCED)
+        ends = np.vstack([self.equations, -self.equations])
+        ends[:, -1] += np.tile(heights, 2)
+
+        open_set = replace(self, facets=np.vstack([self.facets, ends]), equations=self.equations[:0])
+        sides, limits = half_spaces(open_set, self.centre)
+        lower, upper = self.bounding_box()
+        return self._of(construction.of_half_spaces(sides, limits, self.centre, (lower - sizes, upper + sizes)))
 
     def minkowski_difference(self, other: ConvexSet) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
@@ -221,17 +349,18 @@ class Polytope(PolytopeArrays, ConvexSet):
             inward = polyhedron.moved_inward(self._polyhedron.half_spaces, two._polyhedron)
             if inward is None:
                 return self.empty(self.space)
-            return self._of_polyhedron(polyhedron.of_half_spaces(self.space, inward))
-        rows, limits = self._rows(self.centre)
+            return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, inward)))
+        rows, limits = half_spaces(self, self.centre)
         if self.dimension < self.space:
             # The difference plus a point of the other set is a part of this one: it cannot leave the affine hull.
             start = two.vertices[0]
-            part = self._with_rows(rows, _less(limits, supports(two.vertices - start, rows)), self.centre)
-            return part.translate(-start)
+            less = _less(limits, supports(two.vertices - start, rows))
+            return self._of(construction.cut(self, rows, less, self.centre)).translate(-start)
         less = _less(limits, supports(two.vertices, rows))
         lower, upper = np.array(self.bounding_box()) - two.bounding_box()
-        found = self._of_rows(rows, less, self.centre, (lower, np.maximum(lower, upper)))
-        return self._of_rows(rows, less, self.centre) if found.is_empty else found
+        ends = lower, np.maximum(lower, upper)
+        sizes = np.abs(self.vertices - self.centre).max(axis=0) + np.abs(two.vertices).max(axis=0)
+        return self._of(construction.of_half_spaces(rows, less, self.centre, ends, sizes))
 
     def intersection(self, *others: ConvexSet) -> Polytope:
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
@@ -240,21 +369,34 @@ class Polytope(PolytopeArrays, ConvexSet):
             rows = [row for one in every for row in one._polyhedron.half_spaces]
             if any(one.is_empty for one in every):
                 return self.empty(self.space)
-            return self._of_polyhedron(polyhedron.of_half_spaces(self.space, rows))
+            return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, rows)))
         sets = sorted(every, key=lambda one: (one.dimension, -len(one.facets)))
         found = sets[0]
         for one in sets[1:]:
             if not found.is_empty:
-                ends = np.array([found.bounding_box(), one.bounding_box()])
-                box = ends[:, 0].max(axis=0), ends[:, 1].min(axis=0)
-                found = found._with_rows(*one._rows(one.centre), one.centre, box)
+                found = found._cut_by(one)
         return found
+
+    def _cut_by(self, other: Polytope) -> Polytope:
+        """Return the intersection with another bounded set; one that is much smaller than both is computed at once."""
+        ends = np.array([self.bounding_box(), other.bounding_box()])
+        lower = ends[:, 0].max(axis=0)
+        upper = ends[:, 1].min(axis=0)
+        rows, limits = half_spaces(other, other.centre)
+        is_small = _MUCH_SMALLER * (upper - lower) < np.ptp(self.vertices, axis=0)
+        if is_small.any() and (lower <= upper).all():
+            own, own_limits = half_spaces(self, other.centre)
+            every = np.vstack([own, rows]), np.append(own_limits, limits)
+            found = construction.of_half_spaces(*every, other.centre, (lower, upper))
+            if len(found.equations) == len(self.equations):
+                return self._of(found)
+        return self._of(construction.cut(self, rows, limits, other.centre))
 
     def convex_hull(self, *others: ConvexSet) -> Polytope:
         """Return the convex hull of the union with one or more polytopes; its closure if one is unbounded."""
         sets = [one for one in (self, *map(self._need_other, others)) if not one.is_empty]
         if self._is_exact_with(*sets):
-            return self._of_polyhedron(polyhedron.hull([one._polyhedron for one in sets]))
+            return self._of(construction.of_polyhedron(polyhedron.hull([one._polyhedron for one in sets])))
         return self.from_vertices(np.vstack([one.vertices for one in sets])) if sets else self
 
     def cut(
@@ -264,15 +406,12 @@ class Polytope(PolytopeArrays, ConvexSet):
         upper: ArrayLike = np.inf,
         *,
         slack_ulp: float = 0.0,
-        recompute: bool = True,
     ) -> Polytope:
         """Return the part in one or more strips lower <= normals x <= upper, or the set itself if they contain it.
 
         `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,); infinite ones give
         half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
-        satisfies the bounds up to rounding is not lost. A part that is much smaller than the set, or where rounding
-        decides about vertices, is computed again from all half-spaces, which may take long. Without `recompute` the
-        small part is known to 1e-12 of the set.
+        satisfies the bounds up to rounding is not lost.
         """
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
@@ -287,8 +426,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         rows, limits = rows[limits < np.inf], limits[limits < np.inf]
         if self.exact is not None:
             sides = [*self.exact.half_spaces, *polyhedron.as_half_spaces(rows, limits)]
-            return self._of_polyhedron(polyhedron.of_half_spaces(self.space, sides))
-        return self._with_rows(rows, limits, recompute=recompute)
+            return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, sides)))
+        return self._of(construction.cut(self, rows, limits))
 
     def project(self, axes: ArrayLike) -> Polytope:
         """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
@@ -313,8 +452,8 @@ class Polytope(PolytopeArrays, ConvexSet):
         self.bounded()
         if self.is_empty or (len(self.facets) + 2 * len(self.equations) <= cap and len(self.points) <= max_vertices):
             return self
-        solid = self if self.dimension == self.space else self._prism(np.zeros(self.space))
-        return reduced_outward(solid, cap, max_vertices)
+        solid = self if self.dimension == self.space else self._layer(np.zeros(self.space))
+        return self._of(reduced_outward(solid, cap, max_vertices))
 
     def _need_other(self, other: ConvexSet) -> Polytope:
         """Return another set as a polytope; it must be in the same space."""
@@ -349,7 +488,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     def recession(self) -> Polytope:
         """Return the cone of the directions in which the set is unbounded: the origin if it is bounded."""
-        return self._of_polyhedron(polyhedron.recession(self.needed()._polyhedron))
+        return self._of(construction.of_polyhedron(polyhedron.recession(self.needed()._polyhedron)))
 
     def support_function(self, directions: ArrayLike) -> Floats:
         """Return max direction . x, shape (...), for `directions`, shape (..., n); -inf for the empty set. O(v n).
@@ -380,7 +519,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         """The rows of `constraints`, with offsets that no vertex exceeds because of the rounding of these rows."""
         rows, limits = self.constraints()
         # Points within a few tolerances of the double description count as in the affine hull.
-        near = 4.0 * dd.ON * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
+        near = SNAP * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
         near[: len(self.facets)] = 0.0
         return rows, np.maximum(limits, self.support_function(rows)) + near
 
@@ -430,7 +569,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         if not self.dimension:
             return np.zeros((1, 1), np.int64), np.ones(1)
         corners = simplices_of(self.incidence.T, self.dimension)
-        inner = self.points[:, self._own_and_others[0]]
+        inner = self.points[:, own_and_others(self.equations)[0]]
         return corners, np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
 
     def area(self) -> float:
@@ -500,7 +639,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         # The nearest difference is at most as long as the one of two points, so that it is in a box of this size.
         differences = self + -other
         some = differences.vertices[0]
-        size = float(np.linalg.norm(some)) * (1.0 + 1e-9)
+        size = float(np.ldexp(1.0, np.frexp(np.linalg.norm(some))[1]))
         near = differences & self.from_box(np.full(self.space, -size), np.full(self.space, size))
         return nearest_pair(near.vertices, np.zeros((1, self.space))).difference
 
@@ -578,6 +717,6 @@ def _less(limits: Floats, widths: Floats) -> Floats:
 def _has_null_space(matrix: Floats) -> bool:
     """Whether matrix x = 0 has solutions other than zero, exactly decided; the matrix has the shape (n, m)."""
     units = dd.in_units(np.ascontiguousarray(matrix.T))
-    if len(dd.pivots(units, _CLEAR_PIVOT, -1)[0]) == matrix.shape[1]:
+    if len(dd.pivots(units, REDUCED, -1)[0]) == matrix.shape[1]:
         return False
     return bool(cone.null_space(cone.rationals(matrix)))

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from infoset.arrays import Flags, Floats
+from infoset.geometry.polytope import construction
 from infoset.geometry.polytope import double_description as dd
-from infoset.geometry.polytope.arrays import PolytopeArrays
-from infoset.geometry.polytope.errors import UncertainHullError
+from infoset.geometry.polytope.arrays import PolytopeArrays, half_spaces
+from infoset.geometry.polytope.incidence import Bits, unpacked
+from infoset.geometry.tolerances import ON
 from infoset.kernels import Kernels
 
-Shape = TypeVar("Shape", bound=PolytopeArrays)
 _kernels = Kernels("contract", "nnan", "nsz")
 
 
-def reduced_outward(polytope: Shape, cap: int, max_vertices: int) -> Shape:
+def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> PolytopeArrays:
     """Return a set that contains a polytope with an interior, with at most `cap` facets and `max_vertices` vertices.
 
     It starts with the bounding box, so that all widths are exact, and is cut by the facet beyond which it extends most,
@@ -25,10 +25,10 @@ def reduced_outward(polytope: Shape, cap: int, max_vertices: int) -> Shape:
     """
     points, facets, incidence = _cut_by_worst(polytope.points, polytope.facets, cap, max_vertices)
     outer = replace(polytope, points=points, facets=facets, incidence=incidence)
-    try:
-        return outer._reduced(2 * polytope.space)
-    except UncertainHullError:  # at last it is the bounding box
-        return reduced_outward(polytope, cap // 2, max_vertices)
+    found = construction.settled(outer, 2 * polytope.space)
+    if found is None:
+        return construction.of_half_spaces(*half_spaces(outer, outer.centre), outer.centre, outer.bounding_box())
+    return found
 
 
 @_kernels.compiled
@@ -49,7 +49,7 @@ def _cut_by_worst(points: Floats, facets: Floats, cap: int, max_vertices: int) -
             rays[k, j] = sides[side, j] * sides[side, n]
             bits[k, 0] |= np.uint64(1) << np.uint64(side)
     columns, turned = np.ascontiguousarray(rays.T), np.ascontiguousarray(-points.T)
-    widths = np.array([max(facets[i, n] + _highest(turned, facets[i]), dd.ON) for i in range(f)])
+    widths = np.array([max(facets[i, n] + _highest(turned, facets[i]), ON) for i in range(f)])
     excess, round_of = np.full(f, np.inf), np.zeros(f, np.int64)
     while number < len(sides):
         worst = int(np.argmax(excess))
@@ -58,7 +58,7 @@ def _cut_by_worst(points: Floats, facets: Floats, cap: int, max_vertices: int) -
             excess[worst] = (_highest(columns[:n], facet) - facet[n]) / widths[worst]
             round_of[worst] = number
             continue
-        if excess[worst] <= dd.ON:
+        if excess[worst] <= ON:
             break
         row[:n], row[n] = -facet[:n], facet[n]
         cut, cut_bits = dd.insert(rays, bits, row, number, n - 1, np.bool_(True))
@@ -67,7 +67,7 @@ def _cut_by_worst(points: Floats, facets: Floats, cap: int, max_vertices: int) -
         rays, bits, columns = cut, cut_bits, np.ascontiguousarray(cut.T)
         sides[number], excess[worst] = facet, -np.inf
         number += 1
-    return rays[:, :n].copy(), sides[:number], dd.unpacked(bits, number)
+    return rays[:, :n].copy(), sides[:number], unpacked(bits, number)
 
 
 @_kernels.compiled
@@ -84,7 +84,7 @@ def _highest(columns: Floats, facet: Floats) -> float:
 
 
 @_kernels.compiled
-def _count_sides(bits: dd.Bits, rows: int, least: int) -> int:
+def _count_sides(bits: Bits, rows: int, least: int) -> int:
     """Return the number of rows with at least `least` rays."""
     counts = np.zeros(rows, np.int64)
     for i in range(len(bits)):

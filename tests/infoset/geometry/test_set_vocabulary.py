@@ -37,7 +37,6 @@ ONLY_POLYTOPES = {
         ["space_of", "halfspace", "from_rays", "is_bounded", "directions", "lines", "recession", "bounded", "exact"],
         "a polygon is bounded: an unbounded set of the plane is a Polytope",
     ),
-    "recomputed": "in coordinates of its own size; polygons are exact in any",
 }
 
 

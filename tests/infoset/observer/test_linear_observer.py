@@ -700,27 +700,3 @@ def test_numbers_of_one_output_and_a_wrong_bound() -> None:
     np.testing.assert_allclose([observer.estimate().lower[0], observer.estimate().upper[0]], [1.4, 1.6], atol=1e-9)
     with pytest.raises(ValueError, match="max_facets"):
         LinearObserver(np.eye(3), np.eye(3), box, noise=0.1, max_facets=5)
-
-
-def test_a_precise_measurement_is_one_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A set that becomes much smaller is computed again from its few facets; formerly from those of the prediction."""
-    rows: list[int] = []
-    of_rows = Polytope._of_rows
-
-    def counted(normals: Floats, *others: Any) -> Polytope:
-        rows.append(len(normals))
-        return of_rows(normals, *others)
-
-    rng = np.random.default_rng(3)
-    a, c, generators = 0.4 * rng.normal(size=(6, 6)), np.eye(2, 6), 0.1 * rng.normal(size=(2, 6))
-    start, disturbance = Zonotope.box(-np.ones(6), np.ones(6)), Zonotope(np.zeros(6), generators)
-    observer = LinearObserver(a, c, start, noise=1e-3, disturbance=disturbance)
-    monkeypatch.setattr(Polytope, "_of_rows", staticmethod(counted))
-    x = np.zeros(6)
-    for _ in range(4):
-        observer.predict()
-        x = a @ x + rng.uniform(-1.0, 1.0, 2) @ generators
-        observer.update(c @ x + rng.uniform(-1e-3, 1e-3, 2))
-        assert observer.estimate().polytopes[0].contains(x)
-    assert observer.max_facets is not None
-    assert max(rows) <= observer.max_facets

@@ -1,4 +1,4 @@
-"""1 000 random observers of three to six states, 30 steps each, with the default bound on facets.
+"""1 000 random observers of three and four states, 30 steps each, with the default bound on facets.
 
 The errors of all steps are at their bounds, which is the worst case for rounding. Witnesses are motions in exact
 rationals: those of linear programs, moved a little to one that is well inside, so that they satisfy all measurements.
@@ -31,7 +31,7 @@ class System:
 
     def __post_init__(self) -> None:
         self.random = random = np.random.default_rng([77, self.seed])
-        self.size = n = 3 + self.seed % 4
+        self.size = n = 3 + self.seed % 2
         a = random.normal(size=(n, n))
         self.a = a * random.uniform(0.8, 1.02) / np.abs(np.linalg.eigvals(a)).max()
         outputs = int(random.integers(1, 3))

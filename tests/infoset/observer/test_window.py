@@ -1,4 +1,4 @@
-"""Observers of seven and more states: true states, linear programs of their own, contradictions, smoothing."""
+"""Observers of five and more states: true states, linear programs of their own, contradictions, smoothing."""
 
 from __future__ import annotations
 
@@ -308,9 +308,9 @@ def test_contradiction_that_the_zonotope_shows_is_found_at_once() -> None:
 # Interface --------------------------------------------------------------------------------------------------------
 
 
-def test_polytopes_of_seven_states_are_refused() -> None:
+def test_polytopes_of_many_states_are_refused() -> None:
     estimate = WideSystem.random(7, 1).observer().estimate()
-    with pytest.raises(ValueError, match=r"at most 6 states are possible: use \.lower, \.upper or \.output_hull"):
+    with pytest.raises(ValueError, match=r"at most 4 states are possible: use \.lower, \.upper or \.output_hull"):
         _ = estimate.polytopes
     with pytest.raises(ValueError, match=r"not two: use \.lower, \.upper or \.output_hull"):
         _ = estimate.polygons

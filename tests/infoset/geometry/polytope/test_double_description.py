@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from infoset.geometry.polytope import Polytope
-from infoset.geometry.polytope.double_description import packed, unpacked
+from infoset.geometry.polytope.incidence import packed, unpacked
 
 
 def test_vertices_are_the_points_bit_for_bit() -> None:
