@@ -1,7 +1,6 @@
 """The simulator: scenarios, true motion, closed loop, records, campaigns, bounds and statistics."""
 
 from infoset.sim.adversary import NothingCountsError, Objective, WorstEngagement, find_worst
-from infoset.sim.bound.linear_program import BoundError
 from infoset.sim.bound.lower_bound import LowerBound, lower_bound
 from infoset.sim.campaign import Campaign
 from infoset.sim.closed_form import possible_miss_of
@@ -27,7 +26,6 @@ from infoset.sim.storage import Axis
 __all__ = [
     "Axis",
     "Body",
-    "BoundError",
     "Campaign",
     "CampaignNoise",
     "Covariance",

@@ -73,24 +73,22 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     ------
     TypeError
         If `scenario` is no `Scenario`.
-    BoundError
-        If a linear program is not solved.
 
     Notes
     -----
     Any pair of admissible motions gives a bound; the search looks for a good one. The bound depends on the label mostly
     through the range of the last measurement before x = 0, and repeats with the distance between measurements.
     Therefore the search covers whole periods of labels in some parts of the range interval, for both ends of the
-    interval of V_x and for the nominal closing speed, and refines the best labels. Cost: about 600 linear programs of
-    about 110 variables, 6 ms each.
+    interval of V_x and for the nominal closing speed, and refines the best labels. For each label, one pass over the
+    steps gives the farthest motions for every last common step (Theorem 5a of docs/guarantee.md).
 
     Equal measurements up to step s give equal impulses up to step s. Later impulses change the distance of the two
     across x at x = 0 by at most their common limit, and one of the two has at least half of the rest; for one motion
     alone all impulses count. docs/guarantee.md has the proof, with the reserves for gravity and for the slope of the
     line of sight.
 
-    In space, each axis has a linear program, and the impulses limit the modulus. The two motions of a pair differ along
-    both axes, each by the most that its program allows, so the bound is never below that of one axis.
+    In space, each axis has its own sets of differences, and the impulses limit the modulus. The two motions of a pair
+    differ along both axes, each by as much as possible, so the bound is not below that of one axis.
     """
     need_scenario(scenario)
     model = scenario.set_model
@@ -103,7 +101,6 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     best: list[TruthPair] = []
     for speed, grid, extra in zip(speeds, grids, refinements, strict=True):
         tried: list[TruthPair] = []
-        before_s: float | None = None
         width = float(np.diff(grid).min(initial=np.inf))
         labels = grid.tolist()
         for index in range(len(grid) + extra):
@@ -114,10 +111,8 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
                 label_m = max(tried, key=_BOUND).label_m + side * width
                 labels.append(min(max(label_m, model.bounds.x_m[0]), model.bounds.x_m[1]))
             approach = Approach(scenario, labels[index], speed)
-            pair = approach.best_pair(before_s)
-            before_s = pair.arrival_s - pair.last_common_step * model.step_s
-            tried.append(max(pair, approach.single(), key=UNLIMITED))
-            by_label[speed, pair.label_m] = tried[-1]
+            tried.append(max(approach.best_pair(), approach.single(), key=UNLIMITED))
+            by_label[speed, labels[index]] = tried[-1]
             done += 1
             if progress is not None:
                 progress(done / total)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 
@@ -12,12 +12,10 @@ import numpy as np
 from infoset.arrays import Floats, Integers
 from infoset.sensors import Apart, BearingSensor
 from infoset.sim.bound.coasting import NoArrivalError, coasting
+from infoset.sim.bound.difference_sets import MARGIN, POSITION, PREDICTED_MISS, AxisDifferences
 from infoset.sim.bound.gravity_reserve import GravityReserve, gravity_reserve
-from infoset.sim.bound.linear_program import MARGIN, PairProgram
 from infoset.sim.scenario import Scenario
 
-FEW_CANDIDATES = 16
-"""Number of last common steps up to which all are tried: between few impulses, the bound has several maxima."""
 UNLIMITED = attrgetter("unlimited_bound_m")
 
 
@@ -118,35 +116,43 @@ class Approach:
             due = np.arange(0, self.steps, model.steps_in(sensor.period_s))
             before_s = (scenario.nominal_arrival_s - self.motion.times_s[due]).tolist()
             self._due[name] = due[[sensor.measures_at(each_s) for each_s in before_s]]
-        self._programs: list[PairProgram] = []
-        for i, planar in enumerate(self._models):
-            sensors = {**scenario.sensors, BearingSensor.name: planar.angle_sensor}
-            program = PairProgram(planar, sensors, self._due, self.motion, i)
-            # Two axes that are alike have one linear program.
-            self._programs.append(next(filter(program.is_like, self._programs), program))
+        self._differences = [
+            AxisDifferences(
+                planar, {**scenario.sensors, BearingSensor.name: planar.angle_sensor}, self._due, self.motion, i
+            )
+            for i, planar in enumerate(self._models)
+        ]
 
-    def best_pair(self, try_first_before_s: float | None = None) -> TruthPair:
-        """Return the best pair over the last common step, by a search that starts at a time before arrival, s."""
-        candidates = self.candidates
-        if self.scenario.thruster.is_scheduled and len(candidates) <= FEW_CANDIDATES:
-            return max(map(self.pair, candidates.tolist()), key=UNLIMITED)
-        start = len(candidates) - 1
-        if try_first_before_s is not None:
-            wanted = (self.motion.arrival_s - try_first_before_s) / self.scenario.set_model.step_s
-            start = int(np.abs(candidates - wanted).argmin())
-        return _climb(self.pair, candidates, start)
+    def best_pair(self) -> TruthPair:
+        """Return the best pair over the last common step.
 
-    @property
-    def candidates(self) -> Integers:
-        """Last common steps that may be the best: those before a measurement, and the end."""
-        measured = np.logical_or.reduce([program.is_measured for program in self._programs])
-        last = np.append(np.flatnonzero(measured) - 1, self.steps - 1).astype(np.int64)
-        thruster, steps = self.scenario.thruster, self.scenario.impulse_steps
-        if steps is None:
-            return last
+        To first order a pair is not better than half of the farthest difference less the correction by later impulses.
+        The pairs are computed in descending order of this number, until it is not greater than the best pair.
+        """
+        correction_m = self._corrections_m()
+        half_m = 0.5 * np.hypot.reduce([differences.farthest_m() for differences in self._differences])
         # Between two decisions, more common measurements only bring the motions nearer to each other.
-        after_decisions = np.searchsorted(last, np.array(steps) - thruster.delay_steps)
-        return np.asarray(last[np.unique(np.append(0, np.minimum(after_decisions, len(last) - 1)))])
+        _, common_steps = np.unique(-correction_m, return_index=True)
+        estimates_m = (half_m - correction_m)[common_steps]
+        best: TruthPair | None = None
+        for index in np.argsort(-estimates_m, kind="stable").tolist():
+            if best is not None and (estimates_m[index] <= best.bound_m or not self.arrives):
+                break
+            pair = self.pair(int(common_steps[index]) - 1)
+            best = pair if best is None else max(best, pair, key=UNLIMITED)
+        assert best is not None
+        return best
+
+    def _corrections_m(self) -> Floats:
+        """Return what impulses decided after the first 0, 1, ..., all steps change on straight lines, m."""
+        given_s, sizes = later_impulses(self.scenario, -1, self.motion.arrival_s)
+        sizes = sizes[sizes > 0.0]
+        if not len(sizes):
+            return np.zeros(self.steps + 1)
+        arms_s = np.concatenate([self.motion.arrival_s - given_s, np.zeros(len(sizes))])
+        from_each = np.correlate(arms_s, sizes)
+        decided = np.round(given_s / self.scenario.set_model.step_s) - self.scenario.thruster.delay_steps
+        return from_each[np.searchsorted(decided, np.arange(self.steps + 1))]
 
     def _correction_m(self, last_common_step: int, late_s: float, reserve: GravityReserve) -> tuple[float, float]:
         """Return the maximum change of the miss by impulses that are decided after a step, within the budget, m.
@@ -159,31 +165,50 @@ class Approach:
         return float(sizes @ arms_s), reserve.stretch_per_s2 * float(sizes @ arms_s**3)
 
     def pair(self, last_common_step: int) -> TruthPair:
-        """Return the pair with the maximum distance at the end of those with the same measurements up to a step."""
+        """Return the pair with the maximum distance at the end of those with the same measurements up to a step.
+
+        The farthest difference is found to first order. Its measurements differ by more at some steps, and all of it is
+        reduced until none does. A second one has narrower limits at these steps instead, and is reduced by less.
+        """
+        limits_m = [differences.limits_m for differences in self._differences]
+        pair, excess = self._admissible_pair(last_common_step, limits_m)
+        if not excess.any():
+            return pair
+        narrower, _ = self._admissible_pair(last_common_step, [(1.0 - excess) * limits for limits in limits_m])
+        return max(pair, narrower, key=UNLIMITED)
+
+    def _admissible_pair(self, last_common_step: int, limits_m: Sequence[Floats]) -> tuple[TruthPair, Floats]:
+        """Return the pair with the farthest differences within limits, reduced until its measurements can be the same.
+
+        The second value is the excess of its measurements over their first order, as a share of their limits.
+        """
         offset, velocity = np.zeros((2, self.lateral))
         acceleration = np.zeros((self.lateral, self.steps))
-        farthest = {each: each.farthest(last_common_step) for each in set(self._programs)}
-        for i, program in enumerate(self._programs):
-            offset[i], velocity[i], acceleration[i] = farthest[program]
+        for i, differences in enumerate(self._differences):
+            offset[i], velocity[i], acceleration[i] = differences.member(limits_m[i], last_common_step + 1)
         difference = self.motion.difference(offset, velocity, acceleration)
         half_m = 0.5 * float(np.hypot.reduce(difference[: self.lateral, -1]))
         start, sides = 0.5 * np.stack([offset, velocity]), np.array([1.0, -1.0])
         reserve = self._reserve(difference, half_m)
         if reserve is None:
-            return self._truths(last_common_step, 0.5 * difference, start, 0.5 * acceleration, sides)
+            pair = self._truths(last_common_step, 0.5 * difference, start, 0.5 * acceleration, sides)
+            return pair, np.zeros((self.steps, 2))
+
         correction_m, longer_m = self._correction_m(last_common_step, reserve.late_s, reserve)
         speeds = np.abs(self._middle[1]) + np.abs(start[1]) + 0.5 * self._by_manoeuvre(acceleration)
         slope = self._slope(speeds, reserve)
         beyond_m = reserve.position_m + reserve.drift_m
         along_m = 0.5 * (abs(float(difference[self.lateral, -1])) + beyond_m) + longer_m
         left_m = max(0.0, half_m - correction_m)
-        share = 0.5 * self._admissible_share(last_common_step, difference, reserve, slope, left_m)
-        return self._truths(
+        largest, excess = self._shares(last_common_step, difference, reserve, slope, left_m)
+        share = 0.5 * (1.0 - MARGIN) / max(1.0 - MARGIN, largest)
+        pair = self._truths(
             *(last_common_step, share * difference, 2.0 * share * start, share * acceleration, sides),
             correction_m=correction_m,
             reserve_m=0.5 * beyond_m + longer_m + slope * along_m,
             slope=slope,
         )
+        return pair, excess
 
     def single(self) -> TruthPair:
         """Return the motion that is farthest from the target at x = 0 without impulses."""
@@ -260,14 +285,16 @@ class Approach:
             pushes,
         )
 
-    def _admissible_share(
+    def _shares(
         self, last_common_step: int, difference: Floats, reserve: GravityReserve, slope: float, left_m: float
-    ) -> float:
-        """Return the share of a difference, at most 1, with which all measurements up to a step can be the same.
+    ) -> tuple[float, Floats]:
+        """Return how much the measurements up to a step differ, in units of what is possible with equal values.
 
-        The linear programs neglect the square of the slope of the line of sight, and what impulses change in gravity.
+        The first value is the maximum. The second one has the shape of `AxisDifferences.limits_m`: what the slope of
+        the line of sight, and impulses in gravity, add to the first order.
         """
-        motion, axes, maximum = self.motion, self.motion.axes, 1.0 - MARGIN
+        motion, axes = self.motion, self.motion.axes
+        largest, excess = 0.0, np.zeros((self.steps, 2))
         for name, sensor in self.scenario.sensors.items():
             due = self._due[name][self._due[name] <= last_common_step]
             x, c, apart = motion.range_m[due], motion.closing_speed_m_s[due], np.abs(difference[:, due])
@@ -275,7 +302,7 @@ class Approach:
             moved = 0.5 * shift + reserve.nearer_m[due]
             nearest, farthest, fastest = x - moved, x + moved, c + reserve.deviation_m_s
             if (nearest <= 0.0).any():
-                return 0.0
+                return math.inf, excess
             q = slope + left_m / nearest
             # Equation (26) of docs/guarantee.md, from the difference of the predicted misses to first order.
             to_go, rates = x / c, apart[axes:] + reserve.speed_m_s
@@ -293,8 +320,15 @@ class Approach:
                 slope=q,
                 closing_speed_m_s=fastest,
             )
-            maximum = max(maximum, float(sensor.share(seen).max(initial=0.0)))
-        return (1.0 - MARGIN) / maximum
+            shares = sensor.share(seen)
+            largest = max(largest, float(shares.max(initial=0.0)))
+            band = sensor.band(x, c)
+            if band is not None:
+                column, heights = (PREDICTED_MISS, misses) if band[0] else (POSITION, apart[: self.lateral])
+                limits_m = np.stack([differences.limits_m[due, column] for differences in self._differences])
+                beyond_first = np.clip(shares - (heights / limits_m).max(axis=0), 0.0, 1.0)
+                excess[due, column] = np.maximum(excess[due, column], beyond_first)
+        return largest, excess
 
 
 def later_impulses(scenario: Scenario, last_common_step: int, until_s: float) -> tuple[Floats, Floats]:
@@ -305,27 +339,3 @@ def later_impulses(scenario: Scenario, last_common_step: int, until_s: float) ->
     given_s = given_s[given_s < until_s]
     left = thruster.budget_m_s - thruster.max_impulse_m_s * np.arange(len(given_s))
     return given_s, np.clip(left, 0.0, thruster.max_impulse_m_s)
-
-
-def _climb(pair_of: Callable[[int], TruthPair], candidates: Integers, start: int) -> TruthPair:
-    """Return the pair at a local maximum over candidates, found from an index with strides that double and halve.
-
-    The distance grows linearly and the correction quadratically, so the bound has one maximum.
-    """
-    known: dict[int, TruthPair] = {}
-
-    def value(index: int) -> float:
-        if not 0 <= index < len(candidates):
-            return -np.inf
-        if index not in known:
-            known[index] = pair_of(int(candidates[index]))
-        return known[index].unlimited_bound_m
-
-    at, stride = start, 1
-    while stride:
-        better = next((index for index in (at - stride, at + stride) if value(index) > value(at)), None)
-        if better is None:
-            stride //= 2
-        else:
-            at, stride = better, 2 * stride
-    return known[at]

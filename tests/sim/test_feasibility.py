@@ -56,7 +56,7 @@ def test_the_possible_miss_is_the_closed_form_of_a_camera(name: str, setting: st
 
 
 def test_the_speeds_at_the_start_and_the_images_leave_the_miss_of_a_pair() -> None:
-    """The linear program of a pair is another way to the number; the images alone leave more."""
+    """The farthest pair is another way to the number; the images alone leave more."""
     scenario = replace(load_scenario(CASES / "late-cut-off.toml"), sun=None)
     found = possible_miss(scenario)
     assert found is not None

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.screen import Part, figure_files, number, number_table, parts_of, show
 from infoset.experiments.common.units import M_PER_KM
 from infoset.experiments.interception.command import Bound
@@ -17,7 +16,7 @@ from infoset.experiments.interception.scenario_file import study_scenario
 from infoset.experiments.interception.strategies import chosen_strategies
 from infoset.experiments.interception.study import max_guarantee_m
 from infoset.guidance import Strategy
-from infoset.sim import BoundError, Record, Results, Scenario
+from infoset.sim import Record, Results, Scenario
 from infoset.sim.bound.game_value import ValueReserve, value_reserve, why_no_value
 from infoset.sim.bound.lower_bound import LowerBound, lower_bound, pair_at
 from infoset.sim.bound.pair_flight import PairFlight, fly_pair
@@ -68,14 +67,8 @@ def run(options: Bound) -> None:
     only_bound = options.budget == 0 and options.strategies is None
     strategies = {} if only_bound else chosen_strategies(scenario, options.strategies)
     with work_of(options, scenario, figure_files(FIGURE), notes=notes) as work:
-        try:
-            lower = lower_bound(scenario, progress=work.begin("lower bound"))
-            nominal = _nominal(scenario)
-        except BoundError as error:
-            raise InputError(
-                f"{scenario.name}: a linear program of the bound has no solution ({error}); check the units of the "
-                "scenario with: infoset scenarios check FILE"
-            ) from None
+        lower = lower_bound(scenario, progress=work.begin("lower bound"))
+        nominal = _nominal(scenario)
         reports = parts_of(work.begin("strategies"), len(strategies))
         worst = [
             _simulate(scenario, lower, name, own, options, report)

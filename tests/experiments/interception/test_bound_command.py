@@ -190,17 +190,3 @@ def test_bound_in_space(infoset: Command, short: Scenario, planar: LowerBound, t
     assert right.get_ylabel() == "offset from the midpoint, m"
     half = right.get_lines()[2].get_ydata()[-1]  # type: ignore[index]
     assert half == pytest.approx(0.5 * expected.pair.apart_m)
-
-
-def test_a_program_without_a_solution_is_one_message(
-    infoset: Command, short_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from infoset.sim import BoundError
-
-    def fail(*_: object, **__: object) -> None:
-        raise BoundError("label 1 m")
-
-    monkeypatch.setattr("infoset.experiments.interception.runs.bound.lower_bound", fail)
-    code, out, err = infoset("bound", short_file, "-q")
-    assert (code, out) == (2, "")
-    assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ from infoset.sim.scenario import of_model
 from tests.sensors import linear
 
 QUICK = 4
-"""Random scenarios of the quick tests: of one label, so that there are few linear programs."""
+"""Random scenarios of the quick tests: of one label, so that they are fast."""
 
 SENSOR = AngleSensor(1.0, 0.001, 0.002, 1000.0)
 
@@ -165,6 +166,13 @@ def check(scenario: Scenario, strategy: Strategy) -> None:
 @pytest.mark.parametrize("number", range(QUICK))
 def test_one_of_the_pair_misses_by_the_bound(number: int, make: Callable[[int], Scenario]) -> None:
     check(make(number), make_strategy("symmetric-miss"))
+
+
+@pytest.mark.parametrize("case", ["narrow-labels", "rate-free-space"])
+def test_one_of_the_pair_misses_by_the_bound_with_a_rate_sensor_and_narrow_labels(case: str) -> None:
+    scenario = load_scenario(Path(__file__).parent.parent / "cases" / f"{case}.toml")
+    check(scenario, make_strategy("symmetric-miss"))
+    check(scenario, make_strategy("least-effort"))
 
 
 @pytest.mark.parametrize("kind", Model)
