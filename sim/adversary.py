@@ -21,7 +21,7 @@ from infoset.information_set import InformationSetView
 from infoset.limits import COUNT, WHOLE
 from infoset.model import StateBox
 from infoset.sensors import Measurements, Sensor
-from infoset.sim.adversary_plans import ANGLE, Game, Planner, Plans, by_axis
+from infoset.sim.adversary_plans import Constructions, Planner, Plans, by_axis
 from infoset.sim.closed_form import worst_shift_m
 from infoset.sim.draws import draw
 from infoset.sim.engagement import Engagements
@@ -32,8 +32,8 @@ from infoset.sim.target import constant_side
 
 WORST_FOUND = "worst-found"
 """Name of the noise with the errors that a search found, in records."""
-CHUNK = 50
-"""Engagements in a batch."""
+CHUNK = 250
+"""Maximum number of engagements in a batch; the cost of a step without any engagement is that of 30 to 40 of them."""
 GENERATION = 100
 """Engagements between two selections."""
 ELITE = 24
@@ -225,8 +225,7 @@ class _Search:
         self._planner = Planner(self.scenario, self._draws(1).steps, seed)
 
     def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
-        first = self._planner.first(max(1, round(FIRST_SHARE * budget)))
-        flights = [chunk for plans, game in first for chunk in _in_chunks(plans, game)]
+        flights = _in_chunks(*self._planner.first(max(1, round(FIRST_SHARE * budget))))
         while flights:
             for plans, emptied in pool.map(self._evaluate, *zip(*flights, strict=True)):
                 self.evaluations += len(plans)
@@ -267,16 +266,15 @@ class _Search:
             history=tuple(self.history),
         )
 
-    def engagements(self, plans: Plans, game: Game | None = None) -> Engagements:
-        """Return plans in flight; the errors of a game become those of the plans."""
+    def engagements(self, plans: Plans, constructions: Constructions | None = None) -> Engagements:
+        """Return plans in flight; the errors that game noise chooses become those of the plans."""
         position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
         draws = replace(self._draws(len(plans)), position_m=position_m, velocity_m_s=velocity_m_s)
         noise: MeasurementNoise = self._scripted(plans)
         target_m_s2, side = self._target_m_s2(plans), constant_side(self.scenario.target, draws.target)
-        if game is not None:
+        if constructions is not None:
             side = side if target_m_s2 is None else by_axis(plans.sides[:, :, 0])
-            choosing = game(by_axis(plans.errors[:, ANGLE]).copy(), self._shift_m, side)
-            noise = _Recorded(choosing, plans, self._planner.sensors)
+            noise = _Recorded(constructions.noise(self._shift_m, side), plans, self._planner.sensors)
         strategy, guarantee = self._strategy, self.guarantee
         return Engagements(self.scenario, draws, strategy, noise=noise, target_m_s2=target_m_s2, guarantee=guarantee)
 
@@ -292,9 +290,9 @@ class _Search:
         """Return what the search maximises, m, shape (B,)."""
         return flight.any_state_miss_m(results) if self._objective is Objective.ANY_STATE else results.miss_m
 
-    def _evaluate(self, plans: Plans, game: Game | None) -> tuple[Plans, int]:
+    def _evaluate(self, plans: Plans, constructions: Constructions | None) -> tuple[Plans, int]:
         """Return plans with their values, and the number of engagements whose set became empty."""
-        flight = self.engagements(plans, game)
+        flight = self.engagements(plans, constructions)
         while flight.flying:
             flight.advance()
         results = flight.results(np.arange(len(plans)))
@@ -345,7 +343,7 @@ def start_of(scenario: Scenario, start: Floats) -> dict[str, float]:
     return dict(zip(names, start.tolist(), strict=True))
 
 
-def _in_chunks(plans: Plans, game: Game | None) -> list[tuple[Plans, Game | None]]:
+def _in_chunks(plans: Plans, constructions: Constructions | None) -> list[tuple[Plans, Constructions | None]]:
     """Split plans into equal parts of at most `CHUNK`."""
     parts = np.array_split(np.arange(len(plans)), -(-len(plans) // CHUNK))
-    return [(plans.take(part), game) for part in parts]
+    return [(plans.take(part), constructions and constructions.take(part)) for part in parts]

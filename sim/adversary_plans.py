@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, fields
 
 import numpy as np
 
-from infoset.arrays import Floats, Integers
+from infoset.arrays import Flags, Floats, Integers
+from infoset.engine.predicted_miss import PredictedMiss
 from infoset.guidance import GameNoise, TieRule
-from infoset.guidance.game_noise import SwitchingNoise
+from infoset.guidance.noise import draws_of_step
 from infoset.sensors import BearingSensor, Sensor
 from infoset.sim.scenario import Manoeuvre, Scenario, corners
 from infoset.sim.target import amplitudes_m_s2
@@ -21,10 +21,6 @@ LATE_STEPS = 12.0
 """Mean distance from the end, in steps, of the changes near the end."""
 ANGLE = 0
 """Row of the errors of the angles."""
-
-
-Game = Callable[[Floats, Floats | None, Floats | None], GameNoise]
-"""Makes game noise from its choices, its shift and the sides of the targets."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +58,65 @@ class Plans:
 
     def join(self, other: Plans) -> Plans:
         """Return these plans and others."""
-        return Plans(*(np.concatenate([getattr(part, of.name) for part in (self, other)]) for of in fields(self)))
+        return joined([self, other])
+
+
+def joined(parts: Sequence[Plans]) -> Plans:
+    """Return the plans of all parts."""
+    return Plans(*(np.concatenate([getattr(part, of.name) for part in parts]) for of in fields(Plans)))
+
+
+@dataclass(frozen=True)
+class Constructions:
+    """How game noise chooses the errors of the angles of n first plans.
+
+    Parameters
+    ----------
+    choices : ndarray, shape (n, axes, steps)
+        The upper extreme where not negative: at ties, or at every step.
+    at_every_step : ndarray of bool, shape (n,)
+        Whether the extreme is kept at every step, and not only at ties.
+    shift_side : ndarray, shape (n,)
+        Side to which a shift moves the true state, 1 or -1; 0 if the errors are not shifted.
+    """
+
+    choices: Floats
+    at_every_step: Flags
+    shift_side: Floats
+
+    def take(self, which: Integers | slice) -> Constructions:
+        """Return those of some plans."""
+        return Constructions(*(getattr(self, field.name)[which] for field in fields(self)))
+
+    def noise(self, shift_m: Floats | None, target_side: Floats | None) -> GameNoise:
+        """Return the noise of a batch; `GameNoise` describes the arguments."""
+        return _ConstructedNoise(
+            TieRule.RANDOM,
+            by_axis(self.choices),
+            shift_m,
+            target_side,
+            at_every_step=self.at_every_step,
+            shift_side=self.shift_side,
+        )
+
+
+@dataclass(frozen=True)
+class _ConstructedNoise(GameNoise):
+    """Game noise with the rules of `Constructions`, which differ by engagement."""
+
+    _: KW_ONLY
+    at_every_step: Flags
+    shift_side: Floats
+
+    @property
+    def truth_side(self) -> Floats:
+        """Side to which the shift moves the true state, shape (B,) or (C, B): 1 or -1, 0 for no shift."""
+        side = self.shift_side
+        return side if self.target_side is None else np.where(side == 0.0, 0.0, self.target_side)
+
+    def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
+        chosen = draws_of_step("choices", self.tie_draws, step, miss.upper_m.shape) >= 0.0
+        return np.where(self.at_every_step, chosen, super()._upper_is_worse(miss, step))
 
 
 def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
@@ -114,33 +168,39 @@ class Planner:
         if self.acceleration_m_s2.any():
             self._changes.append(self._turn_target)
 
-    def first(self, count: int) -> list[tuple[Plans, Game]]:
-        """Return first plans, in equal numbers for each construction, with the game noise that chooses their errors.
-
-        The errors of the angles are the choices of this noise: between ties, or of the extreme that it keeps.
-        """
-        switching = partial(SwitchingNoise, TieRule.RANDOM)
-        makers: list[tuple[str, Game, Callable[[int], Floats]]] = [
-            *((f"game noise, tie {tie.value}", partial(GameNoise, tie), self._coins) for tie in TieRule),
-            ("extremes kept in random order", switching, self._coins),
-            ("extremes kept in blocks", switching, self._blocks),
+    def first(self, count: int) -> tuple[Plans, Constructions]:
+        """Return first plans, in equal numbers for each construction, and how game noise chooses their errors."""
+        makers: list[tuple[str, TieRule | None, Callable[[int], Floats]]] = [
+            *((f"game noise, tie {tie.value}", tie, self._coins) for tie in TieRule),
+            ("extremes kept in random order", None, self._coins),
+            ("extremes kept in blocks", None, self._blocks),
         ]
         shares = [len(part) for part in np.array_split(np.arange(count), len(makers))]
-        plans: list[tuple[Plans, Game]] = []
-        for (name, game, choices), share in zip(makers, shares, strict=True):
-            if share == 0:
-                continue
+        plans: list[Plans] = []
+        constructions: list[Constructions] = []
+        for (name, tie, draw_choices), share in zip(makers, shares, strict=True):
             errors = np.zeros((share, len(self.sensors), self._axes, self._steps))
-            errors[:, ANGLE] = choices(share)
+            errors[:, ANGLE] = draw_choices(share)
             # Game noise with a shift knows the sign of a constant acceleration.
-            in_blocks = (self._random.random((share, 1, 1)) < 0.5) & (game is switching)
+            in_blocks = (self._random.random((share, 1, 1)) < 0.5) & (tie is None)
             sides = np.where(in_blocks, self._blocks(share), self._coins(share)[:, :, :1])
             lineage = len(self.constructions) + np.arange(share)
             self.constructions += [name] * share
-            plans.append(
-                (Plans(self._starts(share), errors, sides, lineage, 0 * lineage, np.full(share, -np.inf)), game)
-            )
-        return plans
+            plans.append(Plans(self._starts(share), errors, sides, lineage, 0 * lineage, np.full(share, -np.inf)))
+            constructions.append(self._construction(tie, errors[:, ANGLE]))
+        together = (np.concatenate([getattr(each, of.name) for each in constructions]) for of in fields(Constructions))
+        return joined(plans), Constructions(*together)
+
+    def _construction(self, tie: TieRule | None, drawn: Floats) -> Constructions:
+        """Return game noise with a rule for ties, or for None noise that keeps the drawn extremes at every step."""
+        share = len(drawn)
+        side = {TieRule.UPPER: -1.0, TieRule.LOWER: 1.0}.get(tie, 0.0) if tie is not None else 0.0
+        choices = drawn.copy()
+        if side:
+            choices[:] = -side
+        if tie is TieRule.ALTERNATE:
+            choices[:] = np.where(np.arange(self._steps) % 2 == 0, 1.0, -1.0)
+        return Constructions(choices, np.full(share, tie is None), np.full(share, side))
 
     def children(self, elite: Plans, count: int) -> Plans:
         """Return changed plans of the elite; plans with a greater miss are chosen more often."""
