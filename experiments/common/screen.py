@@ -24,6 +24,8 @@ Clock = Callable[[], float]
 """The time, s, from any origin."""
 Part = str | Text | Table
 """A line or a table of a result on the screen."""
+NUMBER_WIDTH = 8
+"""Width of a column of numbers from 0 to 999999.9, and of those with an exponent, such as -1.23e10."""
 LINE_EVERY_S = 30.0
 """Time between two lines of progress in a log."""
 LONG_S, ESTIMATE_AFTER_S = 10.0, 2.0
@@ -54,17 +56,24 @@ def say_warnings(warnings: Iterable[str], quiet: bool, notes: Iterable[str] = ()
 
 
 def show(parts: Iterable[Part], quiet: bool) -> None:
-    """Print lines, which the terminal wraps, and tables on stdout, unless `quiet`."""
+    """Print lines, which the terminal wraps, and tables on stdout, unless `quiet`.
+
+    Each part is printed at once, also above a progress bar.
+    """
     if not quiet:
         console = Console(highlight=False, markup=False, emoji=False)
         for part in parts:
-            if isinstance(part, Table):
-                for column in part.columns:  # no word and no number is divided: a line may be longer than the screen
-                    words = [word for cell in (column.header, *column.cells) for word in str(cell).split()]
-                    column.min_width = max(map(len, words), default=0)
-                console.print(part, crop=False)
-            else:
-                console.print(part, soft_wrap=True)
+            with console.capture() as captured:
+                if isinstance(part, Table):
+                    for column in part.columns:  # no word and no number is divided: lines may be longer than the screen
+                        words = [word for cell in (column.header, *column.cells) for word in str(cell).split()]
+                        column.min_width = max(map(len, words), default=0)
+                    console.print(part, crop=False)
+                else:
+                    console.print(part, soft_wrap=True)
+            # The stream that bars on a terminal replace: click and the console would write past it.
+            sys.stdout.write(captured.get())
+            sys.stdout.flush()
 
 
 def number_table(*titles: str, left: int = 1) -> Table:
@@ -73,6 +82,32 @@ def number_table(*titles: str, left: int = 1) -> Table:
     for title in titles[left:]:
         table.add_column(title, justify="right")
     return table
+
+
+class RowByRow:
+    """A table of numbers whose rows are printed one after another, as they are known.
+
+    The first column has the width of the longest name, and the others that of a large number or of their title.
+    """
+
+    def __init__(self, titles: Sequence[str], names: Iterable[str], quiet: bool) -> None:
+        self._quiet = quiet
+        width = max(max(map(len, title.split()), default=0) for title in titles[1:])
+        self._widths = [max(map(len, [titles[0], *names])), *[max(width, NUMBER_WIDTH)] * (len(titles) - 1)]
+        show([self._table(titles, show_header=True)], quiet)
+
+    def add(self, *cells: str) -> None:
+        """Print a row."""
+        row = self._table([""] * len(cells), show_header=False)
+        row.add_row(*cells)
+        show([row], self._quiet)
+
+    def _table(self, titles: Sequence[str], show_header: bool) -> Table:
+        table = number_table(*titles)
+        table.show_header = show_header
+        for column, width in zip(table.columns, self._widths, strict=True):
+            column.width = width
+        return table
 
 
 def progress_clock() -> float:
@@ -91,7 +126,14 @@ def progress_bar(quiet: bool, clock: Clock | None = None) -> Iterator[BeginProgr
         yield lambda _name: lambda _done: None
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    bars = Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
+    # On a terminal, rows that are printed meanwhile are shown above the bars; into a file they are written as always.
+    bars = Progress(
+        *columns,
+        console=Console(stderr=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+        redirect_stdout=sys.stdout.isatty(),
+    )
     with contextlib.nullcontext() if bars.disable else bars:
         yield _Report(bars, clock or progress_clock).begin
 

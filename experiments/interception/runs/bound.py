@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.experiments.common.screen import Part, figure_files, number, number_table, parts_of, show
+from infoset.experiments.common.screen import Part, RowByRow, figure_files, number, number_table, parts_of, show
 from infoset.experiments.common.units import M_PER_KM
 from infoset.experiments.interception.command import Bound
 from infoset.experiments.interception.runs.shared import Progress, WorstMisses, find_worst_misses, need_finite, work_of
@@ -24,6 +24,14 @@ from infoset.sim.bound.pair_of_motions import TruthPair
 from infoset.sim.results import join
 
 FIGURE = "figure-bound"
+STRATEGY_TITLES = (
+    "strategy",
+    "pairs\n\nm",
+    "set never\nempty\nm",
+    "also\nempty\nm",
+    "miss /\nbound\n",
+    "guaranteed\n\nm",
+)
 
 
 @dataclass(frozen=True)
@@ -69,11 +77,9 @@ def run(options: Bound) -> None:
     with work_of(options, scenario, figure_files(FIGURE), notes=notes) as work:
         lower = lower_bound(scenario, progress=work.begin("lower bound"))
         nominal = _nominal(scenario)
-        reports = parts_of(work.begin("strategies"), len(strategies))
-        worst = [
-            _simulate(scenario, lower, name, own, options, report)
-            for (name, own), report in zip(strategies.items(), reports, strict=True)
-        ]
+        quiet = options.quiet or work.written.stdout_taken
+        show(_bound_parts(scenario, lower, nominal), quiet)
+        worst = _worst_of_strategies(scenario, lower, strategies, options, work.begin("strategies"), quiet)
         (reserve, reasons), best = _value(scenario, lower), _best(worst)
         parts_m = {} if reserve is None else {name.removesuffix("_m"): part for name, part in asdict(reserve).items()}
         value = {
@@ -90,8 +96,31 @@ def run(options: Bound) -> None:
 
             worst_m = {strategy.name: strategy.worst_m for strategy in worst}
             work.written.figure(FIGURE, draw_bound(scenario, lower, worst_m))
-    parts = [*_parts(scenario, lower, nominal, worst), *_value_lines(lower.bound_m, reserve, reasons, best)]
-    show([*parts, *_notes(lower, options, worst)], options.quiet or work.written.stdout_taken)
+    show([*_value_lines(lower.bound_m, reserve, reasons, best), *_notes(scenario, lower, options, worst)], quiet)
+
+
+def _worst_of_strategies(
+    scenario: Scenario,
+    lower: LowerBound,
+    strategies: Mapping[str, Strategy | None],
+    options: Bound,
+    progress: Progress,
+    quiet: bool,
+) -> list[WorstOfStrategy]:
+    """Simulate the strategies one after another, and print the row of each when it ends."""
+    if not strategies:
+        return []
+    rows = RowByRow(STRATEGY_TITLES, strategies, quiet)
+    reports = parts_of(progress, len(strategies))
+    worst = []
+    for (name, own), report in zip(strategies.items(), reports, strict=True):
+        strategy = _simulate(scenario, lower, name, own, options, report)
+        searched = strategy.searched.misses().values()
+        values = (strategy.pairs_m, *searched, strategy.over(lower), max_guarantee_m(strategy.results))
+        rows.add(name, *map(number, values))
+        worst.append(strategy)
+    show([""], quiet)
+    return worst
 
 
 def _simulate(
@@ -215,9 +244,7 @@ def _value_lines(
     yield f"no upper end is proved, because of: {', '.join(reasons)}"
 
 
-def _parts(
-    scenario: Scenario, lower: LowerBound, nominal: TruthPair, worst: Sequence[WorstOfStrategy]
-) -> Iterator[Part]:
+def _bound_parts(scenario: Scenario, lower: LowerBound, nominal: TruthPair) -> Iterator[Part]:
     model = scenario.set_model
     titles = ("closing speed\nkm/s", "bound\nm", "range at t = 0\nkm", "equal measurements until\ns before arrival")
     bounds = number_table(*titles)
@@ -228,12 +255,6 @@ def _parts(
             f"{pair.label_m / M_PER_KM:.1f}",
             "one motion" if pair.is_single else f"{_equal_until_s(pair, scenario):.2f}",
         )
-    heads = ("pairs\n\nm", "set never\nempty\nm", "also\nempty\nm", "miss /\nbound\n", "guaranteed\n\nm")
-    strategies = number_table("strategy", *heads)
-    for strategy in worst:
-        searched = strategy.searched.misses().values()
-        values = (strategy.pairs_m, *searched, strategy.over(lower), max_guarantee_m(strategy.results))
-        strategies.add_row(strategy.name, *map(number, values))
     bound_m = number(lower.bound_m)
     yield f"{scenario.name}, model {model.model.value}: no strategy can guarantee a miss below {bound_m} m"
     if scenario.radius_m is not None:
@@ -249,13 +270,13 @@ def _parts(
     for axis in model.axes:
         maximum = model.axis(axis).disturbance_m_s2
         yield f"acceleration of the object along {axis} in these pairs: at most {maximum:.3g} m/s^2"
-    yield from (bounds, "", *((strategies, "") if worst else ()))
+    yield from (bounds, "")
+
+
+def _notes(scenario: Scenario, lower: LowerBound, options: Bound, worst: Sequence[WorstOfStrategy]) -> Iterator[str]:
     if any(strategy.results.set_emptied.any() for strategy in worst):
-        hint = "" if model.is_guaranteed else "; try --model guaranteed"
+        hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
         yield f"in some engagements a measurement contradicted all states of the set, which became empty{hint}"
-
-
-def _notes(lower: LowerBound, options: Bound, worst: Sequence[WorstOfStrategy]) -> Iterator[str]:
     if any(pair.is_single for pair in lower.pairs):
         yield "one motion: a start that all impulses together do not bring nearer, whatever is measured"
     if not worst:

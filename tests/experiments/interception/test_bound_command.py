@@ -3,13 +3,16 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from infoset import StateBox
+from infoset.experiments.common.errors import InputError
 from infoset.experiments.common.input_file import to_toml
 from infoset.experiments.interception.figures.bound import draw_bound
+from infoset.experiments.interception.runs import bound
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.guidance import strategy_names
 from infoset.sim import Scenario
@@ -122,6 +125,29 @@ def test_the_bound_alone_names_the_body(
     assert "symmetric-miss" not in out
     found = json.loads(Path("bound.json").read_text())
     assert (found["strategies"], found["hit_cannot_be_guaranteed"]) == ([], share < 1.0)
+
+
+@pytest.mark.usefixtures("known")
+def test_row_of_each_strategy_is_printed_when_its_search_ends(
+    infoset: Command, short_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulate = bound._simulate
+
+    def stop_at_the_second(*arguments: Any) -> bound.WorstOfStrategy:
+        if arguments[2] == "least-effort":
+            raise InputError("stopped")
+        return simulate(*arguments)
+
+    monkeypatch.setattr(bound, "_simulate", stop_at_the_second)
+
+    code, out, err = infoset("bound", short_file, "--strategies", "symmetric-miss,least-effort", "--budget", 1)
+
+    assert (code, "error: stopped" in err) == (2, True)
+    *_, heading, row = out.splitlines()
+    assert heading.split() == ["strategy", *"mmm", "m"]
+    assert row.split()[0] == "symmetric-miss"
+    assert len(heading) == len(row)
+    assert "no strategy can guarantee a miss below" in out
 
 
 def test_value_where_range_and_speed_are_known(infoset: Command, short: Scenario, tmp_path: Path) -> None:
