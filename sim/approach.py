@@ -20,6 +20,8 @@ from infoset.sim.scenario import Sun
 
 TOLERANCE = 1e-12
 """Relative error of a step of the integration."""
+UNIT = np.eye(3)
+"""Unit matrix of space."""
 SEARCH = 3.0
 """The closest approach is searched for up to this multiple of the time that straight lines take to it."""
 WIDEST = 0.1
@@ -162,7 +164,7 @@ def pair_rates(state: Floats, parameter_m3_s2: float) -> Floats:
         body, squared = own + relative, own @ own
         scale, ratio = -parameter_m3_s2 / squared**1.5, np.log1p(relative @ (own + body) / squared)
         own_pull, pull = scale * own, scale * (relative + np.expm1(-1.5 * ratio) * body)
-        gradient = scale * np.exp(-1.5 * ratio) * (np.eye(3) - 3.0 * np.outer(body, body) / (body @ body))
+        gradient = scale * np.exp(-1.5 * ratio) * (UNIT - 3.0 * (body[:, None] * body) / (body @ body))
     changes = transition[3:].ravel(), (gradient @ transition[:3]).ravel()
     return np.concatenate([own_velocity, own_pull, velocity, pull, *changes])
 

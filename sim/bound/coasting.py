@@ -156,9 +156,13 @@ def _kepler(position_m: Floats, velocity_m_s: Floats, sun: Sun, step_s: float) -
 
     def rates(_time: float, state: Floats) -> Floats:
         transition = state[12:48].reshape(6, 6)
+        changes = np.empty(60)
+        changes[:48] = pair_rates(state[:48], parameter)
         # Phi^-1 (0, unit acceleration): columns of the inverse, which is symplectic.
-        pushed = np.vstack([-transition[:3, 3:].T, transition[:3, :3].T])[:, :2]
-        return np.concatenate([pair_rates(state[:48], parameter), pushed.ravel()])
+        pushed = changes[48:].reshape(6, 2)
+        pushed[:3] = -transition[:2, 3:].T
+        pushed[3:] = transition[:2, :3].T
+        return changes
 
     def along_x(_time: float, state: Floats) -> float:
         return float(state[8])
