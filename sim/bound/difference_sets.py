@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from infoset._compile import ZERO, allocation_free, compiled
 from infoset.arrays import Floats, Integers
-from infoset.kernels import Kernels
 from infoset.model import SetModel
 from infoset.sensors import Sensor
 from infoset.sim.bound.coasting import Coasting
@@ -26,8 +26,6 @@ MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding in flights of the two motions."""
 POSITION, PREDICTED_MISS = 0, 1
 """Columns of the strips of a step: limits of the difference of the positions w, and of that of w + V_w x/c."""
-
-_kernels = Kernels()  # without fast-math: a reordered sum of heights need not be what its cut removes
 
 
 class FarthestDifference(NamedTuple):
@@ -72,7 +70,7 @@ class Segments(NamedTuple):
     part_share: Floats
 
 
-@_kernels.allocation_free
+@allocation_free
 def find_place(segments: Segments, count: int, x: float, y: float) -> int:
     """Return the index of the first segment whose angle is not less than that of a direction."""
     low = 0
@@ -86,7 +84,7 @@ def find_place(segments: Segments, count: int, x: float, y: float) -> int:
     return low
 
 
-@_kernels.allocation_free
+@allocation_free
 def insert_segment(segments: Segments, count: int, place: int, x: float, y: float, number: int) -> int:
     """Insert a whole segment at an index and return the number of segments."""
     for i in range(count, place, -1):
@@ -101,7 +99,7 @@ def insert_segment(segments: Segments, count: int, place: int, x: float, y: floa
     return count + 1
 
 
-@_kernels.allocation_free
+@allocation_free
 def add_segment(segments: Segments, count: int, made: int, x: float, y: float) -> tuple[int, float]:
     """Add a segment to the sum; return the number of segments and the sign of its direction from 0 to pi."""
     sign = 1.0
@@ -114,7 +112,7 @@ def add_segment(segments: Segments, count: int, made: int, x: float, y: float) -
     return count, sign
 
 
-@_kernels.allocation_free
+@allocation_free
 def cut_by_strip(
     segments: Segments, count: int, made: int, normal_x: float, normal_y: float, limit: float
 ) -> tuple[int, int]:
@@ -186,7 +184,7 @@ def cut_by_strip(
     return kept, made + 1
 
 
-@_kernels.compiled
+@compiled
 def farthest_difference(
     widths: Floats, pushes: Floats, normals: Floats, limits: Floats, towards: Floats, common: int
 ) -> FarthestDifference:
@@ -226,9 +224,13 @@ def farthest_difference(
 
     signs = np.empty(made_at_most)
     number_of_push = np.empty(common, dtype=np.int64)
-    count, signs[0] = add_segment(segments, 0, 0, widths[0], 0.0)
-    count, signs[1] = add_segment(segments, count, 1, 0.0, widths[1])
-    made = 2
+    count = ZERO
+    made = ZERO
+    for i in range(2):
+        width_x = widths[0] if i == 0 else 0.0
+        width_y = widths[1] if i == 1 else 0.0
+        count, signs[made] = add_segment(segments, count, made, width_x, width_y)
+        made += 1
     farthest = np.empty(common + 1)
     farthest[0] = abs(towards[0] * widths[0]) + abs(towards[1] * widths[1]) + later[0]
     for k in range(common):
