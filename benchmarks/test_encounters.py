@@ -11,11 +11,20 @@ import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from infoset.experiments.common.input_file import load_problem
-from infoset.rendezvous.multipoint import Nodes, best_order, best_times, solve_segments
+from infoset.rendezvous.multipoint import (
+    Nodes,
+    Target,
+    TimeLimits,
+    Tour,
+    best_order,
+    best_times,
+    solve_segments,
+)
 from infoset.rendezvous.pareto import analyse_coalitions, solve_encounter
 from infoset.rendezvous.relative_motion import ClohessyWiltshire
 from tests.rendezvous.multipoint.dense import solve_dense
@@ -85,6 +94,18 @@ def test_order_and_times_of_five(benchmark: BenchmarkFixture, under: Check) -> N
     problem = load_problem("service-5")
     benchmark.pedantic(best_order, args=(problem.tour, problem.limits()), rounds=3, warmup_rounds=1)
     under("N = 5, order and times", best_s(lambda: best_order(problem.tour, problem.limits()), 3), 2.0, "s")
+
+
+@pytest.mark.parametrize(("count", "most_s"), [(6, 4.0), (9, 120.0)])
+def test_order_and_times_of_many(count: int, most_s: float, under: Check) -> None:
+    rate_rad_s, random = 1.1e-3, np.random.default_rng(1)
+    states = random.normal(size=(count, 6)) * np.array([300.0, 3000.0, 300.0, 0.3, 0.3, 0.3])
+    states[:, 4] = -2.0 * rate_rad_s * states[:, 0]
+    targets = tuple(Target(str(number)) for number in range(count))
+    tour = Tour(ClohessyWiltshire(rate_rad_s), targets, states, np.zeros(6))
+    two_revolutions = TimeLimits(4.0 * np.pi / rate_rad_s)
+    best_order(tour, TimeLimits(1.0 / rate_rad_s))
+    under(f"N = {count}, order and times", best_s(lambda: best_order(tour, two_revolutions), 1), most_s, "s")
 
 
 def test_the_asteroid_tour(benchmark: BenchmarkFixture, under: Check) -> None:

@@ -15,9 +15,11 @@ from infoset.experiments.common.problem_command import trajectories_csv
 from infoset.experiments.common.screen import Part, number_table
 from infoset.experiments.common.units import Unit, time_unit
 from infoset.experiments.multipoint.file import MultipointProblem
-from infoset.rendezvous.multipoint import BestOrder, Path, Tour
+from infoset.rendezvous.multipoint import BestOrder, Grid, Path, Tour
 
 _POINTS = 1601
+_ENOUGH_A_REVOLUTION = 20.0
+"""Times of a grid in a revolution: with fewer, its lowest costs may be in other valleys than the minima."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,33 +85,60 @@ class Report:
         """Return what is known of the best order and of the best times."""
         notes = []
         if self.order_chosen == "best":
-            linear = isinstance(self.problem.tour, Tour)
-            proved = linear and self.times_chosen == "given" and not self.best.lost
-            notes.append("no order that fits the times costs less" if proved else "the order is the best one found")
+            notes.append(self._order_note())
         search = self.best.time_search
-        if search is not None:
+        if search is None:
+            return notes
+
+        note = (
+            f"the times are a local minimum, the lowest one found by {search.followed} descents from the best of "
+            f"{search.starts} starting points"
+        )
+        if search.grid is not None:
+            notes.append(f"{note} on a grid of {self._grid_text(search.grid)}")
+            if self.revolutions > 1.0 and self.per_revolution(search.grid) < _ENOUGH_A_REVOLUTION:
+                notes.append("the grid is coarse, and minima between its times can be lower")
+            return notes
+
+        notes.append(note)
+        if self.revolutions > 1.0:
             notes.append(
-                f"the times are a local minimum, the lowest one found by {search.followed} descents from the best of "
-                f"{search.starts} starting points"
+                f"over {self.revolutions:.2g} revolutions there are many local minima, and others are often lower: "
+                "compare the costs from different time_s"
             )
-            if self.revolutions > 1.0:
-                notes.append(
-                    f"over {self.revolutions:.2g} revolutions there are many local minima, and others are often "
-                    "lower: compare the costs from different time_s"
-                )
         return notes
+
+    def _order_note(self) -> str:
+        search = self.best.order_search
+        if search is not None:
+            return (
+                f"all orders were compared on a grid of {self._grid_text(search.grid)}, and the best {search.orders} "
+                "searched again: the order is the best one found"
+            )
+        linear = isinstance(self.problem.tour, Tour)
+        proved = linear and self.times_chosen == "given" and not self.best.lost
+        return "no order that fits the times costs less" if proved else "the order is the best one found"
+
+    def _grid_text(self, grid: Grid) -> str:
+        return f"{grid.times} times, {self.per_revolution(grid):.2g} a revolution"
 
     @property
     def revolutions(self) -> float:
         """Return the revolutions until the latest time: of the reference orbit, or of a circle through the start."""
+        return self._revolutions_until(self.end_s if self.problem.latest_s is None else self.problem.latest_s)
+
+    def per_revolution(self, grid: Grid) -> float:
+        """Return the number of times of a grid in a revolution."""
+        return grid.times / self._revolutions_until(grid.until_s)
+
+    def _revolutions_until(self, time_s: float) -> float:
         problem = self.problem
         rate_rad_s = problem.orbit_rate_rad_s
         if rate_rad_s is None:
             assert problem.gravitational_parameter_m3_s2 is not None
             radius_m = float(np.linalg.norm(problem.tour.start_state[:3]))
             rate_rad_s = float(np.sqrt(problem.gravitational_parameter_m3_s2 / radius_m**3))
-        latest_s = self.end_s if problem.latest_s is None else problem.latest_s
-        return rate_rad_s * (latest_s - problem.tour.start_s) / (2.0 * np.pi)
+        return rate_rad_s * (time_s - problem.tour.start_s) / (2.0 * np.pi)
 
 
 def report_json(report: Report) -> dict[str, object]:
@@ -130,16 +159,33 @@ def report_json(report: Report) -> dict[str, object]:
         "evaluations": report.best.evaluations,
         "orders_begun": report.best.nodes,
         "orders_left_out": len(report.best.lost),
+        "order_search": _order_search_json(report),
         "time_search": _time_search_json(report),
         "notes": report.notes,
     }
+
+
+def _order_search_json(report: Report) -> dict[str, object] | None:
+    search = report.best.order_search
+    if search is None:
+        return None
+    return {"grid": _grid_json(report, search.grid), "orders_searched_again": search.orders}
 
 
 def _time_search_json(report: Report) -> dict[str, object] | None:
     search = report.best.time_search
     if search is None:
         return None
-    return {"starts": search.starts, "followed": search.followed, "revolutions": report.revolutions}
+    return {
+        "starts": search.starts,
+        "followed": search.followed,
+        "revolutions": report.revolutions,
+        "grid": None if search.grid is None else _grid_json(report, search.grid),
+    }
+
+
+def _grid_json(report: Report, grid: Grid) -> dict[str, object]:
+    return {"times": grid.times, "until_s": grid.until_s, "per_revolution": report.per_revolution(grid)}
 
 
 def _node_json(report: Report, index: int) -> dict[str, object]:
@@ -196,6 +242,6 @@ def report_lines(report: Report) -> Iterator[Part]:
         return
     text = f"{report.best.evaluations} paths computed"
     if report.order_chosen == "best":
-        text += f", {report.best.nodes} partial orders examined"
+        text += "" if report.best.order_search is not None else f", {report.best.nodes} partial orders examined"
         text += f", {len(report.best.lost)} left out because no trajectory was found" if report.best.lost else ""
     yield "; ".join([text, *report.notes])

@@ -33,19 +33,25 @@ _CLOCK = 1e-9
 
 
 class Effort(Enum):
-    """Effort of a search for best times: starts besides the guesses, starts that are followed, relative tolerance."""
+    """Effort of a search for best times.
 
-    BOUND = (1, 1, 1e-5)
+    Starts besides the guesses, starts that are followed, relative tolerance, and whether the end is polished to the
+    last digits.
+    """
+
+    BOUND = (1, 1, 1e-5, False)
     """A bound of a partial order, from good times."""
-    ORDER = (6, 2, 1e-7)
-    """Comparison of orders."""
-    RUGGED = (14, 5, 1e-5)
+    VALLEY = (0, 1, 1e-5, False)
+    """The minimum near given times, to compare minima."""
+    RUGGED = (14, 5, 1e-5, False)
     """Comparison of orders whose cost has many local minima."""
-    FINAL = (48, 6, 1e-9)
-    """The final answer, to the last digits."""
+    FINAL = (48, 6, 1e-9, True)
+    """The final answer, without good times to start from."""
+    LAST = (1, 6, 1e-9, True)
+    """The final answer, from the best minima known."""
 
-    def __init__(self, starts: int, followed: int, tolerance: float) -> None:
-        self.starts, self.followed, self.tolerance = starts, followed, tolerance
+    def __init__(self, starts: int, followed: int, tolerance: float, polished: bool) -> None:
+        self.starts, self.followed, self.tolerance, self.polished = starts, followed, tolerance, polished
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,14 @@ class TimeLimits:
             )
 
 
+class Grid(NamedTuple):
+    """Equally spaced times of the first visit, and of later ones with the same gaps and stays before them."""
+
+    times: int
+    until_s: float
+    """End of the last visit at the last time."""
+
+
 class TimeSearch(NamedTuple):
     """Extent of a search for best times."""
 
@@ -86,6 +100,8 @@ class TimeSearch(NamedTuple):
     """Starting points, the guesses included, whose cost was computed."""
     followed: int
     """Starting points that were followed to a local minimum, the cheapest of which is the result."""
+    grid: Grid | None = None
+    """The grid of times from which the starting points are; None if they are from no grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,12 +216,12 @@ def optimise_times(
     ValueError
         If there is no latest time and no guess.
     NotSettledError
-        If the conditions of a minimum are not satisfied; with the final effort only.
+        If the conditions of a minimum are not satisfied, where the end is polished.
 
     Notes
     -----
     The problem is not convex. Many starts are evaluated, and the search begins with those that cost no more than their
-    neighbours; a lower minimum elsewhere is not excluded, and over several revolutions it is frequent. The descent is
+    neighbours; a lower minimum elsewhere is not excluded. The descent is
     sequential quadratic programming in the gaps, on the logarithm of the objective, with the exact gradient dI/dt; then
     Newton's method, with differences of the gradient, on the gaps that are not at a limit. Each step computes one path.
     """
@@ -221,7 +237,12 @@ def optimise_times(
     trials = _Trials(fly, shifts, limits.price_per_s, minimum, total, scale)
     candidates = [np.diff(np.concatenate([[0.0], np.asarray(guess) - shifts])) for guess in guesses]
     candidates += _spread(count, scale, minimum, bounded=np.isfinite(total), most=effort.starts)
-    sound = [gaps for gaps in candidates if (gaps >= minimum * (1 - 1e-9)).all() and gaps.sum() <= total * (1 + 1e-12)]
+    # Differences of times outside the limits by rounding, which is relative to the clock, are moved into them.
+    sound = [
+        trials.within(gaps)
+        for gaps in candidates
+        if (gaps >= minimum * (1.0 - _CLOCK)).all() and gaps.sum() <= total * (1.0 + _CLOCK)
+    ]
     starts = [trial for trial in map(trials.attempt, sound) if trial is not None]
     if not starts:
         trials(sound[0])  # raises the reason
@@ -234,7 +255,7 @@ def optimise_times(
         if ends[-1].objective < enough:
             break
     best = min(ends, key=lambda trial: trial.objective)
-    if effort is Effort.FINAL:
+    if effort.polished:
         best = _polish(trials, best)
         for _ in range(_MAX_RESTARTS):
             if _unsettled(trials, best) <= _WELL_SETTLED:

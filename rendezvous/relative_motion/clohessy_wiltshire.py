@@ -27,6 +27,8 @@ class ClohessyWiltshire(LinearMotion):
 
     rate_rad_s: float
 
+    stationary = True
+
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A, the same at all times, shape (..., 6, 6): x'' = 3 n^2 x + 2 n y', y'' = -2 n x', z'' = -n^2 z."""
         n = self.rate_rad_s

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +30,9 @@ class LinearMotion(ABC):
 
     Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front.
     """
+
+    stationary: ClassVar[bool] = False
+    """Whether a motion between two times depends on their difference only."""
 
     @abstractmethod
     def dynamics(self, time_s: ArrayLike) -> Floats:
