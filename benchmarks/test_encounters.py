@@ -26,7 +26,7 @@ from infoset.rendezvous.multipoint import (
     solve_segments,
 )
 from infoset.rendezvous.pareto import analyse_coalitions, solve_encounter
-from infoset.rendezvous.relative_motion import ClohessyWiltshire
+from infoset.rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, TimeVaryingMotion, TschaunerHempel
 from tests.rendezvous.multipoint.dense import solve_dense
 
 Floats = NDArray[np.float64]
@@ -58,6 +58,22 @@ def test_pareto(benchmark: BenchmarkFixture, under: Check) -> None:
     under("pareto, 3 craft", 1e3 * best_s(lambda: solve_encounter(encounter), 500), 1.0, "ms")
     both = 1e3 * best_s(lambda: analyse_coalitions(solve_encounter(encounter)), 300)
     under("the same with its coalitions", both, 2.0, "ms")
+
+
+def test_elliptic_motion(under: Check, at_least: Check) -> None:
+    """500 transitions over 2.5 revolutions, and a Gramian over them, in closed form and by collocation of A(t)."""
+    orbit = EllipticOrbit(RATE, 0.3, 0.4)
+    end = 2.5 * 2.0 * np.pi / RATE
+    times, ends = np.linspace(0.0, end, 500), np.full(500, end)
+    closed, collocated = TschaunerHempel(orbit), TimeVaryingMotion(orbit.dynamics)
+    transitions = best_s(lambda: closed.transition(times, ends), 20)
+    under("500 transitions about an ellipse", 1e3 * transitions, 5.0, "ms")
+    by_collocation = best_s(lambda: collocated.transition(times, ends), 1)
+    at_least("the same by collocation, compared with it", by_collocation / transitions, 1000.0, "x")
+    gramian = best_s(lambda: closed.gramian(0.0, end), 20)
+    under("Gramian of 2.5 revolutions about an ellipse", 1e3 * gramian, 1.0, "ms")
+    by_collocation = best_s(lambda: collocated.gramian(0.0, end), 3)
+    at_least("the same by collocation, compared with it", by_collocation / gramian, 20.0, "x")
 
 
 def test_segments_and_the_dense_system(benchmark: BenchmarkFixture, under: Check, at_least: Check) -> None:

@@ -71,7 +71,7 @@ nitpick_ignore = [
         "infoset.sim.scenario": ("_Speed",),
         "infoset.observer.sets": ("Polygons", "Polytopes", "Sets", "Motion"),
         "infoset.observer.steps": ("Strips",),
-        "infoset.rendezvous.relative_motion.time_varying": ("HeldSegment",),
+        "infoset.rendezvous.relative_motion.linear_motion": ("HeldSegment",),
         "infoset.limits": ("Line",),
         "infoset.sensors.sensor": ("Measurements", "Geometry", "Apart", "Cuttable"),
         "infoset.sensors.bearing": ("RangeOrRanges",),

@@ -23,7 +23,7 @@ from infoset.rendezvous.reachability import (
     discretised,
     motion_of,
 )
-from infoset.rendezvous.relative_motion import CollocatedMotion, EllipticOrbit
+from infoset.rendezvous.relative_motion import EllipticOrbit, HeldMotion
 from infoset.rendezvous.two_body import OrbitalElements
 
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
@@ -188,7 +188,7 @@ class Rendezvous:
         )
 
     @cached_property
-    def motion(self) -> CollocatedMotion:
+    def motion(self) -> HeldMotion:
         """The linear model."""
         return motion_of(self.ellipse, self.model)
 

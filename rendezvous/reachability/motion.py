@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.relative_motion import CollocatedMotion, EllipticOrbit, TimeVaryingMotion, TschaunerHempel
+from infoset.rendezvous.relative_motion import EllipticOrbit, HeldMotion, TimeVaryingMotion, TschaunerHempel
 
 _RELATIVE = 1e-12
 _ABSOLUTE = 1e-9
@@ -23,7 +23,7 @@ class MotionModel(Enum):
     TIME_VARYING = "time-varying"
 
 
-def motion_of(orbit: EllipticOrbit, model: MotionModel) -> CollocatedMotion:
+def motion_of(orbit: EllipticOrbit, model: MotionModel) -> HeldMotion:
     """Return the linear motion about an `orbit` by a `model`, in Hill's axes.
 
     Equation (2) of Shorikov and Goranov (2021), who use the frozen model.
@@ -33,9 +33,7 @@ def motion_of(orbit: EllipticOrbit, model: MotionModel) -> CollocatedMotion:
     return TschaunerHempel(orbit)
 
 
-def discretised(
-    motion: CollocatedMotion, periods: int, period_s: float, acceleration_m_s2: float
-) -> tuple[Floats, Floats]:
+def discretised(motion: HeldMotion, periods: int, period_s: float, acceleration_m_s2: float) -> tuple[Floats, Floats]:
     """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t), exact for controls held over a period.
 
     A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6, 3), is in m and m/s
@@ -49,7 +47,7 @@ def discretised(
 
 
 def between_periods(
-    motion: CollocatedMotion, periods: int, period_s: float, acceleration_m_s2: float, instants: int
+    motion: HeldMotion, periods: int, period_s: float, acceleration_m_s2: float, instants: int
 ) -> Floats:
     """Return the matrices of states within the periods, x = matrix (x(t), u(t)), shape (periods, instants, 6, 9).
 

@@ -6,14 +6,14 @@ along the orbit's normal, so that z = x cross y. The origin follows the referenc
 
 from infoset.rendezvous.relative_motion.clohessy_wiltshire import ClohessyWiltshire
 from infoset.rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
-from infoset.rendezvous.relative_motion.linear_motion import LinearMotion, Segment
-from infoset.rendezvous.relative_motion.time_varying import CollocatedMotion, TimeVaryingMotion
+from infoset.rendezvous.relative_motion.linear_motion import HeldMotion, LinearMotion, Segment
+from infoset.rendezvous.relative_motion.time_varying import TimeVaryingMotion
 from infoset.rendezvous.relative_motion.tschauner_hempel import TschaunerHempel
 
 __all__ = [
     "ClohessyWiltshire",
-    "CollocatedMotion",
     "EllipticOrbit",
+    "HeldMotion",
     "LinearMotion",
     "Segment",
     "TimeVaryingMotion",

@@ -25,6 +25,13 @@ class Segment:
     gramian: Floats
 
 
+@dataclass(frozen=True)
+class HeldSegment(Segment):
+    """Motion between two times, with the effect at the end of a unit control held from the start, shape (..., 6, 3)."""
+
+    held: Floats
+
+
 class LinearMotion(ABC):
     """x' = A(t) x + B u, x = (position, velocity), with B = (0, 1)'.
 
@@ -55,6 +62,14 @@ class LinearMotion(ABC):
         return self.segment(start_s, end_s).gramian
 
 
+class HeldMotion(LinearMotion):
+    """A linear motion that also has the effect of a control that is constant between two times."""
+
+    @abstractmethod
+    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> HeldSegment:
+        """Transition, Gramian and the effect of a held control together; end >= start."""
+
+
 def state_scales(durations: Floats) -> Floats:
     """Return (T, T, T, 1, 1, 1) of each interval, shape (..., 6), from durations in s; T = 1 s for an empty one."""
     scale = np.ones((*durations.shape, 6))
@@ -67,9 +82,14 @@ def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
 
     Raise `ValueError` if there are more than 200 000 panels.
     """
+    need_panels(start_s, end_s, radians)
+    return np.linspace(start_s, end_s, max(1, int(np.ceil(radians))) + 1)
+
+
+def need_panels(start_s: float, end_s: float, radians: float) -> None:
+    """Raise `ValueError` if a motion that turns by `radians` between two times has more than 200 000 panels."""
     if not radians <= MAX_PANELS:
         raise ValueError(
             f"the motion turns by {radians:.3g} rad from {start_s:g} s to {end_s:g} s; at most {MAX_PANELS} rad can "
             "be divided into panels; check the units"
         )
-    return np.linspace(start_s, end_s, max(1, int(np.ceil(radians))) + 1)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.relative_motion.linear_motion import LinearMotion, Segment, state_scales
+from infoset.rendezvous.relative_motion.linear_motion import HeldMotion, HeldSegment, state_scales
 
 OfTime = Callable[[Floats], Floats]
-WeightsAt = Callable[[Floats], tuple[Floats, Floats]]
 
 NODES = 8
 AGREEMENT = 2e-13
@@ -23,55 +21,14 @@ MAX_PANELS = 4096
 MAX_BREAKS = 200_000
 
 
-@dataclass(frozen=True)
-class HeldSegment(Segment):
-    """Motion between two times, with the effect at the end of a unit control held from the start, shape (..., 6, 3)."""
-
-    held: Floats
-
-
-class LinearSystem(NamedTuple):
-    """dx/ds = A(s) x + c(s) B u, for any independent variable s that increases with time."""
-
-    matrix_at: OfTime
-    """A of s of any shape: shape (..., 6, 6)."""
-    weights_at: WeightsAt
-    """c of s, the weight of the held control, and c^2 / t', the weight of the Gramian, of the shape of s."""
-
-
-class CollocatedMotion(LinearMotion):
-    """A linear motion whose A(t) is known.
+@dataclass(frozen=True, eq=False)
+class TimeVaryingMotion(HeldMotion):
+    """x' = A(t) x + B u; `matrix_at` returns A of times of shape (k,), s: shape (k, 6, 6).
 
     The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
     = Psi(t)' at the nodes gives the Gramian and the held control as sums of positive weights. Panels are doubled until
     two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
     """
-
-    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> HeldSegment:
-        """Transition, Gramian and the effect of a held control together; end >= start, except for the transition."""
-        return collocate(LinearSystem(self.dynamics, _unit_weights), start_s, end_s)
-
-
-def collocate(motion: LinearSystem, start: ArrayLike, end: ArrayLike) -> HeldSegment:
-    """Solve a `motion` between values of its independent variable, see `CollocatedMotion`.
-
-    Raises
-    ------
-    ValueError
-        If two solutions do not agree.
-    """
-    starts, ends = np.broadcast_arrays(np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64))
-    solution, shape = _refined(motion, starts.ravel(), ends.ravel()), starts.shape
-    return HeldSegment(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
-
-
-def _unit_weights(time_s: Floats) -> tuple[Floats, Floats]:
-    return np.ones_like(time_s), np.ones_like(time_s)
-
-
-@dataclass(frozen=True, eq=False)
-class TimeVaryingMotion(CollocatedMotion):
-    """x' = A(t) x + B u; `matrix_at` returns A of times of shape (k,), s: shape (k, 6, 6)."""
 
     matrix_at: OfTime
 
@@ -79,6 +36,18 @@ class TimeVaryingMotion(CollocatedMotion):
         """A(t), shape (..., 6, 6)."""
         times = np.asarray(time_s, dtype=np.float64)
         return np.asarray(self.matrix_at(times.ravel()), dtype=np.float64).reshape(*times.shape, 6, 6)
+
+    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> HeldSegment:
+        """Transition, Gramian and the effect of a held control together; end >= start, except for the transition.
+
+        Raises
+        ------
+        ValueError
+            If two solutions do not agree.
+        """
+        starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
+        solution = _refined(self.dynamics, starts.ravel(), ends.ravel())
+        return HeldSegment(*(part.reshape(*starts.shape, *part.shape[1:]) for part in vars(solution).values()))
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
@@ -104,19 +73,19 @@ class TimeVaryingMotion(CollocatedMotion):
         return np.unique(np.concatenate(settled))
 
 
-def _refined(motion: LinearSystem, starts: Floats, ends: Floats) -> HeldSegment:
+def _refined(dynamics: OfTime, starts: Floats, ends: Floats) -> HeldSegment:
     """Double the panels until two solutions agree, or differ by rounding only; many intervals in parts."""
-    panels = _first_panels(motion, starts, ends)
+    panels = _first_panels(dynamics, starts, ends)
     if len(starts) > 1 and panels * len(starts) > MAX_PANELS:
         half = len(starts) // 2
-        parts = [_refined(motion, starts[part], ends[part]) for part in (slice(None, half), slice(half, None))]
+        parts = [_refined(dynamics, starts[part], ends[part]) for part in (slice(None, half), slice(half, None))]
         return HeldSegment(
             *(np.concatenate(arrays) for arrays in zip(*(vars(part).values() for part in parts), strict=True))
         )
-    coarse, apart = _collocated(motion, starts, ends, panels), np.inf
+    coarse, apart = _collocated(dynamics, starts, ends, panels), np.inf
     while 2 * panels <= MAX_PANELS:
         panels *= 2
-        fine = _collocated(motion, starts, ends, panels)
+        fine = _collocated(dynamics, starts, ends, panels)
         before, apart = apart, _difference(coarse, fine, ends - starts)
         if apart <= AGREEMENT or (apart <= ROUNDING and apart > 0.1 * before):
             return fine
@@ -124,13 +93,13 @@ def _refined(motion: LinearSystem, starts: Floats, ends: Floats) -> HeldSegment:
     raise ValueError(f"A(t) changes too fast: {MAX_PANELS} panels an interval do not agree to {AGREEMENT:g}")
 
 
-def _first_panels(motion: LinearSystem, starts: Floats, ends: Floats) -> int:
+def _first_panels(dynamics: OfTime, starts: Floats, ends: Floats) -> int:
     """One panel for each radian of the fastest motion at the ends and the middle."""
     if not len(starts):
         return 1
     durations = (ends - starts)[:, None]
     places = ends[:, None] - durations * np.array([0.0, 0.5, 1.0])
-    radians = float((_rates(motion.matrix_at(places)) * np.abs(durations)).max())
+    radians = float((_rates(dynamics(places)) * np.abs(durations)).max())
     return int(np.clip(np.ceil(radians), 1, MAX_PANELS // 4))
 
 
@@ -153,20 +122,17 @@ def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
     return 0.5 * (nodes + 1.0), 0.5 * weights, 0.5 * integrals @ np.linalg.inv(values)
 
 
-def _collocated(motion: LinearSystem, starts: Floats, ends: Floats, panels: int) -> HeldSegment:
+def _collocated(dynamics: OfTime, starts: Floats, ends: Floats, panels: int) -> HeldSegment:
     """Solve on equal panels, from the end to the start; states are divided by (T, T, T, 1, 1, 1)."""
     nodes, weights, integrals = _gauss_collocation()
     durations = ends - starts
     positions = (np.arange(panels)[:, None] + nodes) / panels
     places = ends[:, None, None] - durations[:, None, None] * positions
     steps = durations[:, None, None] * np.ones_like(positions) / panels
-    held_weights, gramian_weights = motion.weights_at(places)
     spans = weights * steps
-    held_spans = spans * held_weights
-    gramian_spans = spans * gramian_weights
     scale = state_scales(durations)
     ratio = (scale[:, None, :] / scale[:, :, None])[:, None, None]
-    adjoint = np.swapaxes(motion.matrix_at(places) * ratio, -1, -2) * steps[..., None, None]
+    adjoint = np.swapaxes(dynamics(places) * ratio, -1, -2) * steps[..., None, None]
     # (1 - h a_jk A_k') Psi_k = 1, for the 8 nodes of each panel at once.
     system = -np.einsum("jk,npkab->npjakb", integrals, adjoint).reshape(len(durations), panels, 6 * NODES, 6 * NODES)
     system[..., np.arange(6 * NODES), np.arange(6 * NODES)] += 1.0
@@ -178,8 +144,8 @@ def _collocated(motion: LinearSystem, starts: Floats, ends: Floats, panels: int)
     gramian, held = np.zeros((len(durations), 6, 6)), np.zeros((len(durations), 6, 3))
     for panel in range(panels):
         turned = power[:, None] @ effect[:, panel]
-        gramian = gramian + np.einsum("nk,nkai,nkbi->nab", gramian_spans[:, panel], turned, turned)
-        held = held + np.einsum("nk,nkai->nai", held_spans[:, panel], turned)
+        gramian = gramian + np.einsum("nk,nkai,nkbi->nab", spans[:, panel], turned, turned)
+        held = held + np.einsum("nk,nkai->nai", spans[:, panel], turned)
         power = power @ np.swapaxes(last[:, panel], -1, -2)
     outer = scale[:, :, None] * scale[:, None, :]
     return HeldSegment(

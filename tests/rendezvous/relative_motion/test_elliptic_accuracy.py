@@ -106,13 +106,23 @@ def far_apart(found: Floats, exact: Floats, weight: Floats) -> float:
     return float(np.abs((found - exact) * weight).max() / np.abs(exact * weight).max())
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("eccentricity", [0.1, 0.5, 0.9, 0.95, 0.99, 0.999, 0.9999])
-def test_transitions_are_exact_but_for_rounding(eccentricity: float, seed: int) -> None:
+@pytest.mark.parametrize(
+    "spans",
+    [
+        # A difference of large terms, and the rounding of the two anomalies, left 7 digits of these.
+        (1e-7, 1e-5),
+        (1e-4, 1e-2),
+        (0.01, 1.0),
+        (1.0, 6.0),
+        (6.0, 16.0),
+    ],
+)
+@pytest.mark.parametrize("eccentricity", [0.0, 0.1, 0.5, 0.9, 0.95, 0.99, 0.999, 0.9999])
+def test_transitions_are_exact_but_for_rounding(eccentricity: float, spans: tuple[float, float]) -> None:
     # Products of panels in the same variables are wrong by 2e-11 at 0.95 and 3e-9 at 0.99.
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng([int(1e4 * eccentricity), int(1e7 * spans[0])])
     anomaly = float(random.uniform(-3.1, 3.1))
-    duration = float(random.uniform(*[(0.01, 1.0), (1.0, 6.0), (6.0, 16.0)][seed]))
+    duration = float(random.uniform(*spans))
     with mp.workdps(50):
         exact = exact_transition(eccentricity, anomaly, 0.0, duration)
         allowed = tolerance(eccentricity, anomaly, duration)
@@ -123,10 +133,26 @@ def test_transitions_are_exact_but_for_rounding(eccentricity: float, seed: int) 
     assert far_apart(found, exact, scale[None, :] / scale[:, None]) < allowed
 
 
+@pytest.mark.parametrize("duration", [1e-6, 0.3, 5.0, 40.0])
+@pytest.mark.parametrize("eccentricity", [0.0, 0.6, 0.99])
+def test_a_transition_back_is_the_inverse_of_the_one_forward(eccentricity: float, duration: float) -> None:
+    with mp.workdps(50):
+        of_each = tolerance(eccentricity, 0.4, duration)
+    motion = TschaunerHempel(EllipticOrbit(1.0, eccentricity, 0.4))
+
+    forward, back = motion.transition(0.0, duration), motion.transition(duration, 0.0)
+
+    # Each of the two has the error of a transition, which the other one multiplies.
+    size = float(np.linalg.norm(forward) * np.linalg.norm(back))
+    np.testing.assert_allclose(back @ forward, np.eye(6), rtol=0.0, atol=2.0 * of_each * size)
+
+
 @pytest.mark.parametrize(
     ("eccentricity", "anomaly", "duration"),
     [
+        (0.0, 0.3, 4.0),
         (0.3, 2.0, 9.0),
+        (0.6, 1.0, 0.01),
         (0.99, -2.8, 3.0),  # through perigee
         (0.99, 2.5, 6.0),  # through apogee
         (0.999, -1.0, 7.0),  # more than a revolution
@@ -189,6 +215,17 @@ def test_a_gramian_is_that_of_two_parts(seed: int) -> None:
     # The rounding of the middle time, 4e-15 rad, is multiplied by (1 - e)^(-3/2), at most 1e6, at perigee.
     spread = np.sqrt(np.diag(whole))
     np.testing.assert_allclose(joined / np.outer(spread, spread), whole / np.outer(spread, spread), atol=1e-8)
+
+
+def test_an_interval_of_too_many_panels_is_refused() -> None:
+    motion = TschaunerHempel(EllipticOrbit(1.0, 0.5))
+    with pytest.raises(ValueError, match=r"turns by 5e\+05 rad from 2 s to 500000 s; at most 200000 rad"):
+        motion.segment([0.0, 2.0], [1.0, 5e5])
+
+
+def test_no_interval_has_no_matrices() -> None:
+    found = TschaunerHempel(EllipticOrbit(1.0, 0.5)).segment(np.empty((0, 2)), np.empty((0, 2)))
+    assert (found.transition.shape, found.held.shape) == ((0, 2, 6, 6), (0, 2, 6, 3))
 
 
 def test_many_revolutions_are_not_refused() -> None:

@@ -13,8 +13,8 @@ from infoset.experiments.common.hill_axes import to_paper
 from infoset.rendezvous.reachability import MotionModel, motion_of
 from infoset.rendezvous.relative_motion import (
     ClohessyWiltshire,
-    CollocatedMotion,
     EllipticOrbit,
+    HeldMotion,
     LinearMotion,
     TimeVaryingMotion,
     TschaunerHempel,
@@ -79,7 +79,7 @@ def test_matrices_satisfy_their_differential_equations(name: str, duration: floa
     np.testing.assert_allclose(found.transition * weight, transition * weight, rtol=0.0, atol=2e-10 * size)
     spread = np.sqrt(np.outer(np.diag(gramian), np.diag(gramian)))
     np.testing.assert_allclose(found.gramian / spread, gramian / spread, rtol=0.0, atol=2e-10)
-    if isinstance(motion, CollocatedMotion):
+    if isinstance(motion, HeldMotion):
         effect, wanted = motion.segment(start, start + duration).held / scale[:, None], held / scale[:, None]
         np.testing.assert_allclose(effect, wanted, rtol=0.0, atol=2e-10 * float(np.abs(wanted).max()))
 
