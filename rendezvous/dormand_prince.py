@@ -43,10 +43,14 @@ def step_of(rates: Callable[[float, Floats, Floats, Any, Floats, Floats], None])
         flat, flat_next, flat_slopes = z.reshape(-1), z_next.reshape(-1), kz.reshape(STAGES, -1)
         for stage in range(first, STAGES + 1):
             for i in range(len(y)):
-                total = 0.0
-                for k in range(stage):
-                    total += _WEIGHTS[stage, k] * ky[k, i]
-                y_next[i] = y[i] + h * total
+                y_next[i] = 0.0
+            for k in range(stage):
+                weight = _WEIGHTS[stage, k]
+                if weight != 0.0:
+                    for i in range(len(y)):
+                        y_next[i] += weight * ky[k, i]
+            for i in range(len(y)):
+                y_next[i] = y[i] + h * y_next[i]
             for i in range(len(flat)):
                 flat_next[i] = flat[i]
             for k in range(stage):

@@ -15,10 +15,13 @@ from enum import Enum
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.pursuit_evasion._pair import COARSE, FINE, MAX_RESIDUAL, ROUGH, Node, Pair
+from infoset.rendezvous.pursuit_evasion._pair import FINE, MAX_RESIDUAL, ROUGH, Node, Pair
 
 _LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
 _PREDICTED_WITHIN = 3e-3
+_TRACKED = 1e-7
+"""Tolerance of the propagation of extremals before the capture: a thousandth of the corrections that are accepted
+(`ROUGH`). Captures, and their times, are polished with `FINE`, and do not depend on it."""
 
 MAX_WORK = 20_000.0
 """Radians of extremals propagated for a pair of sides: 15 revolutions of 28 steps each; seconds."""
@@ -69,16 +72,17 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, max_work: floa
             node.duration + step,
             node.distance - step * node.closing,
             time_free=False,
-            tolerance=COARSE,
+            tolerance=_TRACKED,
+            linear_tolerance=_TRACKED,
             close=ROUGH,
         )
-        # The error of a prediction of order two is as the cube of the step.
+        # The error of a prediction of order three is as the fourth power of the step.
         missed = math.inf if after is None else float(np.abs(after.vector - guess).max())
         if after is not None and pair.is_sound(after) and missed <= 8.0 * _PREDICTED_WITHIN:
             at = first_crossing(node, after, radius)
             if at is None:
                 nodes.append(after)
-                growth = 0.9 * (_PREDICTED_WITHIN / max(missed, 1e-12)) ** (1.0 / 3.0)
+                growth = 0.9 * (_PREDICTED_WITHIN / max(missed, 1e-12)) ** 0.25
                 step = min(_LONGEST_STEP, step * min(2.0, growth))
                 continue
             capture = polish(pair, _predicted(nodes, at), at, radius, latest)
@@ -120,11 +124,15 @@ def first_crossing(before: Node, after: Node, radius: float) -> float | None:
 
 
 def _predicted(nodes: list[Node], duration: float) -> Floats:
-    """Extrapolate (pursuer, evader, nu) from the last extremal, with its slope and how that changed."""
+    """Extrapolate (pursuer, evader, nu) by the cubic through the last two extremals with their slopes."""
     node = nodes[-1]
     step = duration - node.duration
     guess = node.vector + step * node.slope
-    if len(nodes) > 1:
-        before = nodes[-2]
-        guess += 0.5 * step * step / (node.duration - before.duration) * (node.slope - before.slope)
-    return guess
+    if len(nodes) == 1:
+        return guess
+    before = nodes[-2]
+    apart = node.duration - before.duration
+    mean_slope = (node.vector - before.vector) / apart
+    second = (node.slope - mean_slope) / apart
+    third = (node.slope - 2.0 * mean_slope + before.slope) / apart**2
+    return np.asarray(guess + step * step * (second + (step + apart) * third))

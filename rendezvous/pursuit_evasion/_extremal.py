@@ -11,6 +11,8 @@ That of the mass, lambda_m' = k |lambda_v| T / m^2 (they omit k), is not needed:
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
@@ -24,6 +26,26 @@ _MAX_STEPS = 20_000
 _FIRST_STEP = 0.05
 NO_VARIATIONS = np.zeros((0, COLUMNS))
 _Parameters = tuple[Floats, Floats, Floats]
+
+
+class Response(NamedTuple):
+    """Linear dependence of an end state at a guess of it: rho + by_nu dnu + by_time dT leads to the true one.
+
+    `rho`, shape (6,), is Newton's correction of the guess; `by_nu`, shape (6, 2), and `by_time`, shape (6,), are the
+    derivatives along two directions across nu and by the duration. `regular` says that there is no conjugate point: the
+    map from end states near by to start states preserves orientation. `inverse`, shape (6, 6), is the inverse of the
+    derivative of the start state by the end state, `costate`, shape (6,), p_r and p_v at the start, and `residual` the
+    maximum component of the error of the start state: infinite if the guess cannot be propagated, or the map is
+    singular.
+    """
+
+    rho: Floats
+    by_nu: Floats
+    by_time: Floats
+    regular: bool
+    inverse: Floats
+    costate: Floats
+    residual: float
 
 
 @allocation_free
@@ -197,20 +219,6 @@ def end_of(state: Floats, nu: Floats) -> Floats:
     return np.concatenate([state, nu, np.zeros(3)])
 
 
-def shoot_back(
-    end_state: Floats, nu: Floats, plane: Floats, craft: Floats, duration: float, tolerance: float
-) -> tuple[Floats, Floats] | None:
-    """Return state and costate at the start of the game, shape (12,), and their derivatives, shape (12, 9), or None.
-
-    The derivatives are by end state, by nu along the two directions of `plane`, shape (2, 3), and by the mass at the
-    end. `craft` is that of `flow_back`. None stands for a failed propagation.
-    """
-    y, z = end_of(end_state, nu), np.zeros((STATES, COLUMNS))
-    z[:6, :6] = np.eye(6)
-    z[6:9, 6:8] = plane.T
-    return (y, z) if flow_back(y, z, craft, 0.0, duration, tolerance) else None
-
-
 @compiled
 def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
     """Return the time derivative of position and velocity, shape (6,), at a state and costate, shape (12,).
@@ -225,3 +233,73 @@ def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
         if size > 0.0:
             out[3 + i] += push * y[9 + i] / size
     return out
+
+
+@compiled
+def respond(
+    start: Floats, craft: Floats, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
+) -> Response:
+    """Return the response of one side at a guess of its end state; `plane`, shape (2, 3), are the directions across nu.
+
+    `start`, shape (6,), is the state at the start of the game, and `craft` that of `flow_back`.
+    """
+    y, z = np.zeros(STATES), np.zeros((STATES, COLUMNS))
+    for i in range(6):
+        y[i] = end_state[i]
+        z[i, i] = 1.0
+    for i in range(3):
+        y[6 + i] = nu[i]
+        z[6 + i, 6] = plane[0, i]
+        z[6 + i, 7] = plane[1, i]
+    is_propagated = flow_back(y, z, craft, 0.0, duration, tolerance)
+
+    by_end, inverse = z[:6, :6].copy(), np.zeros((6, 6))
+    determinant = invert(by_end, inverse) if is_propagated else 0.0
+    # A longer game starts further back, and ends with less mass.
+    later = rate(y, craft[0], craft[1], craft[2] / (craft[3] + craft[4] * duration))
+    rho, by_nu, by_time = np.zeros(6), np.zeros((6, 2)), np.zeros(6)
+    for i in range(6):
+        for j in range(6):
+            rho[i] += inverse[i, j] * (start[j] - y[j])
+            by_nu[i, 0] -= inverse[i, j] * z[j, 6]
+            by_nu[i, 1] -= inverse[i, j] * z[j, 7]
+            by_time[i] += inverse[i, j] * (later[j] + craft[4] * z[j, 8])
+    residual = np.abs(start - y[:6]).max() if determinant != 0.0 else np.inf
+    return Response(rho, by_nu, by_time, determinant > 0.0, inverse, y[6:].copy(), residual)
+
+
+@compiled
+def invert(matrix: Floats, inverse: Floats) -> float:
+    """Fill the inverse of a matrix, shape (n, n), and return its determinant; 0 if it is singular or not finite.
+
+    Gauss and Jordan's elimination with partial pivoting; the matrix is overwritten.
+    """
+    count = len(matrix)
+    determinant = 1.0
+    for i in range(count):
+        for j in range(count):
+            inverse[i, j] = 1.0 if i == j else 0.0
+
+    for column in range(count):
+        pivot = column
+        for i in range(column + 1, count):
+            if abs(matrix[i, column]) > abs(matrix[pivot, column]):
+                pivot = i
+        size = matrix[pivot, column]
+        if not 0.0 < abs(size) < np.inf:
+            return 0.0
+        determinant *= size if pivot == column else -size
+
+        for j in range(count):
+            matrix[column, j], matrix[pivot, j] = matrix[pivot, j], matrix[column, j]
+            inverse[column, j], inverse[pivot, j] = inverse[pivot, j], inverse[column, j]
+        for j in range(count):
+            matrix[column, j] /= size
+            inverse[column, j] /= size
+        for i in range(count):
+            factor = matrix[i, column]
+            if i != column and factor != 0.0:
+                for j in range(count):
+                    matrix[i, j] -= factor * matrix[column, j]
+                    inverse[i, j] -= factor * inverse[column, j]
+    return determinant

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, end_of, flow_back, rate, shoot_back
+from infoset.rendezvous.pursuit_evasion._coupling import Coupling, Step, across, couple, newton_step
+from infoset.rendezvous.pursuit_evasion._extremal import NO_VARIATIONS, Response, end_of, flow_back, rate, respond
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""
@@ -27,26 +28,6 @@ _MAX_ITERATIONS = 12
 _FIRST_DURATION = 0.01
 _MIN_OF_FIRST = 1e-9
 _FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
-
-
-@dataclass(frozen=True)
-class Response:
-    """Linear dependence of an end state at a guess of it: rho + by_nu dnu + by_time dT leads to the true one.
-
-    `rho`, shape (6,), is Newton's correction of the guess; `by_nu`, shape (6, 2), and `by_time`, shape (6,), are the
-    derivatives along two directions across nu and by the duration. `regular` says that there is no conjugate point: the
-    map from end states near by to start states preserves orientation. `inverse`, shape (6, 6), is the inverse of the
-    derivative of the start state by the end state, `costate`, shape (6,), p_r and p_v at the start, and `residual` the
-    maximum component of the error of the start state.
-    """
-
-    rho: Floats
-    by_nu: Floats
-    by_time: Floats
-    regular: bool
-    inverse: Floats
-    costate: Floats
-    residual: float
 
 
 @dataclass(frozen=True)
@@ -68,26 +49,9 @@ class Craft:
         self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
     ) -> Response | None:
         """Linearise at a guess of the end state; None if it cannot be propagated."""
-        shot = shoot_back(end_state, nu, plane, self.kernel_craft(duration), duration, tolerance)
-        if shot is None:
-            return None
-        y, z = shot
-        error = self.start - y[:6]
-        # A longer game starts further back, and ends with less mass.
-        later = rate(y, self.mu, self.oblateness, self.thrust / self.mass) + self.flow * z[:6, 8]
-        try:
-            inverse = np.asarray(np.linalg.inv(z[:6, :6]), dtype=np.float64)
-        except np.linalg.LinAlgError:
-            return None
-        return Response(
-            rho=inverse @ error,
-            by_nu=-inverse @ z[:6, 6:8],
-            by_time=inverse @ later,
-            regular=bool(np.linalg.det(z[:6, :6]) > 0.0),
-            inverse=inverse,
-            costate=y[6:],
-            residual=float(np.abs(error).max()),
-        )
+        craft = self.kernel_craft(duration)
+        response = respond(self.start, craft, end_state, nu, plane, duration, tolerance)
+        return response if response.residual < math.inf else None
 
     def correct(
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
@@ -132,15 +96,6 @@ class KnownPath:
 
 
 Side = Craft | KnownPath
-
-
-def across(nu: Floats) -> Floats:
-    """Return two unit vectors across a unit vector and each other, shape (2, 3)."""
-    x, y, z = nu
-    sign = 1.0 if z >= 0.0 else -1.0
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    return np.array([[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]])
 
 
 @dataclass(frozen=True)
@@ -198,26 +153,15 @@ class _Linear:
     evader: Response
     plane: Floats
     time_free: bool
-    inverse: Floats
-    drift: Floats
+    coupling: Coupling
 
-    def step(self, rho: Floats, state: Floats) -> Floats:
-        """Newton's step of (pursuer, evader, nu, T, l), shape (17,), for corrections of the two end states."""
-        gap = state[6:9] + rho[6:9] - state[:3] - rho[:3] - state[16] * state[12:15]
-        turn = self.inverse @ gap
-        dt, dl = (turn[2], 0.0) if self.time_free else (0.0, turn[2])
-        p, e = self.pursuer, self.evader
-        step = np.empty(17)
-        step[:6] = rho[:6] + p.by_nu @ turn[:2] + p.by_time * dt
-        step[6:12] = rho[6:] + e.by_nu @ turn[:2] + e.by_time * dt
-        step[12:15] = turn[:2] @ self.plane
-        step[15], step[16] = dt, dl
-        return step
+    def step(self, rho: Floats, state: Floats) -> Step:
+        """Newton's step of (pursuer, evader, nu, T, l) for corrections of the two end states, shape (2, 6)."""
+        return newton_step(self.pursuer, self.evader, self.plane, self.coupling.inverse, rho, state, self.time_free)
 
     def node(self, state: Floats) -> Node:
         """Return the extremal that the last step led to."""
-        p, e, drift = self.pursuer, self.evader, self.drift[:2]
-        hessian = self.plane @ (p.by_nu[:3] - e.by_nu[:3])
+        p, e = self.pursuer, self.evader
         apart = state[6:9] - state[:3] - state[16] * state[12:15]
         return Node(
             duration=float(state[15]),
@@ -225,10 +169,10 @@ class _Linear:
             nu=state[12:15],
             pursuer=state[:6],
             evader=state[6:12],
-            curvature=np.asarray(np.linalg.eigvalsh(0.5 * (hessian + hessian.T)), dtype=np.float64),
+            curvature=self.coupling.curvature,
             closing=float(state[12:15] @ (state[3:6] - state[9:12])),
             regular=p.regular and e.regular,
-            slope=np.concatenate([p.by_nu @ drift + p.by_time, e.by_nu @ drift + e.by_time, drift @ self.plane]),
+            slope=self.coupling.slope,
             costates=np.stack([p.costate, e.costate]),
             residual=max(p.residual, e.residual, float(np.abs(apart).max())),
         )
@@ -276,19 +220,18 @@ class Pair:
             if linear is None:
                 return None
             if fresh and tolerance >= linear_tolerance:
-                rho = np.concatenate([linear.pursuer.rho, linear.evader.rho])
+                rho = np.array([linear.pursuer.rho, linear.evader.rho])
             else:
                 nu, length = state[12:15], float(state[15])
                 p = self.pursuer.correct(linear.pursuer, state[:6], nu, length, tolerance)
                 e = self.evader.correct(linear.evader, state[6:12], nu, length, tolerance)
                 if p is None or e is None:
                     return None
-                rho = np.concatenate([p, e])
-            step = linear.step(rho, state)
-            correction = float(np.abs(step).max())
+                rho = np.array([p, e])
+            change, correction = linear.step(rho, state)
             if not correction < min(_FARTHEST, 4.0 * before):
                 return None
-            state = state + step
+            state = state + change
             state[12:15] /= np.sqrt(state[12:15] @ state[12:15])
             if not 0.0 < state[15] <= latest:
                 return None
@@ -308,19 +251,8 @@ class Pair:
         e = self.evader.respond(state[6:12], nu, plane, duration, tolerance)
         if p is None or e is None:
             return None
-        outer = np.empty((3, 3))
-        outer[:, :2] = p.by_nu[:3] - e.by_nu[:3] + distance * plane.T
-        outer[:, 2] = nu
-        drift = e.by_time[:3] - p.by_time[:3]
-        try:
-            inverse = np.asarray(np.linalg.inv(outer), dtype=np.float64)
-            by_time = inverse @ drift  # of (nu, l)
-            if time_free:
-                outer[:, 2] = -drift
-                inverse = np.asarray(np.linalg.inv(outer), dtype=np.float64)
-        except np.linalg.LinAlgError:
-            return None
-        return _Linear(p, e, plane, time_free, inverse, by_time)
+        coupling = couple(p, e, plane, nu, distance, time_free)
+        return _Linear(p, e, plane, time_free, coupling) if coupling.solvable else None
 
     def begin(self, latest: float, radius: float) -> Node | None:
         """Return the extremal of a short duration, at most `latest`, from the line of sight as a guess, or None.

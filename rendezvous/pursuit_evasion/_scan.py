@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair, Response, Side, across
+from infoset.rendezvous.pursuit_evasion._coupling import across
+from infoset.rendezvous.pursuit_evasion._extremal import Response
+from infoset.rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair, Side
 
 _DIRECTIONS = 120
 _SEEDS, _MAX_PARTS = 2, 4

@@ -24,7 +24,7 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     -----
     The game is that of Wang's slides, after Shen and Casalino (2018), who shoot forward from a guess. At each duration
     the evader takes the branch with the maximum distance l; the capture is the first time at which l is the capture
-    radius. Cost: 20 to 40 ms per revolution. A capture whose residual is not below 1e-9 is rejected: the verdict is
+    radius. Cost: 10 to 15 ms per revolution. A capture whose residual is not below 1e-9 is rejected: the verdict is
     then that the branch is not certified.
     """
     scaled = scaled_game(game)

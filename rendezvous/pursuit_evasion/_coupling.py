@@ -1,0 +1,120 @@
+"""The 3 x 3 system that couples the extremals of both sides, and Newton's step of both: compiled. Nondimensional."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from infoset.rendezvous._arrays import Floats
+from infoset.rendezvous._compile import compiled
+from infoset.rendezvous.pursuit_evasion._extremal import Response, invert
+
+
+class Coupling(NamedTuple):
+    """Both sides linearised at a guess, and coupled by r_E - r_P = l nu.
+
+    `inverse`, shape (3, 3), gives the change of (nu, T) or (nu, l) for an error of that equation. `slope`, shape (15,),
+    is d/dT of (pursuer, evader, nu) at l free, and `curvature`, shape (2,), contains the eigenvalues of the Hessian of
+    h_P - h_E across nu, ascending. If the equations are singular, `solvable` is False, and the rest is not meaningful.
+    """
+
+    inverse: Floats
+    slope: Floats
+    curvature: Floats
+    solvable: bool
+
+
+class Step(NamedTuple):
+    """A change of (pursuer, evader, nu, T, l), shape (17,), and its maximum component."""
+
+    change: Floats
+    size: float
+
+
+@compiled
+def across(nu: Floats) -> Floats:
+    """Return two unit vectors across a unit vector and each other, shape (2, 3)."""
+    x, y, z = nu[0], nu[1], nu[2]
+    sign = 1.0 if z >= 0.0 else -1.0
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    plane = np.empty((2, 3))
+    plane[0, 0] = 1.0 + sign * x * x * a
+    plane[0, 1] = sign * b
+    plane[0, 2] = -sign * x
+    plane[1, 0] = b
+    plane[1, 1] = sign + y * y * a
+    plane[1, 2] = -y
+    return plane
+
+
+@compiled
+def couple(
+    pursuer: Response, evader: Response, plane: Floats, nu: Floats, distance: float, time_free: bool
+) -> Coupling:
+    """Return the coupling of two responses at a guess of `nu`, with the directions `plane` across it, and of l."""
+    outer, inverse = np.empty((3, 3)), np.empty((3, 3))
+    slope, curvature = np.empty(15), np.empty(2)
+    drift = evader.by_time[:3] - pursuer.by_time[:3]
+    for i in range(3):
+        for j in range(2):
+            outer[i, j] = pursuer.by_nu[i, j] - evader.by_nu[i, j] + distance * plane[j, i]
+        outer[i, 2] = nu[i]
+    solvable = invert(outer.copy(), inverse) != 0.0
+
+    turn_0, turn_1 = 0.0, 0.0
+    for i in range(3):
+        turn_0 += inverse[0, i] * drift[i]
+        turn_1 += inverse[1, i] * drift[i]
+    for i in range(6):
+        slope[i] = pursuer.by_time[i] + pursuer.by_nu[i, 0] * turn_0 + pursuer.by_nu[i, 1] * turn_1
+        slope[6 + i] = evader.by_time[i] + evader.by_nu[i, 0] * turn_0 + evader.by_nu[i, 1] * turn_1
+    for i in range(3):
+        slope[12 + i] = turn_0 * plane[0, i] + turn_1 * plane[1, i]
+
+    fill_curvature(pursuer, evader, plane, curvature)
+    if time_free:
+        for i in range(3):
+            outer[i, 2] = -drift[i]
+        solvable = solvable and invert(outer, inverse) != 0.0
+    return Coupling(inverse, slope, curvature, solvable)
+
+
+@compiled
+def fill_curvature(pursuer: Response, evader: Response, plane: Floats, curvature: Floats) -> None:
+    """Fill the eigenvalues of the Hessian of h_P - h_E across nu, ascending."""
+    hessian = np.zeros((2, 2))
+    for i in range(2):
+        for j in range(2):
+            for k in range(3):
+                hessian[i, j] += plane[i, k] * (pursuer.by_nu[k, j] - evader.by_nu[k, j])
+    middle = 0.5 * (hessian[0, 0] + hessian[1, 1])
+    apart = math.hypot(0.5 * (hessian[0, 0] - hessian[1, 1]), 0.5 * (hessian[0, 1] + hessian[1, 0]))
+    curvature[0] = middle - apart
+    curvature[1] = middle + apart
+
+
+@compiled
+def newton_step(
+    pursuer: Response, evader: Response, plane: Floats, inverse: Floats, rho: Floats, state: Floats, time_free: bool
+) -> Step:
+    """Return Newton's step for corrections `rho`, shape (2, 6), of the end states of a guess, shape (17,)."""
+    gap, turn, change = np.empty(3), np.zeros(3), np.empty(17)
+    for i in range(3):
+        gap[i] = state[6 + i] + rho[1, i] - state[i] - rho[0, i] - state[16] * state[12 + i]
+    for i in range(3):
+        for j in range(3):
+            turn[i] += inverse[i, j] * gap[j]
+    change[15] = turn[2] if time_free else 0.0
+    change[16] = 0.0 if time_free else turn[2]
+
+    for i in range(6):
+        by_time = pursuer.by_time[i] * change[15]
+        change[i] = rho[0, i] + pursuer.by_nu[i, 0] * turn[0] + pursuer.by_nu[i, 1] * turn[1] + by_time
+        by_time = evader.by_time[i] * change[15]
+        change[6 + i] = rho[1, i] + evader.by_nu[i, 0] * turn[0] + evader.by_nu[i, 1] * turn[1] + by_time
+    for i in range(3):
+        change[12 + i] = turn[0] * plane[0, i] + turn[1] * plane[1, i]
+    return Step(change, np.abs(change).max())
