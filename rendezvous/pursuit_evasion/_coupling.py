@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset.rendezvous._arrays import Floats
-from infoset.rendezvous._compile import compiled
+from infoset.rendezvous._compile import allocation_free, compiled
 from infoset.rendezvous.pursuit_evasion._extremal import Response, invert
 
 
@@ -82,16 +82,18 @@ def couple(
     return Coupling(inverse, slope, curvature, solvable)
 
 
-@compiled
+@allocation_free
 def fill_curvature(pursuer: Response, evader: Response, plane: Floats, curvature: Floats) -> None:
     """Fill the eigenvalues of the Hessian of h_P - h_E across nu, ascending."""
-    hessian = np.zeros((2, 2))
-    for i in range(2):
-        for j in range(2):
-            for k in range(3):
-                hessian[i, j] += plane[i, k] * (pursuer.by_nu[k, j] - evader.by_nu[k, j])
-    middle = 0.5 * (hessian[0, 0] + hessian[1, 1])
-    apart = math.hypot(0.5 * (hessian[0, 0] - hessian[1, 1]), 0.5 * (hessian[0, 1] + hessian[1, 0]))
+    along, mixed, beside = 0.0, 0.0, 0.0
+    for k in range(3):
+        first = pursuer.by_nu[k, 0] - evader.by_nu[k, 0]
+        second = pursuer.by_nu[k, 1] - evader.by_nu[k, 1]
+        along += plane[0, k] * first
+        mixed += 0.5 * (plane[0, k] * second + plane[1, k] * first)
+        beside += plane[1, k] * second
+    middle = 0.5 * (along + beside)
+    apart = math.hypot(0.5 * (along - beside), mixed)
     curvature[0] = middle - apart
     curvature[1] = middle + apart
 
