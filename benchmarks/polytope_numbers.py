@@ -1,4 +1,4 @@
-"""Vertices of half-spaces, hulls of points and zonotopes in three to six dimensions, and the times of cddlib.
+"""Vertices of half-spaces, hulls of points, operations and zonotopes in three to six dimensions, and times of cddlib.
 
 ``python -m benchmarks.polytope_numbers``. Both run in one process, in turn; the shortest of several rounds counts.
 cddlib computes with doubles (`pycddlib`, which pip builds from its source with Debian's `libcdd-dev` and `libgmp-dev`);
@@ -52,7 +52,29 @@ def main() -> None:
             line += f" | {mine:10.3f}  {other:6.3f}  {mine / other:5.2f}"
         print(line)
     print(f"target: at most {TARGET:g} times cddlib; the greatest ratio is {worst:.2f}")
+    print_operations()
     print_zonotopes()
+
+
+def print_operations() -> None:
+    """Print the times of operations on sets of random points."""
+    print("n  operation           | ms")
+    for space in (3, 4):
+        random = np.random.default_rng(space)
+        one, two = (Polytope.from_vertices(random.normal(size=(20, space)) * size) for size in (1.0, 0.8))
+        small = Polytope.from_vertices(0.1 * random.normal(size=(space + 1, space)))
+        points = random.normal(size=(1000, space))
+        operations: dict[str, Callable[[], object]] = {
+            "intersection": partial(one.intersection, two),
+            "sum": partial(one.minkowski_sum, small),
+            "projection on two": partial(one.project, [0, 1]),
+            "difference": partial(one.minkowski_difference, small),
+            "contains 1000 points": partial(one.contains, points),
+            "Chebyshev centre": one.chebyshev_centre,
+        }
+        for name, compute in operations.items():
+            took, _ = in_turn(compute, None)
+            print(f"{space}  {name:20}| {took:8.3f}")
 
 
 def print_zonotopes() -> None:

@@ -2,13 +2,14 @@
 
 Each set is computed in three steps. The double description finds vertices or facets with rounded numbers. What it finds
 is *settled*: points within SNAP of a facet are on it, what is redundant goes, and the rest is kept only if it proves to
-be all (`incidence.is_closed`). Otherwise the set is computed again with integers (`cone`), which round nothing: whether
-a set is empty, flat or unbounded is always decided by them.
+be all (`incidence.is_closed`). Otherwise the set is computed again with integers (`cone`), which round nothing.
 
-Theorem. Let vertices and facets be closed, let every vertex satisfy all half-spaces, strictly those of the facets that
-it is not on, and let it be on the outer side of those that it is on. Then the hull of the vertices contains the set of
-the half-spaces: the map of the boundary of the polytope with these faces that takes each face to the hull of its
-vertices never enters the interior of the set, and winds around it once.
+Whether half-spaces have an empty, flat or unbounded intersection is decided by integers. A cut of a set that exists is
+decided to ON of its size if it is empty, and to SNAP if it is flat.
+
+New vertices move to the outer sides of their facets. The hull of vertices that are all contains the set of the
+half-spaces then: the map of the boundary of the polytope that takes each face to the hull of its vertices never enters
+the interior of the set.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ from infoset.geometry.tolerances import ON, REDUCED, SNAP, UNSURE
 
 Ends = tuple[Floats, Floats]
 """Minimum and maximum coordinates, each of shape (n,)."""
-_FINE = 2.0**14
+FINE = 2.0**14
 """Ratio of widths from which a part of a set is computed in its own coordinates: its vertices are known to ON of the
 whole, which would be SNAP of a part 2000 times smaller than this."""
 _ROUND = 2.0**6
@@ -177,7 +178,8 @@ def of_half_spaces(
 ) -> PolytopeArrays:
     """Return {x: rows (x - origin) <= limits}; limits may be infinite.
 
-    If the set is known to be in a box, its `ends` save time, and rounded half-spaces do not leave it unbounded.
+    If the set is known to be in a box, its `ends` save time, and a set that is unbounded because of rounding is clipped
+    to it.
 
     `sizes`, shape (n,), are those of the coordinates from which limits were computed. Integers would be exact about the
     wrong set, often an empty one: where they decide, the half-spaces are larger by the rounding of such limits, and
@@ -323,10 +325,10 @@ def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | fl
     than the set is computed again, in its own coordinates, from the half-spaces that are near it.
     """
     scaled = np.column_stack([rows * whole.scale, moved_limits(rows, limits, whole.centre - origin)])
-    is_noise = _is_short(scaled[:, :-1])
-    if not _holds_without_direction(scaled[:, -1], is_noise):
+    is_zero = ~scaled[:, :-1].any(axis=1)
+    if not _holds_without_direction(scaled[:, -1], is_zero):
         return empty(whole.space)
-    scaled = dd.in_units(scaled[~is_noise])
+    scaled = dd.in_units(scaled[~is_zero])
     heights = whole.points @ scaled[:, :-1].T - scaled[:, -1]
     near = ON * max(1.0, float(np.abs(whole.points).max()))
     if (heights.min(axis=0) > near).any():
@@ -339,36 +341,34 @@ def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | fl
     on = np.hstack([whole.incidence, np.zeros((len(rays), len(cuts)), np.bool_)])
     numbers = len(whole.facets) + np.arange(len(cuts))
     table = cuts * ([-1.0] * whole.space + [1.0])
+    # An edge lies on one facet less than the set has dimensions.
     rays, on = dd.insert_rows(rays, on, table, numbers, whole.dimension - 1, True)
-    facets = np.vstack([whole.facets, cuts])
-    if not len(rays):
-        every = replace(whole, facets=facets)
-        return of_half_spaces(*half_spaces(every, whole.centre), whole.centre, whole.bounding_box())
-    part = replace(whole, points=rays[:, :-1].copy(), facets=facets, incidence=on)
-    found = None if _is_small_part(part, whole) else settled(part, len(whole.facets))
-    if found is not None:
+    part = replace(whole, points=rays[:, :-1].copy(), facets=np.vstack([whole.facets, cuts]), incidence=on)
+    found = settled(part, len(whole.facets)) if len(rays) else None
+    if found is None:
+        again = of_half_spaces(*half_spaces(part, whole.centre), whole.centre, whole.bounding_box())
+    elif _is_small_part(found, whole):
+        lower, upper = found.bounding_box()
+        margin = SNAP * np.ptp(whole.vertices, axis=0)
+        ends = lower - margin, upper + margin
+        again = of_half_spaces(*half_spaces(_near(part), whole.centre), whole.centre, ends)
+    else:
         return found
-
-    around_it = _near(part)
-    lower, upper = part.bounding_box()
-    margin = SNAP * np.ptp(whole.vertices, axis=0)
-    ends = lower - margin, upper + margin
-    found = of_half_spaces(*half_spaces(around_it, whole.centre), whole.centre, ends)
-    if not found.is_empty:
-        return found
-    # It touches the half-spaces, to rounding.
-    return hull(part.points, part.centre, part.scale)
+    if again.is_empty and len(rays):
+        # It touches the half-spaces, to rounding.
+        return found or hull(part.points, part.centre, part.scale)
+    return again
 
 
 def _is_small_part(part: PolytopeArrays, whole: PolytopeArrays) -> bool:
     """Whether a part is much narrower than the whole set along an axis, but not flat there."""
     before = np.ptp(whole.points, axis=0)
     widths = np.ptp(part.points, axis=0)
-    return bool(((_FINE * widths < before) & (widths > SNAP * before)).any())
+    return bool(((FINE * widths < before) & (widths > SNAP * before)).any())
 
 
 def _near(part: PolytopeArrays) -> PolytopeArrays:
-    """Return a part with only those half-spaces that can matter to it: points are known far better than SNAP."""
+    """Return a part without half-spaces farther than SNAP from all its vertices, which are known far better."""
     gaps = part.facets[:, -1] - (part.points @ part.facets[:, :-1].T).max(axis=0)
     return replace(part, facets=part.facets[gaps <= SNAP * max(1.0, float(np.abs(part.points).max()))])
 
@@ -387,7 +387,12 @@ def settled(rough: PolytopeArrays, old: int) -> PolytopeArrays | None:
 
     if _is_flat(on, rough.dimension):
         points = push_out(whole.points, whole.facets, on, old, True, SNAP * size)
+        # Rounding grows across the facets on which all points are, and in no other direction.
+        planes = np.ascontiguousarray(whole.facets[on.all(axis=0), :-1])
+        expected = rough.dimension - len(dd.pivots(planes, REDUCED, -1)[0]) if len(planes) else 0
         flat = hull(points, whole.centre, whole.scale, _PIVOTS * SNAP)
+        if flat.dimension < expected:
+            flat = hull(points, whole.centre, whole.scale)
         return flat if flat.dimension < rough.dimension else None
     used, sides, incidence = without_redundant(on, rough.dimension)
     if loses_points(whole.points, used, on, rough.dimension, _SAME * size) or not is_closed(incidence, rough.dimension):

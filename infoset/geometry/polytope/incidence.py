@@ -109,68 +109,95 @@ def without_redundant(on: Flags, dimension: int) -> tuple[Integers, Integers, Fl
     return points, rows, on
 
 
-@_kernels.compiled
-def _edges(bits: Bits, one: int, shared: Integers, least: int) -> Integers:
-    """Return the vertices that span an edge with vertex `one`; none if two of them span the same edge.
+@_kernels.allocation_free
+def _edges(bits: Bits, one: int, shared: Integers, least: int, near: Integers, others: Integers) -> int:
+    """Write the vertices that span an edge with vertex `one`, and return their number; 0 if two span the same edge.
 
     The numbers of common facets are `shared`, shape (k,). An edge lies on at least `least` facets, and no third vertex
-    lies on all of them.
+    lies on all of them. `near`, shape (k,), is for work.
     """
-    near = np.flatnonzero(shared >= least)
-    near = near[near != one]
-    is_edge = np.ones(len(near), np.bool_)
-    for k in range(len(near)):
-        other = near[k]
+    found = 0
+    for k in range(len(bits)):
+        near[found] = k
+        found += k != one and shared[k] >= least
+
+    count = 0
+    for other in near[:found]:
+        is_edge = True
         has_twin = False
-        for third in near:
+        for third in near[:found]:
             if third == other or not contains_common(bits[third], bits[one], bits[other]):
                 continue
-            if shared[third] > shared[other]:
-                is_edge[k] = False
-                break
+            is_edge &= shared[third] == shared[other]
             has_twin = True
-        if has_twin and is_edge[k]:
-            return np.zeros(0, np.int64)
-    return np.asarray(near[is_edge])
+        if is_edge and has_twin:
+            return 0
+        others[count] = other
+        count += is_edge
+    return count
+
+
+@_kernels.allocation_free
+def _is_cycle(bits: Bits, one: int, others: Integers) -> bool:
+    """Whether each facet of a vertex in space has two of its edges."""
+    for word in range(bits.shape[1]):
+        once = np.uint64(0)
+        twice = np.uint64(0)
+        for other in others:
+            edge = bits[one, word] & bits[other, word]
+            if twice & edge:
+                return False
+            twice |= once & edge
+            once |= edge
+        if twice != bits[one, word]:
+            return False
+    return True
 
 
 @_kernels.compiled
 def _is_closed(bits: Bits, dimension: Any) -> bool:
-    """Whether vertices are all vertices of a polytope; see `is_closed`."""
+    """Whether vertices are all vertices of a polytope of two or more dimensions; see `is_closed`."""
+    k, words = bits.shape
     columns = np.ascontiguousarray(bits.T)
-    shared = np.empty(len(bits), np.int64)
-    is_reached = np.zeros(len(bits), np.bool_)
-    waiting = np.empty(len(bits), np.int64)
-    waiting[0] = 0
-    count = 1
+    shared = np.empty(k, np.int64)
+    near = np.empty(k, np.int64)
+    others = np.empty(k, np.int64)
+    is_reached = np.zeros(k, np.bool_)
+    waiting = np.zeros(k, np.int64)
     is_reached[0] = True
-    while count:
-        count -= 1
-        one = waiting[count]
+    left = 1
+    while left:
+        left -= 1
+        one = waiting[left]
         common(bits[one], columns, shared)
-        others = _edges(bits, one, shared, dimension - 1)
-        if len(others) < dimension:
-            return False
-
-        # The edges are the vertices of the vertex figure, a polytope of one dimension less with the same facets.
-        edges = bits[others] & bits[one]
-        union = edges[0].copy()
-        for k in range(1, len(edges)):
-            union |= edges[k]
-        if (union != bits[one]).any():
-            return False
+        count = _edges(bits, one, shared, dimension - 1, near, others)
         if shared[one] == dimension:
-            # The figure is a simplex if each edge leaves one of its facets, another one each.
-            if len(others) != dimension or (shared[others] != dimension - 1).any():
-                return False
-        elif dimension == 2 or not _is_closed(edges, dimension - 1):
+            # The vertex figure is a simplex if each edge leaves one of its facets: all are different.
+            is_right = count == dimension
+            for other in others[:count]:
+                is_right &= shared[other] == dimension - 1
+        elif dimension == 2:
+            is_right = False
+        elif dimension == 3:
+            # The vertex figure is a polygon, whose sides are the facets.
+            is_right = count == shared[one] and _is_cycle(bits, one, others[:count])
+        else:
+            # The edges are the vertices of the vertex figure, a polytope of one dimension less with the same facets.
+            edges = np.empty((count, words), np.uint64)
+            missing = bits[one].copy()
+            for i in range(count):
+                for word in range(words):
+                    edges[i, word] = bits[one, word] & bits[others[i], word]
+                    missing[word] &= ~edges[i, word]
+            is_right = count >= dimension and not missing.any() and _is_closed(edges, dimension - 1)
+        if not is_right:
             return False
 
-        for other in others:
+        for other in others[:count]:
             if not is_reached[other]:
                 is_reached[other] = True
-                waiting[count] = other
-                count += 1
+                waiting[left] = other
+                left += 1
     return bool(is_reached.all())
 
 
@@ -179,10 +206,11 @@ def is_closed(on: Flags, dimension: int) -> bool:
     """Whether vertices and facets of a polytope are all that it has; `on`, shape (v, f), is which is on which.
 
     Given: every vertex satisfies all half-spaces of the facets, and is on those of its bits and strictly inside of the
-    others. Then each is a vertex of the intersection of the half-spaces. All neighbours of a vertex are known if its
-    edges are all vertices of its vertex figure, a polytope of one dimension less, which is the same question; in a
-    simple vertex, on as many facets as dimensions, the figure is a simplex. The graph of a polytope is connected: a
-    list of vertices that has all the neighbours of its members has all vertices.
+    others. Bits alone are not enough: those of a torus are closed too. Each is a vertex of the intersection of the
+    half-spaces, as the neighbour along each edge is strictly inside a facet that the others are on. All neighbours of a
+    vertex are known if its edges are all vertices of its vertex figure, a polytope of one dimension less, which is the
+    same question; in a simple vertex, on as many facets as dimensions, the figure is a simplex. The graph of a polytope
+    is connected: a list of vertices that has all the neighbours of its members has all vertices.
 
     The same holds for facets, with ridges instead of edges, in the hull of the vertices. The side on which fewer
     vertices or facets are not simple is asked. O(k^2 words) if none is.

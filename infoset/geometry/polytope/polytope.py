@@ -46,8 +46,6 @@ if TYPE_CHECKING:
 
 _WIDE = 2.0**6
 """Size of a sum, in coordinates in which a term is one wide, from which it gets its own: two digits are lost."""
-_MUCH_SMALLER = 2.0**14
-"""Ratio of widths from which an intersection is computed from all half-spaces, in its own coordinates."""
 
 
 class Polytope(PolytopeArrays, ConvexSet):
@@ -366,9 +364,9 @@ class Polytope(PolytopeArrays, ConvexSet):
         """Return the intersection with one or more polytopes: one step of the double description for each facet."""
         every = (self, *map(self._need_other, others))
         if self._is_exact_with(*every):
-            rows = [row for one in every for row in one._polyhedron.half_spaces]
             if any(one.is_empty for one in every):
                 return self.empty(self.space)
+            rows = [row for one in every for row in one._polyhedron.half_spaces]
             return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, rows)))
         sets = sorted(every, key=lambda one: (one.dimension, -len(one.facets)))
         found = sets[0]
@@ -378,12 +376,15 @@ class Polytope(PolytopeArrays, ConvexSet):
         return found
 
     def _cut_by(self, other: Polytope) -> Polytope:
-        """Return the intersection with another bounded set; one that is much smaller than both is computed at once."""
+        """Return the intersection with another bounded set.
+
+        One that is much smaller than this set is computed from all half-spaces together, in its own coordinates.
+        """
         ends = np.array([self.bounding_box(), other.bounding_box()])
         lower = ends[:, 0].max(axis=0)
         upper = ends[:, 1].min(axis=0)
         rows, limits = half_spaces(other, other.centre)
-        is_small = _MUCH_SMALLER * (upper - lower) < np.ptp(self.vertices, axis=0)
+        is_small = construction.FINE * (upper - lower) < np.ptp(self.vertices, axis=0)
         if is_small.any() and (lower <= upper).all():
             own, own_limits = half_spaces(self, other.centre)
             every = np.vstack([own, rows]), np.append(own_limits, limits)

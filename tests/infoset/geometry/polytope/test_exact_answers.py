@@ -14,6 +14,7 @@ import pytest
 
 from infoset.arrays import Floats
 from infoset.geometry.polytope import Polytope
+from infoset.geometry.tolerances import SNAP
 from tests.infoset.geometry.polytope.exact_sets import polyhedron
 from tests.rationals import Fraction
 from tests.rendezvous.reachability.rationals import polyhedron_of, vertices_of
@@ -248,3 +249,27 @@ def test_set_without_an_end_along_one_axis_is_unbounded_along_it(width: float) -
 
     np.testing.assert_array_equal(found.directions, [[0.0, -1.0]])
     assert len(found.vertices) == 2
+
+
+# Cuts ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("upper", [-0.5, 0.5])
+def test_an_intersection_with_a_very_long_set_does_not_depend_on_the_order(upper: float) -> None:
+    """Its honest facets are 1e15 times shorter than others, and were taken for rounding: the result was empty."""
+    square = Polytope.from_box([-1.0, -1.0], [1.0, 1.0])
+    long = Polytope.from_box([0.0, -1.4e11], [1.25e-4, upper])
+    for both in (square & long, long & square):
+        lower, most = both.bounding_box()
+        assert lower.tolist() == [0.0, -1.0]
+        assert most.tolist() == [1.25e-4, upper]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_thin_part_loses_only_the_dimension_in_which_it_is_flat(seed: int) -> None:
+    """A bar, 2e-10 thick along one axis and 3e-12 along the other: formerly both were flat."""
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    bar = Polytope.from_box([-1.0] * 3, [1.0] * 3).cut(turn, [-0.5, 0.0, 0.0], [0.5, 2e-10, 3e-12])
+    assert bar.dimension == 2
+    corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (0.0, 2e-10) for z in (0.0, 3e-12)]) @ turn
+    assert bar.contains(corners, SNAP).all()
