@@ -29,7 +29,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from infoset.experiments import load_scenario
-from infoset.experiments.campaigns.run_tables import COLUMNS, summary
+from infoset.experiments.campaigns.run_tables import summary
 from infoset import StateBox
 from infoset.sim import Campaign, CampaignNoise
 
@@ -42,7 +42,7 @@ short = replace(whole, set_model=model, dispersion=start, range_sensor=None)
 
 runs, folder = int(sys.argv[1]), Path(sys.argv[2])
 result = Campaign(short, runs, folder, noise=CampaignNoise.MIXED).run(workers=2)
-assert summary(result, result.runs(COLUMNS))["runs"].sum() == runs
+assert summary(result)["runs"].sum() == runs
 """
 
 

@@ -37,6 +37,14 @@ class MissCause(Enum):
     """An impulse at the critical decision would have kept a hit possible for all possible misses."""
 
 
+EXPLAINED = {
+    "needed_m": (MissCause.ENGINE, "unguided_miss_m"),
+    "corrected_m": (MissCause.ENGINE, "engine_corrects_m"),
+    "possible_m": (MissCause.KNOWLEDGE, "last_possible_m"),
+}
+"""What explains the misses of a cause: the maximum of a column over them."""
+
+
 class DecisionLog:
     """What decides the causes of misses, recorded in a flight of B engagements and evaluated after it.
 
@@ -150,16 +158,14 @@ def count_causes(
     impulses correct; `possible_m` the maximum radius of the possible misses of those by knowledge. None without such
     misses.
     """
+    columns = {"unguided_miss_m": unguided_m, "engine_corrects_m": engine_m, "last_possible_m": last_possible_m}
+    explained = {name: max_of_cause(causes, columns[column], cause) for name, (cause, column) in EXPLAINED.items()}
+    return {**{cause.value: int((causes == cause.value).sum()) for cause in MissCause}, **explained}
 
-    def maximum(values_m: Floats, cause: MissCause) -> float | None:
-        return max(values_m[causes == cause.value].tolist(), default=None)
 
-    return {
-        **{cause.value: int((causes == cause.value).sum()) for cause in MissCause},
-        "needed_m": maximum(unguided_m, MissCause.ENGINE),
-        "corrected_m": maximum(engine_m, MissCause.ENGINE),
-        "possible_m": maximum(last_possible_m, MissCause.KNOWLEDGE),
-    }
+def max_of_cause(causes: NDArray[np.object_], values_m: Floats, cause: MissCause) -> float | None:
+    """Return the maximum of a column of results over the misses of a cause; None without such misses."""
+    return max(values_m[causes == cause.value].tolist(), default=None)
 
 
 def _chosen(rows: Floats, chosen: Integers) -> Floats:

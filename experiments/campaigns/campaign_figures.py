@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infoset.arrays import Floats
-from infoset.experiments.campaigns.run_tables import groups
+from infoset.experiments.campaigns.run_tables import start_columns
+from infoset.experiments.campaigns.sample_rows import samples_of
 from infoset.experiments.common.figure_style import (
     CURVE_LOOKS,
     HALO,
@@ -42,30 +43,46 @@ _BINS = 24
 _QUANTITIES = {"miss_m": "miss, m", "impulse_m_s": "impulse spent, m/s"}
 
 
-def draw_all(folder: CampaignFolder, runs: pd.DataFrame) -> Iterator[Figure]:
-    """Draw the figures of a campaign, one after the other; in space also the misses across the approach."""
-    by_noise = {noise: chosen for _, noise, chosen in groups(folder, runs) if len(chosen)}
+def draw_all(folder: CampaignFolder) -> Iterator[Figure]:
+    """Draw the figures of a campaign, one after the other; in space also the misses across the approach.
+
+    Only the columns of one figure are in memory.
+    """
     scenario = folder.manifest.scenario
-    guaranteed = scenario.set_model.is_guaranteed
-    sensor = "no" if scenario.range_sensor is None else "with"
-    bound = "guaranteed miss" if guaranteed else "the paper's $\\Phi$ (not a bound here)"
-    samples, clouds = [], []
-    for noise, chosen in by_noise.items():
-        miss_m, impulse_m_s = (chosen[name].to_numpy() for name in _QUANTITIES)
-        bounds_m = chosen["guaranteed_miss_m"]
-        title = f"{noise} noise, {sensor} range sensor, {some_runs(len(chosen))}"
-        samples.append(
-            Sample(title, _look(noise), miss_m, impulse_m_s, bounds_m.dropna().to_numpy(), f"{noise} noise: {bound}")
-        )
-        most_m = float(bounds_m.max()) if guaranteed and bounds_m.notna().all() else None
-        has_axes = scenario.b_plane_t_rad is not None
-        across_m = chosen[["b_dot_t_m", "b_dot_r_m"] if has_axes else ["miss_y_m", "miss_z_m"]].to_numpy()
-        clouds.append(Cloud(f"{noise} noise, {some_runs(len(chosen))}", across_m, miss_m, most_m, has_axes))
-    yield draw_samples(samples, scenario.radius_m)
-    yield draw_convergence(by_noise)
-    yield draw_dispersion(by_noise)
+    yield draw_samples(_distributions(folder), scenario.radius_m)
+    yield draw_convergence(samples_of(folder, tuple(_QUANTITIES)))
+    yield draw_dispersion(samples_of(folder, ("miss_m", *start_columns(scenario))))
     if scenario.is_spatial:
-        yield draw_b_plane(clouds, scenario.radius_m)
+        yield draw_b_plane(_clouds(folder), scenario.radius_m)
+
+
+def _distributions(folder: CampaignFolder) -> list[Sample]:
+    """Return what the distributions of each noise show."""
+    scenario = folder.manifest.scenario
+    sensor = "no" if scenario.range_sensor is None else "with"
+    bound = "guaranteed miss" if scenario.set_model.is_guaranteed else "the paper's $\\Phi$ (not a bound here)"
+    samples = []
+    for noise, runs in samples_of(folder, (*_QUANTITIES, "guaranteed_miss_m")).items():
+        miss_m, impulse_m_s = (runs[name].to_numpy() for name in _QUANTITIES)
+        bounds_m = runs["guaranteed_miss_m"].dropna().to_numpy()
+        title = f"{noise} noise, {sensor} range sensor, {some_runs(len(runs))}"
+        samples.append(Sample(title, _look(noise), miss_m, impulse_m_s, bounds_m, f"{noise} noise: {bound}"))
+    return samples
+
+
+def _clouds(folder: CampaignFolder) -> list[Cloud]:
+    """Return the misses of each noise across the approach."""
+    scenario = folder.manifest.scenario
+    has_axes = scenario.b_plane_t_rad is not None
+    across = ("b_dot_t_m", "b_dot_r_m") if has_axes else ("miss_y_m", "miss_z_m")
+    clouds = []
+    for noise, runs in samples_of(folder, ("miss_m", "guaranteed_miss_m", *across)).items():
+        bounds_m = runs["guaranteed_miss_m"]
+        has_bound = scenario.set_model.is_guaranteed and bounds_m.notna().all()
+        most_m = float(bounds_m.max()) if has_bound else None
+        title = f"{noise} noise, {some_runs(len(runs))}"
+        clouds.append(Cloud(title, runs[[*across]].to_numpy(), runs["miss_m"].to_numpy(), most_m, has_axes))
+    return clouds
 
 
 @style()

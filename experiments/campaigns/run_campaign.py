@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from infoset.experiments.campaigns.command import Campaign as Options
 from infoset.experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, noise_of, scenario_of
-from infoset.experiments.campaigns.run_tables import COLUMNS, heading, records, summary, summary_parts
+from infoset.experiments.campaigns.run_tables import heading, records, summary, summary_parts
 from infoset.experiments.common.errors import input_errors
 from infoset.experiments.common.input_file import to_toml
 from infoset.experiments.common.output import output_of, to_json
@@ -36,7 +36,7 @@ def run(options: Options) -> None:
         )
         stored, warnings, elapsed_s = fly(campaign, options, model_notes)
         manifest = stored.manifest
-        table = summary(stored, stored.runs(COLUMNS))
+        table = summary(stored)
         results = {
             **heading(stored),
             **({"warnings": warnings} if warnings else {}),

@@ -12,13 +12,13 @@ from infoset.experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
 from infoset.experiments.campaigns.run_tables import (
     correlations,
     heading,
-    noises_of,
     records,
     screen_table,
     summary,
     summary_parts,
     worst_runs,
 )
+from infoset.experiments.campaigns.sample_rows import noises_of
 from infoset.experiments.campaigns.sweep_report import TABLE, SweepReport, figure_names, read_requirement
 from infoset.experiments.campaigns.sweep_table import sweep_table
 from infoset.experiments.common.errors import InputError
@@ -88,9 +88,9 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output) -> I
 def _report_campaign(folder: CampaignFolder, options: Report, written: Output) -> Iterator[Part]:
     if options.require is not None:
         raise InputError(f"--require: is only for a sweep, and {folder.path} is a campaign; omit it")
-    runs = folder.runs()
-    table = summary(folder, runs)
-    related, worst = correlations(folder, runs), worst_runs(folder, runs, _scenario_file(folder, options.out))
+    table = summary(folder)
+    related = correlations(folder)
+    worst = worst_runs(folder, _scenario_file(folder, options.out))
     report = {
         **heading(folder),
         "samples": records(table.drop(columns="cell")),
@@ -103,7 +103,7 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output) -
         from infoset.experiments.campaigns.campaign_figures import draw_all
 
         with progress_bar(options.quiet) as begin:
-            written.draw(_figures(folder), draw_all(folder, runs), begin("figures"))
+            written.draw(_figures(folder), draw_all(folder), begin("figures"))
     return _parts(folder, table, related, worst)
 
 

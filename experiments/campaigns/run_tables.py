@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pandas as pd
 from rich.table import Table
 
+from infoset.experiments.campaigns.sample_rows import Step, fits, noises_of, rows_of_samples
 from infoset.experiments.campaigns.sweep_axes import tied_keys
 from infoset.experiments.common.screen import Part, number, number_table, quantile_notes
 from infoset.experiments.interception.runs.shared import bound_name, certificate
@@ -23,9 +25,10 @@ from infoset.experiments.interception.study import (
     redrawn_text,
     set_warnings,
 )
-from infoset.sim import CampaignNoise, HitEstimate, Outcome, estimate_hits, estimate_quantiles
-from infoset.sim.miss_cause import count_causes
-from infoset.sim.statistics import correlation_interval, level_name, shows
+from infoset.sim import CampaignNoise, HitEstimate, Outcome, Results, Scenario, estimate_hits, estimate_quantiles
+from infoset.sim.columns import columns_of
+from infoset.sim.miss_cause import EXPLAINED, MissCause, max_of_cause
+from infoset.sim.statistics import average_ranks, correlation_interval, level_name, shows
 from infoset.sim.stopping_rule import QUANTITIES
 from infoset.sim.storage import CampaignFolder, fingerprint
 from infoset.sim.versions import versions
@@ -36,50 +39,39 @@ OUTCOMES = {outcome.value.replace("-", "_"): outcome.value for outcome in Outcom
 """Columns of the numbers of runs with each outcome."""
 
 
-CAUSE = ("cause", "unguided_miss_m", "engine_corrects_m", "last_possible_m")
-"""Columns of the runs that say why they missed."""
-COLUMNS = ("cell", "noise", "outcome", "hit", *CAUSE, "truth_kept", "set_emptied", "phi_held", "redraws", *QUANTITIES)
-"""Columns of the runs that `summary` needs."""
+_SIGNED_ONLY = ("start_x_m", "start_vx_m_s")
+"""Components along the approach, whose moduli have no meaning of their own."""
 CI = ("95 % CI\nfrom", "\nto")
 """Titles of the ends of an interval in a table for the screen."""
 
 
-def noises_of(folder: CampaignFolder) -> list[str]:
-    """Return the noises of a campaign."""
-    return [kind.value for kind in folder.manifest.noise.kinds]
-
-
-def groups(folder: CampaignFolder, runs: pd.DataFrame) -> Iterator[tuple[int, str, pd.DataFrame]]:
-    """Yield the runs of each cell and noise, which may be none; a campaign has one cell."""
-    stored = dict(list(runs.groupby(["cell", "noise"], observed=True)))
-    for cell in range(folder.manifest.cells):
-        for noise in noises_of(folder):
-            yield cell, noise, stored.get((cell, noise), runs.iloc[:0])
-
-
-def summary(folder: CampaignFolder, runs: pd.DataFrame, levels: Sequence[float] = LEVELS) -> pd.DataFrame:
-    """Return a table with a row for each cell and noise.
+def summary(folder: CampaignFolder, levels: Sequence[float] = LEVELS, more: Sequence[Step] = ()) -> pd.DataFrame:
+    """Return a table with a row for each cell and noise, followed by the keys of `more` steps.
 
     The columns are the varied keys; the numbers of all runs, of those with each outcome, and of those in which the
     sets and the bound Phi held; the share of hits; the misses by cause, and what explains them; and for each quantity
     the maximum and the quantiles at some levels. Shares and quantiles have the ends of their 95 % confidence intervals.
     NaN is unknown: the share of hits of a body without a size, and a quantile that so few runs do not show.
     """
+    steps = [
+        Step(("outcome", "hit", "truth_kept", "set_emptied", "phi_held"), _counts),
+        Step(("cause",), _causes),
+        *(Step(("cause", column), partial(_explained, name)) for name, (_, column) in EXPLAINED.items()),
+        Step(("redraws",), _redrawn_share),
+        *(Step((quantity,), partial(_quantiles, levels=levels)) for quantity in QUANTITIES),
+        *more,
+    ]
     rows = []
-    for cell, noise, chosen in groups(folder, runs):
-        varied = {key: value for name, value in folder.manifest.values_of(cell).items() for key in tied_keys(name)}
-        row = {"cell": cell, **varied, "noise": noise, **_counts(chosen)}
-        for quantity in QUANTITIES:
-            row |= _quantiles(quantity, chosen[quantity].dropna().to_numpy(), levels)
-        rows.append(row)
+    for row in rows_of_samples(folder, steps):
+        values = folder.manifest.values_of(row["cell"])
+        varied = {key: value for name, value in values.items() for key in tied_keys(name)}
+        rows.append({"cell": row["cell"], **varied, **row})
     return pd.DataFrame(rows).astype({"hits": "Int64"})
 
 
 def _counts(runs: pd.DataFrame) -> dict[str, Any]:
     sized = int(runs["hit"].count())
     hits = vars(estimate_hits(int(runs["hit"].sum()), sized)) if sized else {}
-    missed = count_causes(*(runs[name].to_numpy() for name in CAUSE))
-    redraws = runs["redraws"].sum()
     return {
         "runs": len(runs),
         **{name: int((runs["outcome"] == outcome).sum()) for name, outcome in OUTCOMES.items()},
@@ -90,12 +82,28 @@ def _counts(runs: pd.DataFrame) -> dict[str, Any]:
         "phi_held": int(runs["phi_held"].sum()),
         "hits": hits.get("hits", math.nan),
         **{f"hit_{name}": hits.get(name, math.nan) for name in ("probability", "lower", "upper")},
-        **{f"missed_{name}": or_nan(value) for name, value in missed.items()},
-        **({"redrawn_share": redraws / (len(runs) + redraws)} if runs["redraws"].count() else {}),
     }
 
 
-def _quantiles(quantity: str, known: Any, levels: Sequence[float]) -> dict[str, float]:
+def _causes(runs: pd.DataFrame) -> dict[str, Any]:
+    return {f"missed_{cause.value}": int((runs["cause"] == cause.value).sum()) for cause in MissCause}
+
+
+def _explained(name: str, runs: pd.DataFrame) -> dict[str, float]:
+    cause, column = EXPLAINED[name]
+    return {f"missed_{name}": or_nan(max_of_cause(runs["cause"].to_numpy(), runs[column].to_numpy(), cause))}
+
+
+def _redrawn_share(runs: pd.DataFrame) -> dict[str, float]:
+    if not runs["redraws"].count():
+        return {}
+    redraws = runs["redraws"].sum()
+    return {"redrawn_share": redraws / (len(runs) + redraws)}
+
+
+def _quantiles(runs: pd.DataFrame, levels: Sequence[float]) -> dict[str, float]:
+    (quantity,) = runs
+    known = runs[quantity].dropna().to_numpy()
     row = {}
     estimates = estimate_quantiles(known, levels) if known.size else [None] * len(levels)
     for level, estimate in zip(levels, estimates, strict=True):
@@ -105,44 +113,87 @@ def _quantiles(quantity: str, known: Any, levels: Sequence[float]) -> dict[str, 
     return row | {f"{quantity}_max": float(known.max()) if known.size else math.nan}
 
 
-def correlations(folder: CampaignFolder, runs: pd.DataFrame) -> pd.DataFrame:
+def start_columns(scenario: Scenario) -> tuple[str, ...]:
+    """Return the columns of the runs with the components of the initial state, in a plane without y."""
+    columns = [column for column in columns_of(Results) if column.name.startswith("start_")]
+    return tuple(column.name for column in columns if scenario.is_spatial or not column.optional)
+
+
+def correlations(folder: CampaignFolder) -> pd.DataFrame:
     """Return Pearson's and Spearman's correlation of the miss with each component of the initial state, by noise.
 
     Each has the ends of its 95 % confidence interval. The moduli of the lateral components are included, for example
     `|start_z_m|`. A correlation is NaN where the component or the miss does not vary, and so are its ends with fewer
     than 4 runs.
     """
+    # Components of one step share the ranks of the miss.
+    start = start_columns(folder.manifest.scenario)
+    is_small = fits(("miss_m", *start), folder.finished_runs)
+    groups = [start] if is_small else [(name,) for name in start]
+    steps = [Step(("miss_m", *names), _correlations_with_miss) for names in groups]
+
     rows = []
-    for _, noise, chosen in groups(folder, runs):
-        start = chosen.filter(like="start_").dropna(axis="columns", how="all")
-        moduli = start.drop(columns=["start_x_m", "start_vx_m_s"], errors="ignore").abs()
-        components = pd.concat([start, moduli.add_prefix("|").add_suffix("|")], axis="columns")
-        with np.errstate(invalid="ignore", divide="ignore"):  # a component that does not vary
-            both = {
-                "pearson": components.corrwith(chosen["miss_m"]),
-                "spearman": components.rank().corrwith(chosen["miss_m"].rank()),
-            }
-        for component in components:
+    for sample in rows_of_samples(folder, steps):
+        noise = sample.pop("noise")
+        size = sample.pop("runs")
+        del sample["cell"]
+        for component in sorted(sample, key=lambda name: name.startswith("|")):  # moduli last
             row = {"noise": noise, "component": component}
-            for kind, found in both.items():
-                value = found[component]
-                ends = correlation_interval(value, len(chosen), ranks=kind == "spearman")
+            for kind, value in sample[component].items():
+                ends = correlation_interval(value, size, ranks=kind == "spearman")
                 row |= {kind: value, f"{kind}_lower": ends[0], f"{kind}_upper": ends[1]}
             rows.append(row)
     return pd.DataFrame(rows)
 
 
-def worst_runs(folder: CampaignFolder, runs: pd.DataFrame, scenario_file: Path) -> pd.DataFrame:
+def _correlations_with_miss(runs: pd.DataFrame) -> dict[str, Any]:
+    """Return the number of runs, and both correlations of each component that is known, and of its modulus."""
+    miss_m = runs["miss_m"]
+    ranks = pd.Series(average_ranks(miss_m.to_numpy()))
+
+    def related(component: pd.Series[float]) -> dict[str, float]:
+        component_ranks = pd.Series(average_ranks(component.to_numpy()))
+        with np.errstate(invalid="ignore", divide="ignore"):  # a component that does not vary
+            return {"pearson": miss_m.corr(component), "spearman": ranks.corr(component_ranks)}
+
+    found: dict[str, Any] = {"runs": len(runs)}
+    for name in runs.columns.drop("miss_m"):
+        if not runs[name].count():
+            continue
+        found[name] = related(runs[name])
+        if name not in _SIGNED_ONLY:
+            found[f"|{name}|"] = related(runs[name].abs())
+    return found
+
+
+def worst_runs(folder: CampaignFolder, scenario_file: Path) -> pd.DataFrame:
     """Return the runs with the largest miss, the worst first; `replay` is the command that simulates a run again."""
     # The manifest's name of a strategy or a noise in a file: mine.py:Mine sha256:...
     file, _, version = folder.manifest.strategy.rpartition(" sha256:")
     own = f" --strategy {shlex.quote(file)}" if version and file else ""
     own_noise = shlex.quote((folder.manifest.own_noise or "").partition(" sha256:")[0])
-    worst = runs.nlargest(WORST, "miss_m")[["run", "noise", "outcome", "hit", "cause", "miss_m", "impulse_m_s"]]
+    worst = _rows_of_worst(folder)
     command = f"infoset engage {shlex.quote(str(scenario_file))} --noise {{}} --seed {folder.manifest.seed} --run {{}}"
     noises = worst["noise"].astype(str).replace(CampaignNoise.OWN.value, own_noise)
     replay = [command.format(noise, run) + own for noise, run in zip(noises, worst["run"], strict=True)]
     return worst.assign(replay=replay)
+
+
+def _rows_of_worst(folder: CampaignFolder) -> pd.DataFrame:
+    """Return some columns of the runs with the largest miss, from the files that contain them."""
+    (chunks,) = folder.stored_chunks()
+    miss_m = folder.read_chunks(chunks, ["miss_m"])["miss_m"]
+    positions = miss_m.nlargest(WORST).index.to_numpy()
+
+    ends = np.cumsum([len(runs) for _, runs in chunks])
+    files = np.searchsorted(ends, positions, side="right")
+    numbers = [
+        chunks[file][1][position - ends[file] + len(chunks[file][1])]
+        for file, position in zip(files, positions, strict=True)
+    ]
+    columns = ["run", "noise", "outcome", "hit", "cause", "miss_m", "impulse_m_s"]
+    read = folder.read_chunks([chunks[file] for file in np.unique(files)], columns)
+    return read.set_index("run", drop=False).loc[numbers]
 
 
 def heading(folder: CampaignFolder) -> dict[str, Any]:

@@ -6,13 +6,15 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from infoset.arrays import Floats
-from infoset.experiments.campaigns.run_tables import COLUMNS, LEVELS, groups, noises_of, or_nan, summary
+from infoset.experiments.campaigns.run_tables import LEVELS, or_nan, summary
+from infoset.experiments.campaigns.sample_rows import Step, noises_of
 from infoset.experiments.campaigns.sweep_axes import sweep_cells, tied_keys
 from infoset.sim import Requirement
 from infoset.sim.closed_form import possible_miss_of
@@ -58,16 +60,17 @@ class SweepTable:
 
 def sweep_table(folder: CampaignFolder, required: AnyRequirement) -> SweepTable:
     """Return the table of a sweep, finished or not, with the levels `LEVELS` and that of the required quantile."""
-    runs = folder.runs(COLUMNS)
-    more = {required.quantile.level} if isinstance(required, Requirement) else set[float]()
-    table = summary(folder, runs, sorted({*LEVELS} | more))
-    decisions = pd.DataFrame([_decision(chosen, required, folder) for _, _, chosen in groups(folder, runs)])
-    decisions = decisions.astype({"required_known": "Int64", "runs_needed": "Int64"})
+    levels = set(LEVELS)
+    if isinstance(required, Requirement):
+        levels.add(required.quantile.level)
+    columns = tuple(dict.fromkeys((required.quantity, "miss_m")))
+    decided = Step(columns, partial(_decision, required=required, folder=folder))
+    rows = summary(folder, sorted(levels), [decided]).astype({"required_known": "Int64", "runs_needed": "Int64"})
     axes, noises = folder.manifest.axes, noises_of(folder)
-    decisions["limit_bound"] = required.bound if isinstance(required, Requirement) else _radii_m(folder, table)
+    rows["limit_bound"] = required.bound if isinstance(required, Requirement) else _radii_m(folder, rows)
     if required.quantity == "guaranteed_miss_m" and folder.manifest.scenario.camera is not None:
-        decisions["closed_form_m"] = np.repeat(_closed_forms(folder), len(noises))
-    return SweepTable(axes, tuple(noises), required, pd.concat([table, decisions], axis="columns"))
+        rows["closed_form_m"] = np.repeat(_closed_forms(folder), len(noises))
+    return SweepTable(axes, tuple(noises), required, rows)
 
 
 def _decision(runs: pd.DataFrame, required: AnyRequirement, folder: CampaignFolder) -> dict[str, Any]:

@@ -77,8 +77,18 @@ class CampaignFolder:
 
         Unknown numbers are NaN, unknown flags NA. StorageError, which names the file, if one cannot be read.
         """
-        stored = [chunk for chunk in self.manifest.chunks() if cell in (None, chunk[0]) and self.has(*chunk)]
-        return self.read_chunks(sorted(stored, key=lambda chunk: (chunk[0], chunk[1][0])), columns)
+        chosen = [
+            chunk for number, chunks in enumerate(self.stored_chunks()) if cell in (None, number) for chunk in chunks
+        ]
+        return self.read_chunks(chosen, columns)
+
+    def stored_chunks(self) -> list[list[tuple[int, range]]]:
+        """Return the cells and runs of the stored chunks, by cell and in the order of the runs."""
+        stored: list[list[tuple[int, range]]] = [[] for _ in range(self.manifest.cells)]
+        for cell, runs in self.manifest.chunks():
+            if self.has(cell, runs):
+                stored[cell].append((cell, runs))
+        return stored
 
     def read_chunks(
         self, chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None = None

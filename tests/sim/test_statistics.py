@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from infoset.sim import empirical_distribution, estimate_hits, estimate_quantiles
-from infoset.sim.statistics import order_statistics, runs_for_hits, shown_quantiles, shows
+from infoset.sim.statistics import average_ranks, order_statistics, runs_for_hits, shown_quantiles, shows
 
 
 def test_the_distribution_of_a_small_sample_by_hand() -> None:
@@ -129,3 +129,11 @@ def test_runs_for_hits_of_values_without_a_meaning_are_refused() -> None:
     for arguments in ((1.0,), (0.0,), (0.9, -1), (0.9, 0, 1.0)):
         with pytest.raises(ValueError, match=r"share|misses|confidence"):
             runs_for_hits(*arguments)
+
+
+@given(values=st.lists(st.sampled_from([-2.5, -0.0, 0.0, 1.0, math.nextafter(1.0, 2.0), 7.0, 1e300]), max_size=40))
+def test_average_ranks_are_those_of_the_definition(values: list[float]) -> None:
+    expected = [
+        sum(other < value for other in values) + 0.5 * (sum(other == value for other in values) + 1) for value in values
+    ]
+    assert average_ranks(np.array(values)).tolist() == expected

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,8 +15,9 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.stats import pearsonr
 
+from infoset.experiments.campaigns import sample_rows
 from infoset.experiments.campaigns.campaign_figures import draw_convergence, draw_dispersion
-from infoset.experiments.campaigns.run_tables import correlations
+from infoset.experiments.campaigns.run_tables import WORST, correlations, summary, worst_runs
 from infoset.experiments.interception.figures.distributions import MAX_POINTS
 from infoset.experiments.interception.scenario_file import load_scenario
 from infoset.guidance import NoiseKind
@@ -83,6 +85,52 @@ def test_what_cannot_be_reported(
     assert not (tmp_path / "report").exists()
 
 
+@pytest.mark.usefixtures("unrendered")
+@pytest.mark.parametrize("bytes_at_once", [1, 300 * 20])
+def test_report_does_not_depend_on_the_columns_read_together(
+    bytes_at_once: int, infoset: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together = infoset("report", folder, "--json", "-")
+    monkeypatch.setattr(sample_rows, "PASS_BYTES", bytes_at_once)
+    assert infoset("report", folder, "--json", "-") == together
+
+
+def test_report_reads_only_columns_within_the_memory_limit(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stored = CampaignFolder.read(folder)
+    read: list[list[str]] = []
+    read_chunks = stored.read_chunks
+
+    def recorded(chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None = None) -> pd.DataFrame:
+        assert columns is not None
+        read.append([*columns])
+        return read_chunks(chunks, columns)
+
+    monkeypatch.setattr(stored, "read_chunks", recorded)
+    monkeypatch.setattr(sample_rows, "PASS_BYTES", 300 * 16)
+    summary(stored)
+    correlations(stored)
+    steps = [columns for columns in read if "outcome" not in columns]
+    assert all(columns[0] == "noise" and len(columns) <= 3 for columns in steps)
+
+
+def test_worst_runs_are_those_of_all_runs_also_with_equal_misses(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stored = CampaignFolder.read(folder)
+    read_chunks = stored.read_chunks
+
+    def rounded(chunks: Iterable[tuple[int, Sequence[int]]], columns: Sequence[str] | None = None) -> pd.DataFrame:
+        runs = read_chunks(chunks, columns)
+        return runs.assign(miss_m=runs["miss_m"].round(-1))
+
+    monkeypatch.setattr(stored, "read_chunks", rounded)
+    found = worst_runs(stored, Path("scenario.toml"))
+    whole = stored.runs()
+    # Equal misses are in the order of the runs.
+    expected = whole.sort_values("miss_m", ascending=False, kind="stable").head(WORST)
+    assert whole["miss_m"].nunique() < WORST
+    assert found["run"].tolist() == expected["run"].tolist()
+    assert found["impulse_m_s"].tolist() == expected["impulse_m_s"].tolist()
+
+
 PLANE = ("start_z_m", "start_x_m", "start_vz_m_s", "start_vx_m_s")
 
 
@@ -95,8 +143,15 @@ def made_runs(noise: str, size: int) -> pd.DataFrame:
 
 def correlated(runs: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Return the correlations of runs of random noise by component."""
-    manifest = SimpleNamespace(cells=1, noise=SimpleNamespace(kinds=[NoiseKind.RANDOM]))
-    rows = correlations(cast(CampaignFolder, SimpleNamespace(manifest=manifest)), runs).to_dict("records")
+    folder = SimpleNamespace(
+        manifest=SimpleNamespace(
+            noise=SimpleNamespace(kinds=[NoiseKind.RANDOM]), scenario=SimpleNamespace(is_spatial=False)
+        ),
+        finished_runs=len(runs),
+        stored_chunks=lambda: [[(0, range(len(runs)))]],
+        read_chunks=lambda _, columns: runs.reindex(columns=columns),
+    )
+    rows = correlations(cast(CampaignFolder, folder)).to_dict("records")
     return {row["component"]: row for row in rows}
 
 
