@@ -261,8 +261,8 @@ def test_an_intersection_with_a_very_long_set_does_not_depend_on_the_order(upper
     long = Polytope.from_box([0.0, -1.4e11], [1.25e-4, upper])
     for both in (square & long, long & square):
         lower, most = both.bounding_box()
-        assert lower.tolist() == [0.0, -1.0]
-        assert most.tolist() == [1.25e-4, upper]
+        np.testing.assert_allclose(lower, [0.0, -1.0], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(most, [1.25e-4, upper], rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))
