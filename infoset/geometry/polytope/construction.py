@@ -1,8 +1,9 @@
 """Construction of polytopes: hulls of points, intersections of half-spaces, and cuts.
 
 Each set is computed in three steps. The double description finds vertices or facets with rounded numbers. What it finds
-is *settled*: points within SNAP of a facet are on it, what is redundant goes, and the rest is kept only if it proves to
-be all (`incidence.is_closed`). Otherwise the set is computed again with integers (`cone`), which round nothing.
+is *settled*: what is redundant goes, and the rest is kept only if it proves to be all (`incidence.is_closed`), with the
+incidence of the double description or with that of all points within SNAP of a facet. Otherwise the set is computed
+again with integers (`cone`), which round nothing.
 
 Whether half-spaces have an empty, flat or unbounded intersection is decided by integers. A cut of a set that exists is
 decided to ON of its size if it is empty, and to SNAP if it is flat.
@@ -157,10 +158,11 @@ def _facets_of(points: Floats) -> tuple[Integers, Floats, Flags]:
             on = exact.on
         # Rounding can divide a facet in two rays, each on some of its points: on all of them, they are one.
         snapped, is_right = touching(points, rays, on.T.copy(), 0, 1.0)
-        used, sides, incidence = without_redundant(snapped, dimension)
-        is_right = is_right and not loses_points(points, used, snapped, dimension, _SAME)
-        if is_right and is_closed(incidence, dimension):
-            return used, rays[sides, :-1].copy(), incidence
+        for one in (on.T.copy(), snapped):
+            used, sides, incidence = without_redundant(one, dimension)
+            is_lost = loses_points(points, used, one, dimension, _SAME)
+            if is_right and not is_lost and is_closed(incidence, dimension):
+                return used, rays[sides, :-1].copy(), incidence
     # Facets at a small angle: what is on which is as the integers say.
     used, sides, incidence = without_redundant(on.T.copy(), dimension)
     return used, rays[sides, :-1].copy(), incidence
@@ -175,11 +177,13 @@ def of_half_spaces(
     origin: Floats | float = 0.0,
     ends: Ends | None = None,
     sizes: Floats | None = None,
+    *,
+    is_inside: bool = True,
 ) -> PolytopeArrays:
     """Return {x: rows (x - origin) <= limits}; limits may be infinite.
 
-    If the set is known to be in a box, its `ends` save time, and a set that is unbounded because of rounding is clipped
-    to it.
+    If the set is known to be about in a box, its `ends` save time. If it certainly `is_inside`, and unbounded because
+    of rounding, it is clipped to the box.
 
     `sizes`, shape (n,), are those of the coordinates from which limits were computed. Integers would be exact about the
     wrong set, often an empty one: where they decide, the half-spaces are larger by the rounding of such limits, and
@@ -205,7 +209,7 @@ def of_half_spaces(
     if sizes is not None:
         limits = limits + UNSURE * (np.abs(rows) @ sizes)
     found = _with_integers(rows, limits, start, np.zeros(space) if sizes is None else sizes)
-    if found.is_bounded or ends is None:
+    if found.is_bounded or ends is None or not is_inside:
         return found
     sides = np.vstack([rows, np.eye(space), -np.eye(space)])
     ends_of_box = np.concatenate([ends[1] - start, start - ends[0]])
@@ -325,7 +329,7 @@ def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | fl
     than the set is computed again, in its own coordinates, from the half-spaces that are near it.
     """
     scaled = np.column_stack([rows * whole.scale, moved_limits(rows, limits, whole.centre - origin)])
-    is_zero = ~scaled[:, :-1].any(axis=1)
+    is_zero = np.asarray(~scaled[:, :-1].any(axis=1))
     if not _holds_without_direction(scaled[:, -1], is_zero):
         return empty(whole.space)
     scaled = dd.in_units(scaled[~is_zero])
@@ -344,20 +348,35 @@ def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | fl
     # An edge lies on one facet less than the set has dimensions.
     rays, on = dd.insert_rows(rays, on, table, numbers, whole.dimension - 1, True)
     part = replace(whole, points=rays[:, :-1].copy(), facets=np.vstack([whole.facets, cuts]), incidence=on)
-    found = settled(part, len(whole.facets)) if len(rays) else None
-    if found is None:
-        again = of_half_spaces(*half_spaces(part, whole.centre), whole.centre, whole.bounding_box())
-    elif _is_small_part(found, whole):
-        lower, upper = found.bounding_box()
-        margin = SNAP * np.ptp(whole.vertices, axis=0)
-        ends = lower - margin, upper + margin
-        again = of_half_spaces(*half_spaces(_near(part), whole.centre), whole.centre, ends)
-    else:
+    if not len(rays):
+        return of_half_spaces(*half_spaces(part, whole.centre), whole.centre, whole.bounding_box())
+    found = settled(part, len(whole.facets))
+    if found is not None and not _is_small_part(found, whole):
         return found
-    if again.is_empty and len(rays):
+    again = _of_near_half_spaces(part)
+    if again is None:
+        again = of_half_spaces(*half_spaces(part, whole.centre), whole.centre, whole.bounding_box())
+    if again.is_empty:
         # It touches the half-spaces, to rounding.
         return found or hull(part.points, part.centre, part.scale)
     return again
+
+
+def _of_near_half_spaces(part: PolytopeArrays) -> PolytopeArrays | None:
+    """Return a part from its half-spaces that are within SNAP of its points, or None if others cut what they leave.
+
+    The points need not be right: if all half-spaces hold where these few hold, the others are redundant.
+    """
+    near = SNAP * max(1.0, float(np.abs(part.points).max()))
+    gaps = part.facets[:, -1] - (part.points @ part.facets[:, :-1].T).max(axis=0)
+    few = replace(part, facets=part.facets[gaps <= near])
+    lower, upper = part.bounding_box()
+    found = of_half_spaces(*half_spaces(few, part.centre), part.centre, (lower, upper), is_inside=False)
+    if not found.is_bounded:
+        return None
+    points = (found.vertices - part.centre) / part.scale
+    heights = points @ part.facets[:, :-1].T - part.facets[:, -1]
+    return None if heights.max(initial=0.0) > near else found
 
 
 def _is_small_part(part: PolytopeArrays, whole: PolytopeArrays) -> bool:
@@ -365,12 +384,6 @@ def _is_small_part(part: PolytopeArrays, whole: PolytopeArrays) -> bool:
     before = np.ptp(whole.points, axis=0)
     widths = np.ptp(part.points, axis=0)
     return bool(((FINE * widths < before) & (widths > SNAP * before)).any())
-
-
-def _near(part: PolytopeArrays) -> PolytopeArrays:
-    """Return a part without half-spaces farther than SNAP from all its vertices, which are known far better."""
-    gaps = part.facets[:, -1] - (part.points @ part.facets[:, :-1].T).max(axis=0)
-    return replace(part, facets=part.facets[gaps <= SNAP * max(1.0, float(np.abs(part.points).max()))])
 
 
 def settled(rough: PolytopeArrays, old: int) -> PolytopeArrays | None:
@@ -382,22 +395,45 @@ def settled(rough: PolytopeArrays, old: int) -> PolytopeArrays | None:
     size = max(1.0, float(np.abs(rough.points).max()))
     on, is_right = touching(rough.points, rough.facets, rough.incidence, old, size)
     if not is_right:
+        rough = _refined(rough, old)
+        on, is_right = touching(rough.points, rough.facets, rough.incidence, old, size)
+    if not is_right:
         return None
-    whole = replace(rough, incidence=on)
-
     if _is_flat(on, rough.dimension):
-        points = push_out(whole.points, whole.facets, on, old, True, SNAP * size)
-        # Rounding grows across the facets on which all points are, and in no other direction.
-        planes = np.ascontiguousarray(whole.facets[on.all(axis=0), :-1])
-        expected = rough.dimension - len(dd.pivots(planes, REDUCED, -1)[0]) if len(planes) else 0
-        flat = hull(points, whole.centre, whole.scale, _PIVOTS * SNAP)
-        if flat.dimension < expected:
-            flat = hull(points, whole.centre, whole.scale)
-        return flat if flat.dimension < rough.dimension else None
-    used, sides, incidence = without_redundant(on, rough.dimension)
-    if loses_points(whole.points, used, on, rough.dimension, _SAME * size) or not is_closed(incidence, rough.dimension):
-        return None
-    return _reduced(whole, old, used, sides)
+        return _flat_part(replace(rough, incidence=on), old)
+
+    # What is on which by the steps of the double description is finer than by distances, if it is all.
+    for incidence in (rough.incidence, on):
+        used, sides, kept = without_redundant(incidence, rough.dimension)
+        if loses_points(rough.points, used, incidence, rough.dimension, _SAME * size):
+            continue
+        if is_closed(kept, rough.dimension):
+            return _reduced(replace(rough, incidence=incidence), old, used, sides)
+    return None
+
+
+def _refined(rough: PolytopeArrays, old: int) -> PolytopeArrays:
+    """Return a set whose new vertices are computed again from their facets: cuts of a small part are rounded often."""
+    points = rough.points.copy()
+    is_new = rough.incidence[:, old:].any(axis=1) if old else np.ones(len(points), np.bool_)
+    for i in np.flatnonzero(is_new):
+        rows = np.vstack([rough.facets[rough.incidence[i]], rough.equations])
+        gaps = rows[:, -1] - rows[:, :-1] @ points[i]
+        points[i] += np.linalg.lstsq(rows[:, :-1], gaps)[0]
+    return replace(rough, points=points)
+
+
+def _flat_part(whole: PolytopeArrays, old: int) -> PolytopeArrays | None:
+    """Return the hull of points that are all on a facet; None if it is not flat."""
+    near = SNAP * max(1.0, float(np.abs(whole.points).max()))
+    points = push_out(whole.points, whole.facets, whole.incidence, old, True, near)
+    # Rounding grows across the facets on which all points are, and in no other direction.
+    planes = np.ascontiguousarray(whole.facets[whole.incidence.all(axis=0), :-1])
+    expected = whole.dimension - len(dd.pivots(planes, REDUCED, -1)[0]) if len(planes) else 0
+    flat = hull(points, whole.centre, whole.scale, _PIVOTS * SNAP)
+    if flat.dimension < expected:
+        flat = hull(points, whole.centre, whole.scale)
+    return flat if flat.dimension < whole.dimension else None
 
 
 def _is_flat(on: Flags, dimension: int) -> bool:

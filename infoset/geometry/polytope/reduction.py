@@ -9,7 +9,7 @@ import numpy as np
 from infoset.arrays import Flags, Floats
 from infoset.geometry.polytope import construction
 from infoset.geometry.polytope import double_description as dd
-from infoset.geometry.polytope.arrays import PolytopeArrays, half_spaces
+from infoset.geometry.polytope.arrays import PolytopeArrays
 from infoset.geometry.polytope.incidence import Bits, unpacked
 from infoset.geometry.tolerances import ON
 from infoset.kernels import Kernels
@@ -26,8 +26,8 @@ def reduced_outward(polytope: PolytopeArrays, cap: int, max_vertices: int) -> Po
     points, facets, incidence = _cut_by_worst(polytope.points, polytope.facets, cap, max_vertices)
     outer = replace(polytope, points=points, facets=facets, incidence=incidence)
     found = construction.settled(outer, 2 * polytope.space)
-    if found is None:
-        return construction.of_half_spaces(*half_spaces(outer, outer.centre), outer.centre, outer.bounding_box())
+    if found is None:  # with fewer facets it is right at last: a box is
+        return reduced_outward(polytope, cap // 2, max_vertices)
     return found
 
 
