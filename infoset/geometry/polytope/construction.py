@@ -25,7 +25,7 @@ from infoset.arrays import Flags, Floats, Integers
 from infoset.geometry.double_words import supports
 from infoset.geometry.polytope import cone
 from infoset.geometry.polytope import double_description as dd
-from infoset.geometry.polytope.arrays import PolytopeArrays, half_spaces
+from infoset.geometry.polytope.arrays import PolytopeArrays, half_spaces, own_and_others
 from infoset.geometry.polytope.incidence import is_closed, without_redundant
 from infoset.geometry.polytope.outward import around, loses_points, push_out, touching
 from infoset.geometry.polytope.polyhedron import (
@@ -329,8 +329,10 @@ def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | fl
     than the set is computed again, in its own coordinates, from the half-spaces that are near it.
     """
     scaled = np.column_stack([rows * whole.scale, moved_limits(rows, limits, whole.centre - origin)])
+    if len(whole.equations):
+        scaled = _within(scaled, whole.equations)
     is_zero = np.asarray(~scaled[:, :-1].any(axis=1))
-    if not _holds_without_direction(scaled[:, -1], is_zero):
+    if (scaled[is_zero, -1] < 0.0).any():
         return empty(whole.space)
     scaled = dd.in_units(scaled[~is_zero])
     heights = whole.points @ scaled[:, :-1].T - scaled[:, -1]
@@ -377,6 +379,24 @@ def _of_near_half_spaces(part: PolytopeArrays) -> PolytopeArrays | None:
     points = (found.vertices - part.centre) / part.scale
     heights = points @ part.facets[:, :-1].T - part.facets[:, -1]
     return None if heights.max(initial=0.0) > near else found
+
+
+def _within(rows: Floats, equations: Floats) -> Floats:
+    """Return rows (a, b) in the own coordinates of a flat set: the others are functions of them.
+
+    Entries that are the rounding of a difference are zero; a row without others holds to this rounding.
+    """
+    _, others = own_and_others(equations)
+    factors = rows[:, others]
+    own = rows - factors @ equations
+    own[:, others] = 0.0
+    terms = np.abs(rows) + np.abs(factors) @ np.abs(equations)
+    own[np.abs(own) <= UNSURE * rows.shape[1] * terms] = 0.0
+    is_zero = ~own[:, :-1].any(axis=1)
+    # The distance of the set from such a half-space is known to ON of the terms.
+    near = ON * terms.max(axis=1)
+    own[is_zero & (own[:, -1] >= -near), -1] = 0.0
+    return np.asarray(own)
 
 
 def _is_small_part(part: PolytopeArrays, whole: PolytopeArrays) -> bool:

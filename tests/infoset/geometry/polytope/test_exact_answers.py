@@ -273,3 +273,15 @@ def test_a_thin_part_loses_only_the_dimension_in_which_it_is_flat(seed: int) -> 
     assert bar.dimension == 2
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (0.0, 2e-10) for z in (0.0, 3e-12)]) @ turn
     assert bar.contains(corners, SNAP).all()
+
+
+def test_a_cut_of_a_small_flat_set_is_as_precise_as_the_set() -> None:
+    """The coordinate that is zero has no width: an oblique half-space was compared with a width of one."""
+    segment = Polytope.from_box([0.0, 0.0], [1e-13, 0.0])
+    assert segment.cut([1.0, 1.0], upper=-9e-13).is_empty
+    square = Polytope.from_box([0.0, 0.0, 0.0], [1e-10, 1e-10, 0.0])
+    corner = square.cut([1.0, 0.5, 1.0], upper=4e-13)
+    assert corner.dimension == 2
+    assert corner.volume() == pytest.approx(0.5 * 4e-13 * 8e-13, rel=1e-9)
+    assert square.cut([0.0, 0.0, 1.0], upper=0.0).equals(square)
+    assert square.cut([0.0, 0.0, 1.0], upper=-1e-3).is_empty
