@@ -17,18 +17,17 @@ from infoset.experiments.observer.data import simulate
 from tests.experiments.command_line import Command, strict
 
 PUBLISHED = json.loads((Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text())
-SIX_STATES = """kind = "observer"
-name = "six"
+FOUR_STATES = """kind = "observer"
+name = "four"
 [system]
-A = [[1, 0.5, 0, 0, 0, 0], [0, 1, 0.5, 0, 0, 0], [0, 0, 0.9, 0, 0, 0], [0, 0, 0, 1, 0.5, 0], [0, 0, 0, 0, 1, 0.5],
-     [0, 0, 0, 0, 0, 0.9]]
-C = [[1, 0, 0, 0, 0, 0], [0, 0, 0, 1, 0, 0]]
+A = [[1, 0.5, 0, 0], [0, 0.9, 0.1, 0], [0, 0, 1, 0.5], [0.1, 0, 0, 0.9]]
+C = [[1, 0, 0, 0], [0, 0, 1, 0]]
 [initial]
-lower = [-1, -1, -1, -1, -1, -1]
-upper = [1, 1, 1, 1, 1, 1]
+lower = [-1, -1, -1, -1]
+upper = [1, 1, 1, 1]
 [disturbance]
-center = [0, 0, 0, 0, 0, 0]
-generators = [[0, 0, 0.1, 0, 0, 0], [0, 0, 0, 0, 0, 0.1]]
+center = [0, 0, 0, 0]
+generators = [[0, 0.1, 0, 0], [0, 0, 0, 0.1]]
 [noise]
 half_width = [0.2, 0.2]
 [simulation]
@@ -194,12 +193,12 @@ def test_a_set_may_be_given_by_its_vertices(infoset: Command) -> None:
         assert (np.abs(states[0] - [0.0, 10.0]) <= 10.0).all()
 
 
-def test_six_states_are_polytopes(infoset: Command) -> None:
-    Path("six.toml").write_text(SIX_STATES)
-    results = infoset.json("observe", "six.toml")
+def test_four_states_are_polytopes(infoset: Command) -> None:
+    Path("four.toml").write_text(FOUR_STATES)
+    results = infoset.json("observe", "four.toml")
     assert "vertices" not in results["steps"][0]
     assert all(0.0 <= excess < 1.0 for excess in results["excess_widths"])
-    assert "the sets have a bounded number of facets" in infoset("observe", "six.toml")[1]
+    assert "the sets have a bounded number of facets" in infoset("observe", "four.toml")[1]
     for step in results["steps"]:
         assert (np.array(step["lower"]) <= step["state"]).all()
         assert (np.array(step["upper"]) >= step["state"]).all()
