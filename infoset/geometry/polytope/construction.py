@@ -27,7 +27,7 @@ from infoset.geometry.polytope import cone
 from infoset.geometry.polytope import double_description as dd
 from infoset.geometry.polytope.arrays import PolytopeArrays, half_spaces, own_and_others
 from infoset.geometry.polytope.incidence import is_closed, without_redundant
-from infoset.geometry.polytope.outward import around, loses_points, push_out, touching
+from infoset.geometry.polytope.outward import around, loses_points, push_out, refined, touching
 from infoset.geometry.polytope.polyhedron import (
     Polyhedron,
     holds_with_equality,
@@ -415,7 +415,7 @@ def settled(rough: PolytopeArrays, old: int) -> PolytopeArrays | None:
     size = max(1.0, float(np.abs(rough.points).max()))
     on, is_right = touching(rough.points, rough.facets, rough.incidence, old, size)
     if not is_right:
-        rough = _refined(rough, old)
+        rough = replace(rough, points=refined(rough.points, rough.facets, rough.equations, rough.incidence, old))
         on, is_right = touching(rough.points, rough.facets, rough.incidence, old, size)
     if not is_right:
         return None
@@ -430,17 +430,6 @@ def settled(rough: PolytopeArrays, old: int) -> PolytopeArrays | None:
         if is_closed(kept, rough.dimension):
             return _reduced(replace(rough, incidence=incidence), old, used, sides)
     return None
-
-
-def _refined(rough: PolytopeArrays, old: int) -> PolytopeArrays:
-    """Return a set whose new vertices are computed again from their facets: cuts of a small part are rounded often."""
-    points = rough.points.copy()
-    is_new = rough.incidence[:, old:].any(axis=1) if old else np.ones(len(points), np.bool_)
-    for i in np.flatnonzero(is_new):
-        rows = np.vstack([rough.facets[rough.incidence[i]], rough.equations])
-        gaps = rows[:, -1] - rows[:, :-1] @ points[i]
-        points[i] += np.linalg.lstsq(rows[:, :-1], gaps)[0]
-    return replace(rough, points=points)
 
 
 def _flat_part(whole: PolytopeArrays, old: int) -> PolytopeArrays | None:

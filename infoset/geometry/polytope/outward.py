@@ -74,6 +74,23 @@ def touching(points: Floats, facets: Floats, on: Flags, old: int, size: float) -
 
 
 @_kernels.compiled
+def refined(points: Floats, facets: Floats, equations: Floats, on: Flags, old: int) -> Floats:
+    """Return points, those on facets after the first `old` computed again: nearest to where their facets meet.
+
+    Cuts of a small part combine points that are far from it, so that their rounding grows.
+    """
+    n = points.shape[1]
+    result = points.copy()
+    for i in range(len(points)):
+        if old > 0 and not on[i, old:].any():
+            continue
+        rows = np.concatenate((facets[on[i]], equations))
+        gaps = np.array([row[n] - dot(points[i], row) for row in rows])
+        result[i] += np.linalg.lstsq(np.ascontiguousarray(rows[:, :n]), gaps)[0]
+    return result
+
+
+@_kernels.compiled
 def loses_points(points: Floats, used: Integers, on: Flags, least: int, distance: float) -> bool:
     """Whether a point that is not used is on at least `least` facets and farther than a distance from all that are.
 
