@@ -8,9 +8,8 @@ again with integers (`cone`), which round nothing.
 Whether half-spaces have an empty, flat or unbounded intersection is decided by integers. A cut of a set that exists is
 decided to ON of its size if it is empty, and to SNAP if it is flat.
 
-New vertices move to the outer sides of their facets. The hull of vertices that are all contains the set of the
-half-spaces then: the map of the boundary of the polytope that takes each face to the hull of its vertices never enters
-the interior of the set.
+New vertices move to the outer sides of their facets. If no vertex is missing, the hull of the vertices then contains
+the set of the half-spaces: each face of the hull is on the outer side of its facet.
 """
 
 from __future__ import annotations

@@ -55,11 +55,11 @@ class Polytope(PolytopeArrays, ConvexSet):
     points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
     rows of `across` are orthonormal. The constructors are the methods `from_...`.
 
-    One algorithm, the double description, computes all sets. Vertices and facets that are given are kept; those that
-    are computed are rounded outward, so that the set contains the exact one, and exceeds it by about 1e-12 of its size.
-    A set that is 1e11 times thinner than it is long, in units in which it is one wide along each axis, counts as flat;
-    the hull of points in such a set is their affine hull to rounding. A set that sticks out by less than 1e-12 of its
-    size from a half-space touches it.
+    One algorithm, the double description, computes all sets; its result is checked, and where the check fails exact
+    integers decide, which takes longer. Vertices and facets that are given are kept; those that are computed are
+    rounded outward, by about 1e-12 of the size. A set that is thinner than 7e-12, in units in which it is one wide
+    along each axis, counts as flat: across it, the exact set may stick out by as much. A set that sticks out by less
+    than 1e-12 of its size from a half-space touches it.
 
     The arrays are stored in scaled coordinates y, x = `centre` + `scale` y, with powers of two, which round nothing:
     `points`, shape (v, n), and rows (a, b) of `facets`, a . y <= b, shape (f, n + 1), and of `equations`, a . y = b,
@@ -72,7 +72,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     Operations on the empty set give the empty set; points such as its centroid do not exist (EmptyPolytopeError). All
     arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
-    (ValueError). An UncertainHullError is raised if vertices and facets do not agree because of rounding.
+    (ValueError).
 
     The other set of an operation may be a single polygon, one of `ConvexPolygons`: it is converted.
 
