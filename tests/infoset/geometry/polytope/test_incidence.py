@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
-from infoset.arrays import Flags
+from infoset.arrays import Flags, Floats
 from infoset.geometry.polytope import Polytope, construction, product
 from infoset.geometry.polytope.arrays import PolytopeArrays
 from infoset.geometry.polytope.incidence import is_closed
 from infoset.geometry.tolerances import SNAP
+from tests.infoset.geometry.polytope.exact_sets import polyhedron
+from tests.rendezvous.reachability.rationals import vertices_of
 
 
 def cube(space: int) -> Polytope:
@@ -99,3 +102,122 @@ def test_a_moved_vertex_is_put_back_and_a_facet_that_cuts_it_off_is_refused(name
     row = np.append(normal, (one.points @ normal).max() - 1e-9)
     on = np.column_stack([one.incidence, np.zeros(len(one.points), np.bool_)])
     assert settled(replace(one, facets=np.vstack([one.facets, row]), incidence=on)) is None
+
+
+# Random results ---------------------------------------------------------------------------------
+
+
+def half_spaces_of(seed: int) -> tuple[Floats, Floats]:
+    """Half-spaces of a bounded set: round, in mixed units, with integers, or a thin box far away."""
+    random = np.random.default_rng([seed, 5])
+    space = int(random.integers(2, 6))
+    unit = np.vstack([np.eye(space), -np.eye(space)])
+    rows = np.vstack([random.normal(size=(2 * space, space)), unit])
+    limits = np.ones(len(rows))
+    match seed % 4:
+        case 1:
+            units = 10.0 ** random.integers(-12, 13, space)
+            rows = rows / units
+        case 2:
+            rows = np.vstack([random.integers(-2, 3, (2 * space, space)), unit])
+            limits = np.append(random.integers(1, 4, 2 * space).astype(float), np.full(2 * space, 3.0))
+        case 3:
+            middle = random.normal(size=space) * 10.0 ** random.integers(0, 4, space)
+            widths = np.abs(middle) * 10.0 ** random.uniform(-9.0, -3.0, space)
+            rows = unit
+            limits = np.concatenate([middle + widths, widths - middle])
+    return rows, limits
+
+
+@pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+@pytest.mark.parametrize("count", [40, pytest.param(1600, marks=pytest.mark.thorough)])
+def test_vertices_that_are_accepted_without_integers_are_all_vertices(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the proof fails, integers decide: they are switched off here, and such sets left out."""
+    accepted = 0
+    monkeypatch.setattr(construction, "_with_integers", lambda *_: construction.empty(1))
+    for seed in range(count):
+        rows, limits = half_spaces_of(seed)
+
+        found = construction.of_half_spaces(rows, limits)
+
+        if found.is_empty:
+            continue
+        accepted += 1
+        exact = np.array(vertices_of(polyhedron(rows, limits)), dtype=float)
+        apart = np.abs(exact[:, None] - found.vertices) / np.ptp(exact, axis=0)
+        rounding = 1e-11 + 1e-15 * np.abs(exact).max(axis=0) / np.ptp(exact, axis=0)
+        is_same = (apart <= rounding).all(axis=2)
+        assert len(found.vertices) == len(exact), seed
+        assert is_same.any(axis=0).all(), seed
+        assert is_same.any(axis=1).all(), seed
+    # Round sets and those of integers are; a thin box and mixed units may need integers for a box.
+    assert accepted >= count // 2
+
+
+def is_accepted(one: PolytopeArrays, right: PolytopeArrays) -> bool:
+    """Whether a changed result passes as it is: neither refused nor put back to the right one."""
+    found = settled(one)
+    if found is None:
+        return False
+    if (len(found.points), len(found.facets)) != (len(right.points), len(right.facets)):
+        return True
+    apart = np.abs(found.points[:, None] - right.points).max(axis=2)
+    return bool(max(apart.min(axis=0).max(), apart.min(axis=1).max()) > SNAP)
+
+
+def changed(one: PolytopeArrays, random: np.random.Generator) -> dict[str, PolytopeArrays]:
+    """Eight changes of a set: its bits, its vertices or its facets are no longer those of a polytope."""
+    on = one.incidence
+    vertex = int(random.integers(len(on)))
+    facet = int(random.integers(on.shape[1]))
+    others = np.delete(np.arange(len(on)), vertex)
+    sides = np.delete(np.arange(on.shape[1]), facet)
+    set_bit = on.copy()
+    set_bit[tuple(random.permutation(np.argwhere(~on))[0])] = True
+    lost_bit = on.copy()
+    lost_bit[tuple(random.permutation(np.argwhere(on))[0])] = False
+    middle = one.points.mean(axis=0)
+    moves = []
+    for step in (1e-9, -1e-3):
+        points = one.points.copy()
+        points[vertex] += step * (points[vertex] - middle)
+        moves.append(replace(one, points=points))
+
+    # A half-space that cuts a vertex off by 1e-9, and of which no vertex knows.
+    normal = one.points[vertex] - middle
+    normal /= np.abs(normal).max()
+    row = np.append(normal, (one.points @ normal).max() - 1e-9)
+    unknown = np.column_stack([on, np.zeros(len(on), np.bool_)])
+    return {
+        "a bit set": replace(one, incidence=set_bit),
+        "a bit lost": replace(one, incidence=lost_bit),
+        "a vertex dropped": replace(one, points=one.points[others], incidence=on[others]),
+        "a vertex doubled": replace(
+            one, points=np.vstack([one.points, one.points[vertex]]), incidence=np.vstack([on, on[vertex]])
+        ),
+        "a facet dropped": replace(one, facets=one.facets[sides], incidence=on[:, sides]),
+        "a vertex moved outward": moves[0],
+        "a vertex moved inward": moves[1],
+        "a half-space that cuts": replace(one, facets=np.vstack([one.facets, row]), incidence=unknown),
+    }
+
+
+@pytest.mark.parametrize("count", [16, pytest.param(151, marks=pytest.mark.thorough)])
+def test_changed_results_are_refused_or_put_back(count: int) -> None:
+    """Eight changes of each set: of 151 sets 1208, none of which passes.
+
+    Points that are too few for an interior are a flat set for `settled`: that a simplex has lost a
+    vertex is found by `is_closed` alone.
+    """
+    combinatorial = ["a bit set", "a bit lost", "a vertex dropped", "a vertex doubled", "a facet dropped"]
+    for seed in range(count):
+        random = np.random.default_rng([seed, 7])
+        one = Polytope.from_constraints(*half_spaces_of(seed))
+        assert is_closed(one.incidence, one.dimension), seed
+        for name, other in changed(one, random).items():
+            is_flat_simplex = name == "a vertex dropped" and len(other.points) == one.dimension
+            assert is_flat_simplex or not is_accepted(other, one), (seed, name)
+            if name in combinatorial:
+                assert not is_closed(other.incidence, one.dimension), (seed, name)
