@@ -372,18 +372,20 @@ def difference(one: Any, other: Any) -> Any:
 @needs_ppl
 @pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("space", [2, 3])
-def test_operations_equal_exact_ones(space: int, count: int) -> None:
+def test_operations_on_pairs_with_directions_and_lines_equal_exact_ones(space: int, count: int) -> None:
     import ppl
 
-    unbounded = compared = 0
-    for seed in range(count):
+    unbounded = compared = seed = 0
+    while compared < count:
+        seed += 1
         random = np.random.default_rng([seed, space])
         (one, first), (two, second) = random_set(random, space), random_set(random, space)
-        unbounded += not one.is_bounded
         need_equal(one, first, f"set {seed}")
+        # A set whose vertices or facets are rounded is not the polyhedron with the same data.
         if not (is_exact(one, first) and is_exact(two, second)):
             continue
         compared += 1
+        unbounded += not (one.is_bounded and two.is_bounded)
         matrix = random.integers(-2, 3, (int(random.integers(1, 4)), space)).astype(float)
         offset = random.integers(-2, 3, len(matrix)).astype(float)
         back = random.integers(-2, 3, (space, int(random.integers(1, 4)))).astype(float)
@@ -401,5 +403,4 @@ def test_operations_equal_exact_ones(space: int, count: int) -> None:
         need_equal(one + two, summed(first, second), f"sum {seed}")
         need_equal(one.minkowski_difference(two), difference(first, second), f"difference {seed}")
         need_equal(one.affine_map(matrix, offset), mapped(first, matrix, offset), f"image {seed}")
-    assert unbounded > count / 2
-    assert compared > count / 2
+    assert unbounded > 0.9 * count
