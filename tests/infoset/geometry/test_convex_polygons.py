@@ -26,8 +26,8 @@ def square() -> ConvexPolygons:
     return ConvexPolygons.from_box((0.0, 0.0), (1.0, 1.0))
 
 
-POINT = ConvexPolygons.from_box((1.0, 2.0), (1.0, 2.0))
-SEGMENT = ConvexPolygons([(0.0, 0.0), (3.0, 4.0)], 2)
+def segment() -> ConvexPolygons:
+    return ConvexPolygons([(0.0, 0.0), (3.0, 4.0)], 2)
 
 
 # Batches --------------------------------------------------------------------------------------------------------
@@ -64,7 +64,7 @@ def test_a_batch_gives_what_its_members_give(shape: tuple[int, ...]) -> None:
 def test_members_of_a_batch_may_have_few_vertices_or_none() -> None:
     vertices = np.zeros((4, 4, 2))
     vertices[1, 0] = (1.0, 2.0)
-    vertices[2, :2] = SEGMENT.polygon()
+    vertices[2, :2] = segment().polygon()
     vertices[3] = square().polygon()
     vertices[0] = np.nan  # not used: never looked at
     mixed = ConvexPolygons(vertices, [0, 1, 2, 4])
@@ -95,8 +95,14 @@ def test_indexing_slicing_masking_and_iteration() -> None:
 # Empty sets -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("empty", [ConvexPolygons.empty(), square().cut((1.0, 0.0), 5.0, 6.0)], ids=["made", "cut"])
-def test_operations_on_the_empty_set_are_empty(empty: ConvexPolygons) -> None:
+# Here and below a case is a function that returns a set: kernels are compiled when tests run, not when they are
+# collected.
+@pytest.mark.parametrize(
+    "make", [ConvexPolygons.empty, lambda: square().cut((1.0, 0.0), 5.0, 6.0)], ids=["made", "cut"]
+)
+def test_operations_on_the_empty_set_are_empty(make: Callable[[], ConvexPolygons]) -> None:
+    empty = make()
+
     results = [
         empty.cut((1.0, 0.0), 0.0, 1.0),
         empty.linear_map(np.eye(2)),
@@ -201,16 +207,17 @@ def test_from_points_of_a_degenerate_set(points: list[tuple[float, float]], want
 
 
 @pytest.mark.parametrize(
-    ("polygon", "kind"),
+    ("make", "kind"),
     [
-        (ConvexPolygons.empty(), "Polygon"),
-        (POINT, "Point"),
-        (SEGMENT, "LineString"),
-        (square(), "Polygon"),
-        (ConvexPolygons.from_box((1e9, 0.0), (1e9 + 1.0, 1e-9)), "Polygon"),
+        (ConvexPolygons.empty, "Polygon"),
+        (lambda: ConvexPolygons.from_box((1.0, 2.0), (1.0, 2.0)), "Point"),
+        (segment, "LineString"),
+        (square, "Polygon"),
+        (lambda: ConvexPolygons.from_box((1e9, 0.0), (1e9 + 1.0, 1e-9)), "Polygon"),
     ],
 )
-def test_shapely_round_trip(polygon: ConvexPolygons, kind: str) -> None:
+def test_shapely_round_trip(make: Callable[[], ConvexPolygons], kind: str) -> None:
+    polygon = make()
     geometry = polygon.to_shapely()
     assert geometry.geom_type == kind
     assert geometry.is_empty == polygon.is_empty

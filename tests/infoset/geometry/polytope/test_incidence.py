@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from importlib.util import find_spec
 
 import numpy as np
@@ -32,24 +34,33 @@ def hull(space: int, count: int) -> Polytope:
     return Polytope.from_vertices(np.random.default_rng([space, count]).normal(size=(count, space)))
 
 
-POLYTOPES = {
-    "polygon": hull(2, 9),
-    "cube": cube(3),
-    "cube of five dimensions": cube(5),
-    "octahedron": cross_polytope(3),
-    "cross-polytope of four dimensions": cross_polytope(4),
-    "points in space": hull(3, 15),
-    "points of five dimensions": hull(5, 9),
+POLYTOPES: dict[str, Callable[[], Polytope]] = {
+    "polygon": lambda: hull(2, 9),
+    "cube": lambda: cube(3),
+    "cube of five dimensions": lambda: cube(5),
+    "octahedron": lambda: cross_polytope(3),
+    "cross-polytope of four dimensions": lambda: cross_polytope(4),
+    "points in space": lambda: hull(3, 15),
+    "points of five dimensions": lambda: hull(5, 9),
     # Neither vertices nor facets are simple.
-    "prism over an octahedron": product(cross_polytope(3), cube(1)),
-    "octahedron times octahedron": product(cross_polytope(3), cross_polytope(3)),
-    "pyramid over an octahedron": Polytope.from_vertices(np.vstack([np.eye(3, 4), -np.eye(3, 4), np.eye(4)[3:]])),
+    "prism over an octahedron": lambda: product(cross_polytope(3), cube(1)),
+    "octahedron times octahedron": lambda: product(cross_polytope(3), cross_polytope(3)),
+    "pyramid over an octahedron": lambda: Polytope.from_vertices(
+        np.vstack([np.eye(3, 4), -np.eye(3, 4), np.eye(4)[3:]])
+    ),
 }
+"""Functions and not polytopes: kernels are compiled when tests run, not when they are collected."""
+
+
+@cache
+def polytope(name: str) -> Polytope:
+    """Return one of the polytopes."""
+    return POLYTOPES[name]()
 
 
 @pytest.mark.parametrize("name", POLYTOPES)
 def test_vertices_and_facets_of_a_polytope_are_closed(name: str) -> None:
-    one = POLYTOPES[name]
+    one = polytope(name)
     assert is_closed(one.incidence, one.dimension)
     # The roles of vertices and facets can be exchanged.
     assert is_closed(one.incidence.T.copy(), one.dimension)
@@ -58,7 +69,7 @@ def test_vertices_and_facets_of_a_polytope_are_closed(name: str) -> None:
 @pytest.mark.parametrize("name", POLYTOPES)
 @pytest.mark.parametrize("by_facets", [False, True])
 def test_a_changed_bit_or_a_missing_or_doubled_vertex_is_refused(name: str, by_facets: bool) -> None:
-    one = POLYTOPES[name]
+    one = polytope(name)
     on: Flags = one.incidence.T.copy() if by_facets else one.incidence
     random = np.random.default_rng(len(on))
     for _ in range(20):
@@ -73,9 +84,9 @@ def test_a_changed_bit_or_a_missing_or_doubled_vertex_is_refused(name: str, by_f
 
 @pytest.mark.parametrize("name", POLYTOPES)
 def test_two_polytopes_are_not_one(name: str) -> None:
-    on = POLYTOPES[name].incidence
+    on = polytope(name).incidence
     apart = np.block([[on, np.zeros_like(on)], [np.zeros_like(on), on]])
-    assert not is_closed(apart, POLYTOPES[name].dimension)
+    assert not is_closed(apart, polytope(name).dimension)
 
 
 def settled(one: PolytopeArrays) -> PolytopeArrays | None:
@@ -84,7 +95,7 @@ def settled(one: PolytopeArrays) -> PolytopeArrays | None:
 
 @pytest.mark.parametrize("name", POLYTOPES)
 def test_a_moved_vertex_is_put_back_and_a_facet_that_cuts_it_off_is_refused(name: str) -> None:
-    one = POLYTOPES[name]
+    one = polytope(name)
     found = settled(one)
     assert found is not None
     assert (len(found.points), len(found.facets)) == (len(one.points), len(one.facets))

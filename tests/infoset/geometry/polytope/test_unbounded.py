@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
+from functools import cache
 from importlib.util import find_spec
 from typing import Any
 
@@ -16,11 +17,30 @@ from infoset.geometry.polytope import EmptyPolytopeError, Polytope, UnboundedPol
 from infoset.geometry.polytope.polyhedron import Polyhedron
 from tests.infoset.geometry.polytope.exact_sets import polyhedron
 
-QUADRANT = Polytope.from_rays([[0.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]])
-STRIP = Polytope.from_constraints([[0.0, 1.0], [0.0, -1.0]], [1.0, 1.0])
-BOX = Polytope.from_box([-1.0, -1.0], [1.0, 1.0])
-WEDGE = Polytope.from_rays([[0.0, 0.0, 1.0], [2.0, 0.0, 1.0]], [[0.0, 1.0, 0.0], [0.0, 1.0, 1.0]])
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
+
+
+# Functions and not constants: kernels are compiled when tests run, not when they are collected.
+
+
+@cache
+def quadrant() -> Polytope:
+    return Polytope.from_rays([[0.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]])
+
+
+@cache
+def strip() -> Polytope:
+    return Polytope.from_constraints([[0.0, 1.0], [0.0, -1.0]], [1.0, 1.0])
+
+
+@cache
+def box() -> Polytope:
+    return Polytope.from_box([-1.0, -1.0], [1.0, 1.0])
+
+
+@cache
+def wedge() -> Polytope:
+    return Polytope.from_rays([[0.0, 0.0, 1.0], [2.0, 0.0, 1.0]], [[0.0, 1.0, 0.0], [0.0, 1.0, 1.0]])
 
 
 def test_half_space_has_a_line_and_a_direction() -> None:
@@ -51,7 +71,7 @@ def test_the_whole_space_has_no_facet(space: int) -> None:
 def test_rays_inside_the_cone_of_others_are_left_out() -> None:
     cone = Polytope.from_rays([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 1.0], [2.0, 3.0], [0.0, 0.0]])
 
-    assert cone.equals(QUADRANT)
+    assert cone.equals(quadrant())
     assert cone.vertices.tolist() == [[0.0, 0.0]]
     assert sorted(cone.directions.tolist()) == [[0.0, 1.0], [1.0, 0.0]]
 
@@ -65,16 +85,16 @@ def test_opposite_rays_are_a_line() -> None:
 
 
 def test_points_without_rays_are_their_hull() -> None:
-    assert Polytope.from_rays(BOX.vertices, np.zeros((0, 2))).equals(BOX)
+    assert Polytope.from_rays(box().vertices, np.zeros((0, 2))).equals(box())
 
 
 def test_support_is_infinite_only_where_the_set_is_unbounded() -> None:
     directions = [[-1.0, -1.0], [-1.0, 0.0], [0.0, 1.0], [1e-300, -1.0]]
 
-    assert QUADRANT.support_function(directions).tolist() == [0.0, 0.0, np.inf, np.inf]
-    assert QUADRANT.support_vector([-1.0, -2.0]).tolist() == [0.0, 0.0]
+    assert quadrant().support_function(directions).tolist() == [0.0, 0.0, np.inf, np.inf]
+    assert quadrant().support_vector([-1.0, -2.0]).tolist() == [0.0, 0.0]
     with pytest.raises(UnboundedPolytopeError, match="along"):
-        QUADRANT.support_vector([1.0, 0.0])
+        quadrant().support_vector([1.0, 0.0])
 
 
 def test_support_along_a_facet_is_finite_in_spite_of_rounding() -> None:
@@ -87,51 +107,51 @@ def test_support_along_a_facet_is_finite_in_spite_of_rounding() -> None:
 
 
 def test_intersection_with_a_box_is_bounded() -> None:
-    part = QUADRANT & BOX
+    part = quadrant() & box()
 
     assert part.is_bounded
     assert part.equals(Polytope.from_box([0.0, 0.0], [1.0, 1.0]))
-    assert (STRIP & QUADRANT).directions.tolist() == [[1.0, 0.0]]
-    assert (QUADRANT & Polytope.halfspace([1.0, 1.0], -1.0)).is_empty
-    assert (QUADRANT & Polytope.halfspace([1.0, 1.0], 0.0)).vertices.tolist() == [[0.0, 0.0]]
-    assert (QUADRANT & Polytope.empty(2)).is_empty
+    assert (strip() & quadrant()).directions.tolist() == [[1.0, 0.0]]
+    assert (quadrant() & Polytope.halfspace([1.0, 1.0], -1.0)).is_empty
+    assert (quadrant() & Polytope.halfspace([1.0, 1.0], 0.0)).vertices.tolist() == [[0.0, 0.0]]
+    assert (quadrant() & Polytope.empty(2)).is_empty
 
 
 def test_cut_and_slice() -> None:
-    assert QUADRANT.cut([1.0, 1.0], upper=1.0).area() == pytest.approx(0.5, rel=1e-15)
-    assert QUADRANT.cut([1.0, 1.0], lower=1.0).vertices.shape == (2, 2)
-    np.testing.assert_array_equal(WEDGE.slice(2, 2.0).bounding_box(), [[0.0, 1.0], [2.0, np.inf]])
+    assert quadrant().cut([1.0, 1.0], upper=1.0).area() == pytest.approx(0.5, rel=1e-15)
+    assert quadrant().cut([1.0, 1.0], lower=1.0).vertices.shape == (2, 2)
+    np.testing.assert_array_equal(wedge().slice(2, 2.0).bounding_box(), [[0.0, 1.0], [2.0, np.inf]])
 
 
 def test_sums() -> None:
-    assert (QUADRANT + BOX).vertices.tolist() == [[-1.0, -1.0]]
-    assert (QUADRANT + -QUADRANT).equals(Polytope.space_of(2))
-    assert QUADRANT.add_segment([1.0, 0.0]).vertices.tolist() == [[-1.0, 0.0]]
-    assert QUADRANT.enlarged([2.0, 3.0]).vertices.tolist() == [[-2.0, -3.0]]
-    assert (QUADRANT.translate([5.0, 7.0])).vertices.tolist() == [[5.0, 7.0]]
+    assert (quadrant() + box()).vertices.tolist() == [[-1.0, -1.0]]
+    assert (quadrant() + -quadrant()).equals(Polytope.space_of(2))
+    assert quadrant().add_segment([1.0, 0.0]).vertices.tolist() == [[-1.0, 0.0]]
+    assert quadrant().enlarged([2.0, 3.0]).vertices.tolist() == [[-2.0, -3.0]]
+    assert (quadrant().translate([5.0, 7.0])).vertices.tolist() == [[5.0, 7.0]]
 
 
 def test_differences() -> None:
-    assert QUADRANT.minkowski_difference(BOX).vertices.tolist() == [[1.0, 1.0]]
-    assert QUADRANT.minkowski_difference(QUADRANT).equals(QUADRANT)
-    assert BOX.minkowski_difference(QUADRANT).is_empty
-    assert STRIP.minkowski_difference(BOX).dimension == 1
+    assert quadrant().minkowski_difference(box()).vertices.tolist() == [[1.0, 1.0]]
+    assert quadrant().minkowski_difference(quadrant()).equals(quadrant())
+    assert box().minkowski_difference(quadrant()).is_empty
+    assert strip().minkowski_difference(box()).dimension == 1
 
 
 def test_maps() -> None:
-    assert ([[1.0, -1.0]] @ QUADRANT).equals(Polytope.space_of(1))
-    assert (-QUADRANT).support_function([1.0, 1.0]) == 0.0
-    assert (np.zeros((1, 2)) @ QUADRANT).vertices.tolist() == [[0.0]]
-    np.testing.assert_array_equal(QUADRANT.project(1).bounding_box(), [[0.0], [np.inf]])
+    assert ([[1.0, -1.0]] @ quadrant()).equals(Polytope.space_of(1))
+    assert (-quadrant()).support_function([1.0, 1.0]) == 0.0
+    assert (np.zeros((1, 2)) @ quadrant()).vertices.tolist() == [[0.0]]
+    np.testing.assert_array_equal(quadrant().project(1).bounding_box(), [[0.0], [np.inf]])
 
 
 def test_preimage_of_a_singular_matrix_contains_its_null_space() -> None:
-    found = BOX.preimage([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0]], [0.5, 0.0])
+    found = box().preimage([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0]], [0.5, 0.0])
 
     np.testing.assert_allclose(found.lines @ [[1.0], [1.0], [0.0]], 0.0, atol=1e-15)
     np.testing.assert_allclose(found.support_function([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), [0.5, 0.5], rtol=1e-14)
-    assert BOX.preimage([[0.0, 0.0], [0.0, 0.0]]).equals(Polytope.space_of(2))
-    assert BOX.preimage([[0.0, 0.0], [0.0, 0.0]], [2.0, 0.0]).is_empty
+    assert box().preimage([[0.0, 0.0], [0.0, 0.0]]).equals(Polytope.space_of(2))
+    assert box().preimage([[0.0, 0.0], [0.0, 0.0]], [2.0, 0.0]).is_empty
 
 
 def test_hull_with_an_unbounded_set_is_closed() -> None:
@@ -141,49 +161,49 @@ def test_hull_with_an_unbounded_set_is_closed() -> None:
 
 
 def test_subsets() -> None:
-    assert Polytope.halfspace([-1.0, -1.0], 0.0) >= QUADRANT
-    assert not Polytope.halfspace([-1.0, -1.0], 0.0) <= QUADRANT
-    assert not QUADRANT <= BOX
-    assert Polytope.from_box([0.0, 0.0], [1e9, 1.0]) <= QUADRANT
+    assert Polytope.halfspace([-1.0, -1.0], 0.0) >= quadrant()
+    assert not Polytope.halfspace([-1.0, -1.0], 0.0) <= quadrant()
+    assert not quadrant() <= box()
+    assert Polytope.from_box([0.0, 0.0], [1e9, 1.0]) <= quadrant()
 
 
 def test_distances() -> None:
-    assert QUADRANT.distance([-3.0, -4.0]) == 5.0
-    assert QUADRANT.closest_point([-3.0, 7.0]).tolist() == [0.0, 7.0]
-    assert QUADRANT.distance((-QUADRANT).translate([-3.0, -4.0])) == 5.0
+    assert quadrant().distance([-3.0, -4.0]) == 5.0
+    assert quadrant().closest_point([-3.0, 7.0]).tolist() == [0.0, 7.0]
+    assert quadrant().distance((-quadrant()).translate([-3.0, -4.0])) == 5.0
     assert Polytope.halfspace([0.6, 0.8], 1.0).distance(Polytope.halfspace([-0.6, -0.8], -3.0)) == pytest.approx(2.0)
-    assert STRIP.distance(STRIP) == 0.0
+    assert strip().distance(strip()) == 0.0
 
 
 def test_separating_direction_of_unbounded_sets() -> None:
     one = Polytope.halfspace([0.0, 1.0], 0.0)
-    other = QUADRANT.translate([3.0, 1.0])
+    other = quadrant().translate([3.0, 1.0])
 
     assert one.separating_direction(other) is not None
     assert one.isdisjoint(other)
-    assert not one.isdisjoint(QUADRANT)
+    assert not one.isdisjoint(quadrant())
 
 
 def test_hausdorff_distance_is_finite_for_equal_recession_cones() -> None:
-    assert QUADRANT.hausdorff_distance(QUADRANT.translate([3.0, 0.0])) == 3.0
-    assert QUADRANT.hausdorff_distance(STRIP) == np.inf
-    assert QUADRANT.hausdorff_distance(BOX) == np.inf
+    assert quadrant().hausdorff_distance(quadrant().translate([3.0, 0.0])) == 3.0
+    assert quadrant().hausdorff_distance(strip()) == np.inf
+    assert quadrant().hausdorff_distance(box()) == np.inf
 
 
 def test_recession_cone() -> None:
-    assert (QUADRANT.translate([1.0, 2.0])).recession().equals(QUADRANT)
-    assert BOX.recession().vertices.tolist() == [[0.0, 0.0]]
+    assert (quadrant().translate([1.0, 2.0])).recession().equals(quadrant())
+    assert box().recession().vertices.tolist() == [[0.0, 0.0]]
     with pytest.raises(EmptyPolytopeError):
         Polytope.empty(2).recession()
 
 
 def test_largest_ball_of_a_strip_exists_and_that_of_a_quadrant_does_not() -> None:
-    centre, radius = STRIP.chebyshev_centre()
+    centre, radius = strip().chebyshev_centre()
 
     assert radius == pytest.approx(1.0)
     assert centre[1] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(UnboundedPolytopeError):
-        QUADRANT.chebyshev_centre()
+        quadrant().chebyshev_centre()
 
 
 @pytest.mark.parametrize(
@@ -197,16 +217,16 @@ def test_largest_ball_of_a_strip_exists_and_that_of_a_quadrant_does_not() -> Non
 )
 def test_what_only_bounded_sets_have_is_refused(ask: Callable[[Polytope], object]) -> None:
     with pytest.raises(UnboundedPolytopeError, match=r"unbounded along \("):
-        ask(QUADRANT)
+        ask(quadrant())
 
 
 def test_measures_are_infinite() -> None:
-    assert (QUADRANT.volume(), QUADRANT.area(), QUADRANT.diameter()) == (np.inf, np.inf, np.inf)
+    assert (quadrant().volume(), quadrant().area(), quadrant().diameter()) == (np.inf, np.inf, np.inf)
     assert Polytope.from_rays([[0.0, 0.0]], [[1.0, 2.0]]).area() == 0.0
 
 
 def test_product_with_an_unbounded_factor() -> None:
-    found = product(QUADRANT, Polytope.from_box([0.0], [1.0]))
+    found = product(quadrant(), Polytope.from_box([0.0], [1.0]))
 
     np.testing.assert_array_equal(found.bounding_box(), [[0.0, 0.0, 0.0], [np.inf, np.inf, 1.0]])
     assert (len(found.vertices), len(found.directions)) == (2, 2)
@@ -216,16 +236,16 @@ def test_plot_shows_the_part_within_the_limits_of_the_axes() -> None:
     axes = Figure().add_subplot()
     axes.set(xlim=(-2.0, 3.0), ylim=(4.0, -1.0))
 
-    (patch,) = QUADRANT.plot(axes)
+    (patch,) = quadrant().plot(axes)
 
     assert sorted(map(tuple, patch.get_xy()[:-1].tolist())) == [(0.0, 0.0), (0.0, 4.0), (3.0, 0.0), (3.0, 4.0)]
     assert (axes.get_xlim(), axes.get_ylim()) == ((-2.0, 3.0), (4.0, -1.0))
 
 
 def test_unbounded_set_survives_pickling_and_says_what_it_is() -> None:
-    again = pickle.loads(pickle.dumps(QUADRANT))
+    again = pickle.loads(pickle.dumps(quadrant()))
 
-    assert again.equals(QUADRANT)
+    assert again.equals(quadrant())
     assert repr(again) == "<unbounded polytope of dimension 2 in R^2: 1 vertices, 2 facets>"
 
 
