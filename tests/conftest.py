@@ -29,9 +29,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 PROFILE = os.environ.get("INFOSET_HYPOTHESIS_PROFILE", "default")
 TIMES = 32
+EXAMPLES = 40
+"""Examples of a property that sets no number; the profile `thorough` tries 3200."""
 
 # No property depends on the speed of the machine.
-settings.register_profile("default", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "default", derandomize=True, deadline=None, max_examples=EXAMPLES, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.register_profile(
     "thorough", settings.get_profile("default"), derandomize=False, max_examples=TIMES * settings().max_examples
 )
