@@ -230,7 +230,7 @@ def random_scenario(number: int) -> Scenario:
     )
 
 
-@pytest.mark.parametrize("number", [*range(12), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(12, 300))])
+@pytest.mark.parametrize("number", [*range(6), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(6, 300))])
 def test_random_flights_with_precise_angles_have_finite_impulses(number: int) -> None:
     scenario = random_scenario(number)
     for strategy in BASELINES:

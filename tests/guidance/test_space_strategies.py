@@ -121,7 +121,7 @@ def space() -> Scenario:
 
 
 @pytest.mark.parametrize("name", strategy_names())
-@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
+@pytest.mark.parametrize("noise", [pytest.param(NoiseKind.RANDOM, marks=pytest.mark.thorough), NoiseKind.GAME])
 def test_all_strategies_arrive_in_space(name: str, noise: NoiseKind) -> None:
     results = simulate(replace(space(), noise=noise), 6, strategy=name)
     assert np.median(results.miss_m) < 60.0

@@ -188,7 +188,7 @@ def fly(scenario: Scenario, draws: Draws) -> Results:
 
 
 @pytest.mark.parametrize("name", strategy_names())
-@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
+@pytest.mark.parametrize("noise", [pytest.param(NoiseKind.RANDOM, marks=pytest.mark.thorough), NoiseKind.GAME])
 def test_a_mirrored_engagement_is_mirrored(name: str, noise: NoiseKind) -> None:
     scenario = replace(with_long_steps(load_scenario("asteroid-1997")), strategy=name, noise=noise)
     draws = draw(scenario, range(8), 3)

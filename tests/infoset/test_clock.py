@@ -24,9 +24,10 @@ def decimal(draw: random.Random, maximum: int) -> Fraction:
     return Fraction(draw.randint(1, 1000 * maximum), 10 ** draw.choice((0, 1, 2, 3))) % maximum + Fraction(1, 1000)
 
 
-def test_it_is_the_nearest_step_of_random_times() -> None:
+@pytest.mark.parametrize("count", [4_000, pytest.param(20_000, marks=pytest.mark.thorough)])
+def test_it_is_the_nearest_step_of_random_times(count: int) -> None:
     draw = random.Random(1)
-    for _ in range(20_000):
+    for _ in range(count):
         step_s = decimal(draw, 100)
         start_s = decimal(draw, 50_000) % (100_000 * step_s)  # a flight has no more steps
         time_s = decimal(draw, 60_000) % (2 * start_s + 1)

@@ -83,7 +83,7 @@ def test_bands_contain_the_truth_and_are_convex(
     contain_and_are_convex(model, true, errors_of(error, extremal), label, elapsed_m)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=100)
 @given(
     st.floats(-9.0, -1.0), st.floats(-2.0, 5.0), st.floats(0.0, 2.0),
     st.tuples(signed, signed), st.tuples(signed, signed), st.booleans(), signed, st.floats(0.0, 0.5), shares,

@@ -76,8 +76,9 @@ def random_state(seed: int, share: float) -> Floats:
         4.0,
     ],
 )
-def test_states_on_any_conic_are_coasted(share: float, duration: float) -> None:
-    for seed in range(3):
+@pytest.mark.parametrize("seeds", [(0,), pytest.param((1, 2), marks=pytest.mark.thorough)])
+def test_states_on_any_conic_are_coasted(share: float, duration: float, seeds: tuple[int, ...]) -> None:
+    for seed in seeds:
         state = random_state(seed, share)
         with mp.workdps(40):
             exact = exactly_coasted(state, duration)

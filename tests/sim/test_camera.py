@@ -214,8 +214,8 @@ def sound(results: Results) -> bool:
 @pytest.mark.parametrize(
     "fields",
     [
-        {},
-        {"bias": Bias.CONSTANT},
+        pytest.param({}, marks=pytest.mark.thorough),
+        pytest.param({"bias": Bias.CONSTANT}, marks=pytest.mark.thorough),
         {"miss_probability": 0.5, "first_image_s": 2400.0, "last_image_s": 90.0},
         {"bias": Bias.CONSTANT, "miss_probability": 0.2},
     ],

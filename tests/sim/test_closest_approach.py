@@ -102,7 +102,7 @@ def drawn(number: int) -> tuple[Floats, Floats, Floats, float]:
 
 
 @pytest.mark.parametrize("sun", [None, SUN], ids=["free space", "gravity"])
-@pytest.mark.parametrize("number", [*range(24), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(24, 400))])
+@pytest.mark.parametrize("number", [*range(8), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(8, 400))])
 def test_minimum_distance_of_random_motions(number: int, sun: Sun | None) -> None:
     position, velocity, manoeuvres, step_s = drawn(number)
     motion = KeplerMotion(position[None], velocity[None], sun)

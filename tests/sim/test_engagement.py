@@ -45,7 +45,8 @@ def mirror(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
     return mirrored, Draws(draws.position_m * flip, draws.velocity_m_s * flip, errors, -draws.tie)
 
 
-@pytest.mark.parametrize("name", ["asteroid", "ranging", "comet"])
+# Of the comet the range is measured too.
+@pytest.mark.parametrize("name", ["asteroid", pytest.param("ranging", marks=pytest.mark.thorough), "comet"])
 @pytest.mark.parametrize(
     ("noise", "tie"),
     [

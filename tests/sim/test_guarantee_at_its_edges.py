@@ -107,7 +107,7 @@ def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
 SIDES = st.sampled_from([-1.0, 1.0]) | st.floats(-1.0, 1.0)
 
 
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(
     st.floats(-0.02, 0.02),
     st.floats(-40.0, 40.0),

@@ -101,7 +101,14 @@ def geometric_mean(ratios: Floats) -> float:
 
 
 @pytest.mark.parametrize(
-    "system", [WideSystem.random(7, 1), WideSystem.chain(8), WideSystem.springs(8), WideSystem.random(20, 1)]
+    "system",
+    [
+        WideSystem.random(7, 1),
+        WideSystem.chain(8),
+        WideSystem.springs(8),
+        WideSystem.random(12, 1),
+        pytest.param(WideSystem.random(20, 1), marks=pytest.mark.thorough),
+    ],
 )
 def test_true_state_with_errors_at_their_bounds_is_inside_the_window_bounds(system: WideSystem) -> None:
     states, measured = system.simulated(14, 3)
@@ -150,7 +157,9 @@ def hard_system(seed: int) -> tuple[LinearObserver, Floats, Floats]:
     return observer, np.array(true), np.array(measured)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(6, 12))]
+)
 def test_true_state_of_singular_flat_exact_unstable_systems_is_inside(seed: int) -> None:
     observer, states, measured = hard_system(seed)
 

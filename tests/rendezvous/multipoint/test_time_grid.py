@@ -100,7 +100,7 @@ def test_candidates_cost_what_their_paths_cost(
         assert candidate.objective == pytest.approx(path.cost + 1e-3 * candidate.time_s[-1], rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in (1, 2))])
 @pytest.mark.parametrize("meets", MIXED[:2])
 @pytest.mark.parametrize("dwell_s", [0.0, 0.3])
 def test_lowest_candidate_is_the_minimum_on_the_grid_of_three_visits(
