@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 import matplotlib as mpl
@@ -15,8 +16,17 @@ from matplotlib.figure import Figure
 from infoset import ConvexPolygons, Polytope, Zonotope
 from infoset.geometry.drawing import ring_order
 
-CUBE = Polytope.from_box([0, 0, 0], [1, 1, 1])
-SQUARE = ConvexPolygons.from_box([0, 0], [2, 1])
+# Functions and not constants: kernels are compiled when tests run, not when they are collected.
+
+
+@cache
+def cube() -> Polytope:
+    return Polytope.from_box([0, 0, 0], [1, 1, 1])
+
+
+@cache
+def square() -> ConvexPolygons:
+    return ConvexPolygons.from_box([0, 0], [2, 1])
 
 
 @pytest.fixture(autouse=True)
@@ -54,7 +64,7 @@ def test_set_of_the_plane_is_one_patch_of_its_vertices(kind: Any) -> None:
 
 def test_batch_is_drawn_member_by_member_without_the_empty_ones() -> None:
     ax = axes_of(2)
-    batch = ConvexPolygons.stack([SQUARE, ConvexPolygons.empty(), SQUARE.translate([3, 0])])
+    batch = ConvexPolygons.stack([square(), ConvexPolygons.empty(), square().translate([3, 0])])
 
     first, second = batch.plot(ax)
 
@@ -117,9 +127,9 @@ def test_set_of_any_dimension_is_visible(points: list[tuple[float, ...]], style:
 
 def test_facets_of_a_cube_are_its_six_squares() -> None:
     ax = axes_of(3)
-    (artist,) = CUBE.plot(ax)
+    (artist,) = cube().plot(ax)
     ax.figure.canvas.draw()
-    rings = CUBE._facet_rings()
+    rings = cube()._facet_rings()
 
     assert len(artist.get_paths()) == len(rings) == 6
     for ring in rings:
@@ -154,9 +164,9 @@ def test_edges_of_facets_join_vertices_with_two_common_facets(seed: int) -> None
 
 def test_faces_in_space_are_transparent_unless_the_style_says_otherwise() -> None:
     ax = axes_of(3)
-    (first,) = CUBE.plot(ax)
-    (second,) = CUBE.plot(ax, color="red")
-    (third,) = CUBE.plot(ax, facecolor="red", edgecolor="black", shade=False)
+    (first,) = cube().plot(ax)
+    (second,) = cube().plot(ax, color="red")
+    (third,) = cube().plot(ax, facecolor="red", edgecolor="black", shade=False)
 
     ax.figure.canvas.draw()
 
@@ -174,8 +184,8 @@ def test_faces_in_space_are_transparent_unless_the_style_says_otherwise() -> Non
 
 def test_sets_in_space_have_different_colours_and_are_within_the_limits() -> None:
     ax = axes_of(3)
-    (first,) = CUBE.translate([10, 20, 30]).plot(ax)
-    (second,) = CUBE.translate([14, 20, 30]).plot(ax)
+    (first,) = cube().translate([10, 20, 30]).plot(ax)
+    (second,) = cube().translate([14, 20, 30]).plot(ax)
     third = Polytope.from_vertices([[10, 29, 30]]).plot(ax)[0]
 
     ax.figure.canvas.draw()
@@ -187,24 +197,24 @@ def test_sets_in_space_have_different_colours_and_are_within_the_limits() -> Non
 
 
 def test_hatching_of_a_polygon_stays_visible() -> None:
-    (patch,) = SQUARE.plot(axes_of(2), hatch="//")
+    (patch,) = square().plot(axes_of(2), hatch="//")
 
     assert patch.get_hatchcolor() != patch.get_facecolor()
 
 
 def test_present_axes_are_used_if_they_have_as_many_dimensions() -> None:
     plane = plt.figure().add_subplot()
-    SQUARE.plot()
-    SQUARE.polytope().plot()
+    square().plot()
+    square().polytope().plot()
     assert len(plane.patches) == 2
 
-    CUBE.plot()
+    cube().plot()
     space = plt.gca()
     assert space.figure is not plane.figure
-    CUBE.plot()
+    cube().plot()
     assert len(space.collections) == 2
 
-    SQUARE.plot()
+    square().plot()
     assert plt.gca() not in (plane, space)
     assert len(plt.gca().patches) == 1
 
@@ -218,21 +228,23 @@ def test_axes_are_made_in_a_new_figure(dimension: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("each", "space"),
+    ("make", "space"),
     [
-        (SQUARE, 3),
-        (SQUARE.polytope(), 3),
-        (CUBE, 2),
-        (Polytope.empty(3), 2),
+        (square, 3),
+        (lambda: square().polytope(), 3),
+        (cube, 2),
+        (lambda: Polytope.empty(3), 2),
     ],
 )
-def test_axes_of_another_dimension_are_refused(each: Any, space: int) -> None:
+def test_axes_of_another_dimension_are_refused(make: Callable[[], Any], space: int) -> None:
+    each = make()
     with pytest.raises(ValueError, match=rf"a set of R\^{5 - space} is drawn on axes of {5 - space} dimensions: got"):
         each.plot(axes_of(space))
 
 
-@pytest.mark.parametrize("each", [SQUARE, CUBE])
-def test_argument_that_is_no_axes_is_refused(each: Any) -> None:
+@pytest.mark.parametrize("make", [square, cube])
+def test_argument_that_is_no_axes_is_refused(make: Callable[[], Any]) -> None:
+    each = make()
     with pytest.raises(TypeError, match="ax must be axes of matplotlib: got"):
         each.plot(np.array([axes_of(2), axes_of(2)]))
 
