@@ -61,6 +61,11 @@ def random_state(seed: int, share: float) -> Floats:
     return np.concatenate([radius * axes[0], speed * (np.cos(angle) * axes[0] + np.sin(angle) * axes[1])])
 
 
+def allowed_error(state: Floats, duration: float) -> float:
+    """Rounding of the state changes the period and the perigee, the rounding of the time shifts the state."""
+    return float(200.0 * EPSILON * (1.0 + abs(duration)) / perigee_m(state[:3], state[3:], 1.0) ** 1.5)
+
+
 @pytest.mark.parametrize("duration", [-30.0, -0.8, 1e-3, 2.0, 40.0])
 @pytest.mark.parametrize(
     "share",
@@ -85,10 +90,8 @@ def test_states_on_any_conic_are_coasted(share: float, duration: float, seeds: t
 
         found = coast(state, duration, 1.0)
 
-        # Rounding of the state changes the period and the perigee, the rounding of the time shifts the state.
-        allowed = 200.0 * EPSILON * (1.0 + abs(duration)) / perigee_m(state[:3], state[3:], 1.0) ** 1.5
         size = np.repeat([np.linalg.norm(exact[:3]), np.linalg.norm(exact[3:])], 3)
-        np.testing.assert_allclose(found / size, exact / size, rtol=0.0, atol=allowed)
+        np.testing.assert_allclose(found / size, exact / size, rtol=0.0, atol=allowed_error(state, duration))
 
 
 def test_many_states_of_all_kinds_are_coasted_at_once() -> None:
@@ -99,7 +102,11 @@ def test_many_states_of_all_kinds_are_coasted_at_once() -> None:
     assert found.shape == (3, 4, 6)
     for row in range(3):
         for column, duration in enumerate((-3.0, 0.0, 5.0, 7.0)):
-            np.testing.assert_array_equal(found[row, column], coast(states[row], duration, 1.0))
+            alone = coast(states[row], duration, 1.0)
+            # Libraries round functions of several numbers at once otherwise than those of one.
+            size = np.repeat([np.linalg.norm(alone[:3]), np.linalg.norm(alone[3:])], 3)
+            difference = (found[row, column] - alone) / size
+            assert np.abs(difference).max() <= allowed_error(states[row], duration)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,9 @@
 """Construction of polytopes: hulls of points, intersections of half-spaces, and cuts.
 
 Each set is computed in three steps. The double description finds vertices or facets with rounded numbers. What it finds
-is *settled*: what is redundant goes, and the rest is kept only if it proves to be all (`incidence.is_closed`), with the
-incidence of the double description or with that of all points within SNAP of a facet. Otherwise the set is computed
-again with integers (`cone`), which round nothing.
+is *settled* (`settled`): what is redundant goes, and the rest is kept only if it proves to be all
+(`incidence.is_closed`), with the incidence of the double description or with that of all points within SNAP of a
+facet. Otherwise the set is computed again with integers (`cone`), which round nothing.
 
 Whether half-spaces have an empty, flat or unbounded intersection is decided by integers. A cut of a set that exists is
 decided to ON of its size if it is empty, and to SNAP if it is flat.
@@ -48,14 +48,16 @@ Ends = tuple[Floats, Floats]
 FINE = 2.0**14
 """Ratio of widths from which a part of a set is computed in its own coordinates: its vertices are known to ON of the
 whole, which would be SNAP of a part 2000 times smaller than this."""
-_ROUND = 2.0**6
+_GOOD_WIDTH_RATIO = 2.0**6
 """Ratio of widths up to which coordinates are as good as those of the set itself: two digits are lost."""
 _LEAST_WIDTH = 64.0 * UNSURE / SNAP
 """Scale of an axis, relative to the coordinates from which limits were computed, in which their rounding is flat."""
-_PIVOTS = 64.0
+_PIVOT_GROWTH = 64.0
 """Growth of distances from a plane in the pivots of a flat set."""
-_SAME = 64.0 * SNAP
+_SAME_VERTEX = 64.0 * SNAP
 """Distance of points that are the same vertex: within SNAP of its facets, unless these are at a small angle."""
+_MEETING = 16.0 * SNAP
+"""Distance from a vertex of computed facets that meet in it; up to 6 SNAP were measured in observers of four states."""
 
 
 def empty(space: int) -> PolytopeArrays:
@@ -156,11 +158,11 @@ def _facets_of(points: Floats) -> tuple[Integers, Floats, Flags]:
             rays = np.array([cone.rounded(ray) for ray in exact.rays])
             on = exact.on
         # Rounding can divide a facet in two rays, each on some of its points: on all of them, they are one.
-        snapped, is_right = touching(points, rays, on.T.copy(), 0, 1.0)
+        snapped, is_consistent = touching(points, rays, on.T.copy(), 0, 1.0, SNAP)
         for one in (on.T.copy(), snapped):
             used, sides, incidence = without_redundant(one, dimension)
-            is_lost = loses_points(points, used, one, dimension, _SAME)
-            if is_right and not is_lost and is_closed(incidence, dimension):
+            is_lost = loses_points(points, used, one, dimension, _SAME_VERTEX)
+            if is_consistent and not is_lost and is_closed(incidence, dimension):
                 return used, rays[sides, :-1].copy(), incidence
     # Facets at a small angle: what is on which is as the integers say.
     used, sides, incidence = without_redundant(on.T.copy(), dimension)
@@ -202,7 +204,10 @@ def of_half_spaces(
         found = _rounded(rows, limits, start, *frame)
         if found is None:
             break
-        if np.abs(found.points).max() <= _ROUND and np.ptp(found.points, axis=0).min() >= 1.0 / _ROUND:
+        if (
+            np.abs(found.points).max() <= _GOOD_WIDTH_RATIO
+            and np.ptp(found.points, axis=0).min() >= 1.0 / _GOOD_WIDTH_RATIO
+        ):
             return found
         frame = _frame_of(*found.bounding_box())
     if sizes is not None:
@@ -263,11 +268,11 @@ def _with_integers(rows: Floats, limits: Floats, origin: Floats, sizes: Floats) 
     found = settled(rough, 0)
     if found is not None:
         return found
-    if _spans_less(points, _PIVOTS * SNAP):
-        return hull(points, centre, scale, _PIVOTS * SNAP)
+    if _spans_less(points, _PIVOT_GROWTH * SNAP):
+        return hull(points, centre, scale, _PIVOT_GROWTH * SNAP)
     # Facets at a small angle: what is on which is as the integers say.
-    used, sides, _ = without_redundant(rough.incidence, rough.dimension)
-    return _reduced(rough, 0, used, sides)
+    used, sides, kept = without_redundant(rough.incidence, rough.dimension)
+    return _reduced(rough, 0, used, sides, kept, SNAP * max(1.0, float(np.abs(points).max())))
 
 
 def _unbounded(exact: cone.Vertices) -> Polyhedron:
@@ -354,13 +359,22 @@ def cut(whole: PolytopeArrays, rows: Floats, limits: Floats, origin: Floats | fl
     found = settled(part, len(whole.facets))
     if found is not None and not _is_small_part(found, whole):
         return found
-    again = _of_near_half_spaces(part)
-    if again is None:
-        again = of_half_spaces(*half_spaces(part, whole.centre), whole.centre, whole.bounding_box())
-    if again.is_empty:
-        # It touches the half-spaces, to rounding.
-        return found or hull(part.points, part.centre, part.scale)
-    return again
+
+    again = _computed_again(part, whole)
+    if not again.is_empty:
+        return again
+    # It touches the half-spaces, to rounding: in less than a point, the integers say.
+    if found is not None:
+        return found
+    return hull(part.points, part.centre, part.scale)
+
+
+def _computed_again(part: PolytopeArrays, whole: PolytopeArrays) -> PolytopeArrays:
+    """Return a part of a set from its half-spaces alone: those that are near it, or if these are not enough, all."""
+    few = _of_near_half_spaces(part)
+    if few is not None:
+        return few
+    return of_half_spaces(*half_spaces(part, whole.centre), whole.centre, whole.bounding_box())
 
 
 def _of_near_half_spaces(part: PolytopeArrays) -> PolytopeArrays | None:
@@ -405,43 +419,64 @@ def _is_small_part(part: PolytopeArrays, whole: PolytopeArrays) -> bool:
     return bool(((FINE * widths < before) & (widths > SNAP * before)).any())
 
 
-def settled(rough: PolytopeArrays, old: int) -> PolytopeArrays | None:
+def settled(rough: PolytopeArrays, known: int) -> PolytopeArrays | None:
     """Return a set without what is redundant, or None if vertices and facets are not certainly all.
 
-    Vertices on facets after the first `old` were computed: they move to the outer sides of their facets. Facets on
-    which all vertices lie are equations of a set of lower dimension: the hull of its vertices.
+    The first `known` facets are those of a set that was settled before. Vertices on others were computed: they are
+    compared with all facets, and move to the outer sides of their own. 0 means that all were computed.
+
+    Facets that were themselves computed need not meet in one point. If a vertex is not within SNAP of its facets, the
+    vertices are computed again from them, and may then be _MEETING away.
+
+    Points within SNAP of a facet are on it where the result is not closed otherwise: vertices nearer to each other are
+    one. Facets on which all vertices lie are equations of a set of lower dimension: the hull of its vertices.
     """
     size = max(1.0, float(np.abs(rough.points).max()))
-    on, is_right = touching(rough.points, rough.facets, rough.incidence, old, size)
-    if not is_right:
-        rough = replace(rough, points=refined(rough.points, rough.facets, rough.equations, rough.incidence, old))
-        on, is_right = touching(rough.points, rough.facets, rough.incidence, old, size)
-    if not is_right:
+    far = SNAP * size
+    on, is_consistent = touching(rough.points, rough.facets, rough.incidence, known, size, far)
+    if not is_consistent:
+        rough = replace(rough, points=refined(rough.points, rough.facets, rough.equations, rough.incidence, known))
+        far = _MEETING * size
+        on, is_consistent = touching(rough.points, rough.facets, rough.incidence, known, size, far)
+    if not is_consistent:
         return None
     if _is_flat(on, rough.dimension):
-        return _flat_part(replace(rough, incidence=on), old)
+        return _flat_part(replace(rough, incidence=on), known)
 
     # What is on which by the steps of the double description is finer than by distances, if it is all.
     for incidence in (rough.incidence, on):
         used, sides, kept = without_redundant(incidence, rough.dimension)
-        if loses_points(rough.points, used, incidence, rough.dimension, _SAME * size):
+        if loses_points(rough.points, used, incidence, rough.dimension, _SAME_VERTEX * size):
             continue
         if is_closed(kept, rough.dimension):
-            return _reduced(replace(rough, incidence=incidence), old, used, sides)
+            return _reduced(replace(rough, incidence=incidence), known, used, sides, kept, far)
     return None
 
 
-def _flat_part(whole: PolytopeArrays, old: int) -> PolytopeArrays | None:
-    """Return the hull of points that are all on a facet; None if it is not flat."""
+def _flat_part(whole: PolytopeArrays, known: int) -> PolytopeArrays | None:
+    """Return the hull of points that are all on a facet; None if it is not flat, or if the set of the facets is not."""
+    if _has_interior(whole):
+        return None
     near = SNAP * max(1.0, float(np.abs(whole.points).max()))
-    points = push_out(whole.points, whole.facets, whole.incidence, old, True, near)
+    points = push_out(whole.points, whole.facets, whole.incidence, known, True, near)
     # Rounding grows across the facets on which all points are, and in no other direction.
     planes = np.ascontiguousarray(whole.facets[whole.incidence.all(axis=0), :-1])
     expected = whole.dimension - len(dd.pivots(planes, REDUCED, -1)[0]) if len(planes) else 0
-    flat = hull(points, whole.centre, whole.scale, _PIVOTS * SNAP)
+    flat = hull(points, whole.centre, whole.scale, _PIVOT_GROWTH * SNAP)
     if flat.dimension < expected:
         flat = hull(points, whole.centre, whole.scale)
     return flat if flat.dimension < whole.dimension else None
+
+
+def _has_interior(whole: PolytopeArrays) -> bool:
+    """Whether a point beside the middle of the points, REDUCED inward, is in the set of the facets.
+
+    Then points that are all on one facet are not all vertices: one that is not on it was lost.
+    """
+    planes = whole.facets[whole.incidence.all(axis=0), :-1]
+    middle = whole.points.mean(axis=0)
+    inside = middle - REDUCED * planes.sum(axis=0)
+    return bool((whole.facets[:, :-1] @ inside < whole.facets[:, -1] - _SAME_VERTEX).all())
 
 
 def _is_flat(on: Flags, dimension: int) -> bool:
@@ -449,14 +484,16 @@ def _is_flat(on: Flags, dimension: int) -> bool:
     return len(on) <= dimension or bool(on.all(axis=0).any())
 
 
-def _reduced(rough: PolytopeArrays, old: int, used: Integers, sides: Integers) -> PolytopeArrays:
-    """Return a set with some of its points and facets, new vertices on the outer sides of their facets."""
-    still = len(rough.equations) > 0
-    most = SNAP * max(1.0, float(np.abs(rough.points).max()))
-    points = push_out(rough.points, rough.facets, rough.incidence, old, still, most)
-    return replace(
-        rough, points=points[used], facets=rough.facets[sides], incidence=rough.incidence[np.ix_(used, sides)]
-    )
+def _reduced(
+    rough: PolytopeArrays, known: int, used: Integers, sides: Integers, kept: Flags, most: float
+) -> PolytopeArrays:
+    """Return a set with some of its points and facets, `kept` which of them are on which.
+
+    New vertices move to the outer sides of their facets, by at most a distance `most`.
+    """
+    is_flat = len(rough.equations) > 0
+    points = push_out(rough.points, rough.facets, rough.incidence, known, is_flat, most)
+    return replace(rough, points=points[used], facets=rough.facets[sides], incidence=kept)
 
 
 def enlarged(one: PolytopeArrays, by: Floats) -> PolytopeArrays:

@@ -53,36 +53,37 @@ def image(
 
 
 @_kernels.compiled
-def touching(points: Floats, facets: Floats, on: Flags, old: int, size: float) -> tuple[Flags, bool]:
-    """Return which points are on which facets, also those that are within SNAP of them, and whether this is right.
+def touching(points: Floats, facets: Floats, on: Flags, known: int, size: float, far: float) -> tuple[Flags, bool]:
+    """Return which points are on which facets, also those within SNAP of them, and whether the points are consistent.
 
-    It is wrong if a point is farther outside of a facet, or farther from one that it is `on`, shape (v, f). Only points
-    on facets after the first `old` are looked at. `size` is that of the points.
+    They are not if a point is outside of a facet, or away from one that it is `on`, shape (v, f), by more than `far`.
+    Only points on facets after the first `known` are looked at. `size` is that of the points.
     """
     n = points.shape[1]
+    units = np.array([size_of(facet) for facet in facets])
     result = on.copy()
-    is_right = True
+    is_consistent = True
     for i in range(len(points)):
-        if old > 0 and not on[i, old:].any():
+        if known > 0 and not on[i, known:].any():
             continue
         for j in range(len(facets)):
             height = dot(points[i], facets[j]) - facets[j, n]
-            near = SNAP * size * size_of(facets[j])
-            is_right &= height <= near and (height >= -near or not on[i, j])
-            result[i, j] |= height >= -near
-    return result, is_right
+            limit = far * units[j]
+            is_consistent &= height <= limit and (height >= -limit or not on[i, j])
+            result[i, j] |= height >= -SNAP * size * units[j]
+    return result, is_consistent
 
 
 @_kernels.compiled
-def refined(points: Floats, facets: Floats, equations: Floats, on: Flags, old: int) -> Floats:
-    """Return points, those on facets after the first `old` computed again: nearest to where their facets meet.
+def refined(points: Floats, facets: Floats, equations: Floats, on: Flags, known: int) -> Floats:
+    """Return points, those on facets after the first `known` computed again: nearest to where their facets meet.
 
     Cuts of a small part combine points that are far from it, so that their rounding grows.
     """
     n = points.shape[1]
     result = points.copy()
     for i in range(len(points)):
-        if old > 0 and not on[i, old:].any():
+        if known > 0 and not on[i, known:].any():
             continue
         rows = np.concatenate((facets[on[i]], equations))
         gaps = np.array([row[n] - dot(points[i], row) for row in rows])
@@ -174,19 +175,20 @@ def _push(point: Floats, facets: Floats, mine: Integers, centre: Floats, flat: b
 
 
 @_kernels.compiled
-def push_out(points: Floats, facets: Floats, on: Flags, old: Any, flat: bool, most: float) -> Floats:
-    """Return points, shape (v, n): those on facets after the first `old` are not inside their facets, if `most` allows.
+def push_out(points: Floats, facets: Floats, on: Flags, known: Any, flat: bool, most: float) -> Floats:
+    """Return points, shape (v, n), moved so that they are not inside their facets, if `most` allows.
 
-    Then the hull of the points contains the set of the facets: a map of the set to the hull that takes each facet to
-    its outer side covers the set. A point that is exactly on its facets stays. The others move across their facets
-    (`_cross_facets`), or where this fails, at a sharp corner, and in a `flat` set, away from the centre. No point moves
-    by more than `most`: where rounding moves facets more than the vertex, the hull may lack the very tip.
+    Points on none but the first `known` facets stay. Then the hull of the points contains the set of the facets: a map
+    of the set to the hull that takes each facet to its outer side covers the set. A point that is exactly on its facets
+    stays. The others move across their facets (`_cross_facets`), or where this fails, at a sharp corner, and in a
+    `flat` set, away from the centre. No point moves by more than `most`: where rounding moves facets more than the
+    vertex, the hull may lack the very tip.
     """
     n, f, result, centre = points.shape[1], len(facets), points.copy(), points.sum(axis=0) / len(points)
     work, mine = (np.empty(f), np.empty(n), np.empty((min(3, n), n))), np.empty(f, np.int64)
     whole = np.array([on[:, k].all() for k in range(f)])  # rows of the affine hull
     for i in range(len(points)):
-        if on[i, old:].any():
+        if on[i, known:].any():
             count = 0
             for k in range(f):
                 mine[count] = k

@@ -77,8 +77,9 @@ class Polytope(PolytopeArrays, ConvexSet):
     The other set of an operation may be a single polygon, one of `ConvexPolygons`: it is converted.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
-    `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding). `P == Q` compares objects; `equals` compares sets. The
-    vertices are in no order; `plot` and `to_shapely` order those of a set of the plane.
+    `2 * P`, `-P`, `point in P`, `P <= Q` (subset, to rounding); `ConvexSet` defines them by the methods of these names.
+    `P == Q` compares objects; `equals` compares sets. The vertices are in no order; `plot` and `to_shapely` order those
+    of a set of the plane.
     """
 
     def polytope(self) -> Polytope:
@@ -270,7 +271,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         two = self._need_other(other)
         if self.is_empty or two.is_empty:
             return self if self.is_empty else two
-        if self._is_exact_with(two):
+        if self._any_is_unbounded(two):
             return self._of(construction.of_polyhedron(polyhedron.total(self._polyhedron, two._polyhedron)))
         pairs = [np.repeat(self.points, len(two.points), axis=0), np.tile(two.points, (len(self.points), 1))]
         centre, scale = np.append(self.centre, two.centre), np.append(self.scale, two.scale)
@@ -343,7 +344,7 @@ class Polytope(PolytopeArrays, ConvexSet):
             return self
         if two.is_empty:
             raise ValueError("the difference with an empty set is unbounded")
-        if self._is_exact_with(two):
+        if self._any_is_unbounded(two):
             inward = polyhedron.moved_inward(self._polyhedron.half_spaces, two._polyhedron)
             if inward is None:
                 return self.empty(self.space)
@@ -361,13 +362,17 @@ class Polytope(PolytopeArrays, ConvexSet):
         return self._of(construction.of_half_spaces(rows, less, self.centre, ends, sizes))
 
     def intersection(self, *others: ConvexSet) -> Polytope:
-        """Return the intersection with one or more polytopes: one step of the double description for each facet."""
+        """Return the intersection with one or more polytopes: one step of the double description for each facet.
+
+        If one of them is unbounded, it is computed with integers.
+        """
         every = (self, *map(self._need_other, others))
-        if self._is_exact_with(*every):
+        if self._any_is_unbounded(*every):
             if any(one.is_empty for one in every):
                 return self.empty(self.space)
             rows = [row for one in every for row in one._polyhedron.half_spaces]
             return self._of(construction.of_polyhedron(polyhedron.of_half_spaces(self.space, rows)))
+        # A flat set first: cuts of it stay in its affine hull. Then one with many facets: those are not inserted again.
         sets = sorted(every, key=lambda one: (one.dimension, -len(one.facets)))
         found = sets[0]
         for one in sets[1:]:
@@ -378,7 +383,8 @@ class Polytope(PolytopeArrays, ConvexSet):
     def _cut_by(self, other: Polytope) -> Polytope:
         """Return the intersection with another bounded set.
 
-        One that is much smaller than this set is computed from all half-spaces together, in its own coordinates.
+        One that is much smaller than this set is computed from all half-spaces together, in its own coordinates. `cut`
+        asks the same of its result: boxes that overlap do not show how small it is.
         """
         ends = np.array([self.bounding_box(), other.bounding_box()])
         lower = ends[:, 0].max(axis=0)
@@ -389,6 +395,7 @@ class Polytope(PolytopeArrays, ConvexSet):
             own, own_limits = half_spaces(self, other.centre)
             every = np.vstack([own, rows]), np.append(own_limits, limits)
             found = construction.of_half_spaces(*every, other.centre, (lower, upper))
+            # If it is flatter than this set, rounding may decide that: a cut keeps what touches.
             if len(found.equations) == len(self.equations):
                 return self._of(found)
         return self._of(construction.cut(self, rows, limits, other.centre))
@@ -396,7 +403,7 @@ class Polytope(PolytopeArrays, ConvexSet):
     def convex_hull(self, *others: ConvexSet) -> Polytope:
         """Return the convex hull of the union with one or more polytopes; its closure if one is unbounded."""
         sets = [one for one in (self, *map(self._need_other, others)) if not one.is_empty]
-        if self._is_exact_with(*sets):
+        if self._any_is_unbounded(*sets):
             return self._of(construction.of_polyhedron(polyhedron.hull([one._polyhedron for one in sets])))
         return self.from_vertices(np.vstack([one.vertices for one in sets])) if sets else self
 
@@ -463,7 +470,7 @@ class Polytope(PolytopeArrays, ConvexSet):
             raise ValueError(f"other must be a set in R^{self.space}, as this one: got {other!r}")
         return polytope
 
-    def _is_exact_with(self, *others: Polytope) -> bool:
+    def _any_is_unbounded(self, *others: Polytope) -> bool:
         """Whether an operation on some sets is computed in exact integers: one of them is unbounded."""
         return not all(one.is_bounded for one in (self, *others))
 
@@ -635,7 +642,7 @@ class Polytope(PolytopeArrays, ConvexSet):
 
     def _nearest_difference(self, other: Polytope) -> Floats:
         """Return the difference x - y of nearest points x of this set and y of the other, shape (n,)."""
-        if not self._is_exact_with(other):
+        if not self._any_is_unbounded(other):
             return nearest_pair(self.vertices, other.vertices).difference
         # The nearest difference is at most as long as the one of two points, so that it is in a box of this size.
         differences = self + -other
@@ -669,7 +676,7 @@ class Polytope(PolytopeArrays, ConvexSet):
         """
         two = self._need_other(other)
         have_points = not (self.is_empty or two.is_empty)
-        if have_points and self._is_exact_with(two) and not self.recession().equals(two.recession()):
+        if have_points and self._any_is_unbounded(two) and not self.recession().equals(two.recession()):
             return float("inf")
         from_this = [two.distance(vertex) for vertex in self.vertices]
         from_other = [self.distance(vertex) for vertex in two.vertices]
