@@ -15,8 +15,9 @@ class Multipoint(FileOptions):
     """Visit several moving targets with minimum energy.
 
     Each target is visited by a flyby or a rendezvous. With --order best and --times given, the times of the file are
-    kept and the targets are exchanged: the target that is visited first has the earliest time. Without --out, --json,
-    --csv or --html no file is written.
+    kept and the targets are exchanged: the target that is visited first has the earliest time. With max_control_m_s2
+    in the problem, the control stays within this bound at all times. Without --out, --json, --csv or --html no file is
+    written.
 
     Axes: with orbit_rate_rad_s, x radially outward, y along the motion, z along the orbit's normal; otherwise inertial.
     """

@@ -63,7 +63,7 @@ class MultipointProblem:
     gravitational_parameter_m3_s2 : float
         Gravity of the attracting point, in place of `orbit_rate_rad_s`, which makes the axes inertial.
     max_control_m_s2 : float or None
-        Bound on the control.
+        Bound on the control at all times: imposed in Hill's axes, checked in inertial ones.
     optimise_times : bool
         Whether the times of the visits are optimised.
     chaser : BodyTable

@@ -22,15 +22,33 @@ _ENOUGH_A_REVOLUTION = 20.0
 """Times of a grid in a revolution: with fewer, its lowest costs may be in other valleys than the minima."""
 
 
+@dataclass(frozen=True)
+class ImposedBound:
+    """A bound on the control, m/s^2, that the minimum-energy control without it exceeds.
+
+    `least_m_s2` is the smallest bound with which the visits are possible at the times without the bound; `cost_without`
+    (m^2/s^3) and `peak_without_m_s2` belong to the path without it.
+    """
+
+    max_m_s2: float
+    least_m_s2: float
+    cost_without: float
+    peak_without_m_s2: float
+
+
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Results of one command; `peak_m_s2` is the largest control. Axes are Hill's or inertial."""
+    """Results of one command; `peak_m_s2` is the largest control. Axes are Hill's or inertial.
+
+    There is no `imposed` bound if the problem has none, or the minimum-energy control without it keeps it.
+    """
 
     problem: MultipointProblem
     order_chosen: Literal["given", "best"]
     times_chosen: Literal["given", "best"]
     best: BestOrder
     peak_m_s2: float
+    imposed: ImposedBound | None = None
 
     @property
     def hill(self) -> bool:
@@ -86,6 +104,8 @@ class Report:
         notes = []
         if self.order_chosen == "best":
             notes.append(self._order_note())
+        if self.imposed is not None:
+            notes += self._bound_notes(self.imposed)
         search = self.best.time_search
         if search is None:
             return notes
@@ -106,6 +126,18 @@ class Report:
                 f"over {self.revolutions:.2g} revolutions there are many local minima, and others are often lower: "
                 "compare the costs from different time_s"
             )
+        return notes
+
+    def _bound_notes(self, imposed: ImposedBound) -> list[str]:
+        notes = [
+            f"the bound of {imposed.max_m_s2:g} m/s^2 is imposed: without it the cost is {imposed.cost_without:.8g} "
+            f"m^2/s^3 and the peak {imposed.peak_without_m_s2:.4g} m/s^2; the smallest possible bound is "
+            f"{imposed.least_m_s2:.6g} m/s^2"
+        ]
+        if self.order_chosen == "best":
+            notes.append("the order was chosen without the bound")
+        if self.times_chosen == "best":
+            notes.append("the best times without the bound were improved with it")
         return notes
 
     def _order_note(self) -> str:
@@ -156,12 +188,24 @@ def report_json(report: Report) -> dict[str, object]:
         "nodes": [_node_json(report, index) for index in range(len(report.names))],
         "costate0": {"position_m_s3": path.costate_start[:3], "velocity_m_s2": path.costate_start[3:]},
         "peak_control_m_s2": report.peak_m_s2,
+        "imposed_bound": _imposed_json(report.imposed),
         "evaluations": report.best.evaluations,
         "orders_begun": report.best.nodes,
         "orders_left_out": len(report.best.lost),
         "order_search": _order_search_json(report),
         "time_search": _time_search_json(report),
         "notes": report.notes,
+    }
+
+
+def _imposed_json(imposed: ImposedBound | None) -> dict[str, object] | None:
+    if imposed is None:
+        return None
+    return {
+        "max_control_m_s2": imposed.max_m_s2,
+        "smallest_possible_m_s2": imposed.least_m_s2,
+        "cost_without_m2_s3": imposed.cost_without,
+        "peak_control_without_m_s2": imposed.peak_without_m_s2,
     }
 
 
@@ -239,6 +283,7 @@ def report_lines(report: Report) -> Iterator[Part]:
         )
     yield table
     if "best" not in (report.order_chosen, report.times_chosen):
+        yield from report.notes
         return
     text = f"{report.best.evaluations} paths computed"
     if report.order_chosen == "best":

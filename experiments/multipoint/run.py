@@ -12,8 +12,19 @@ from infoset.experiments.common.screen import BeginProgress
 from infoset.experiments.multipoint.command import Multipoint
 from infoset.experiments.multipoint.file import MultipointProblem
 from infoset.experiments.multipoint.page import multipoint_page
-from infoset.experiments.multipoint.report import Report, report_json, report_lines, trajectories
-from infoset.rendezvous.multipoint import MAX_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
+from infoset.experiments.multipoint.report import ImposedBound, Report, report_json, report_lines, trajectories
+from infoset.rendezvous.bounded_control import BoundTooSmallError
+from infoset.rendezvous.multipoint import (
+    MAX_TARGETS,
+    BestOrder,
+    Tour,
+    best_order,
+    best_order_of_slots,
+    best_times,
+    bound_visits,
+    needed_bound,
+)
+from infoset.rendezvous.multipoint.segments import LinearPath
 from infoset.rendezvous.piecewise import max_control
 
 
@@ -29,12 +40,43 @@ def solve(problem: MultipointProblem, options: Multipoint, begin: BeginProgress)
         raise InputError(f"{problem.name}: times.latest_s: is before the last time_s; make it later, or remove it")
     best = _best(problem, options.order == "best", times == "best", begin("orders and times"))
     peak = max_control(best.path.control, best.path.breaks())
-    if bound is not None and peak > bound:
+    if bound is None or peak <= bound:
+        return Report(problem, options.order, times, best, peak)
+
+    bounded, least = _within_bound(problem, best, peak, bound, times == "best")
+    imposed = ImposedBound(bound, least, best.path.cost, peak)
+    return Report(
+        problem, options.order, times, bounded, max_control(bounded.path.control, bounded.path.breaks()), imposed
+    )
+
+
+def _within_bound(
+    problem: MultipointProblem, best: BestOrder, peak: float, bound: float, times_are_free: bool
+) -> tuple[BestOrder, float]:
+    """Return the visits with the bound imposed, and the smallest possible bound at the times of `best`."""
+    tour, path = problem.tour, best.path
+    key = f"{problem.name}: max_control_m_s2"
+    if not (isinstance(tour, Tour) and isinstance(path, LinearPath)):
         raise InputError(
-            f"{problem.name}: max_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
-            f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
+            f"{key}: the minimum-energy control reaches {peak:.6g} m/s^2, {peak / bound - 1.0:.2%} over the bound of "
+            f"{bound:g} m/s^2, and under the gravity of one point the bound is checked but not imposed; raise it, or "
+            "give the visits more time"
         )
-    return Report(problem, options.order, times, best, peak)
+    least = needed_bound(path)
+    guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
+    try:
+        return bound_visits(tour, best, bound, problem.limits() if times_are_free else None, guesses), least
+    except BoundTooSmallError:
+        where = "at the best times without a bound" if times_are_free else "at these times"
+        if bound < least:
+            raise InputError(
+                f"{key}: no control of at most {bound:g} m/s^2 makes the visits {where}; at least {least:.6g} m/s^2 is "
+                "needed; raise it, or give the visits more time"
+            ) from None
+        raise InputError(
+            f"{key}: {bound:g} m/s^2 is too close to the smallest possible bound {where}, {least:.6g} m/s^2; raise it "
+            f"to {1.001 * least:.6g} m/s^2, or give the visits more time"
+        ) from None
 
 
 def _best(

@@ -16,8 +16,8 @@ class Pareto(FileOptions):
 
     Pareto-optimal means that no craft can save energy unless another one uses more. Each craft moves with minimum
     energy. The excess of a craft is its cost minus the cost of its cheapest meeting. The meeting minimizes the group
-    loss, which is the weighted sum of the excesses. Other choices of the meeting, the coalitions and the bound on the
-    control are also evaluated.
+    loss, which is the weighted sum of the excesses. Other choices of the meeting and the coalitions are also evaluated.
+    With max_control_m_s2 in the problem, the controls to the meeting stay within this bound at all times.
 
     Without --out, --json, --csv or --html no file is written.
 

@@ -54,21 +54,20 @@ def _names(solution: EncounterSolution) -> list[str]:
 
 def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
-    solution = report.solution
-    yield draw_trajectories(solution)
-    yield draw_controls(solution, report.problem.max_control_m_s2)
+    yield draw_trajectories(report)
+    yield draw_controls(report)
     yield draw_front(report)
 
 
 @style()
-def draw_trajectories(solution: EncounterSolution) -> Figure:
+def draw_trajectories(report: Report) -> Figure:
     """Draw the trajectories in space and in three planes."""
     figure = new_figure(150.0)
     panels = figure.subplot_mosaic("ab;cd", per_subplot_kw={"b": {"projection": "3d"}})
-    plans = map(solution.plan, range(len(solution.costs)))
-    paths = [plan.state(plan.times(_POINTS))[:, :3] for plan in plans]
+    solution = report.solution
+    paths = [flight.state(flight.times(_POINTS))[:, :3] for flight in report.flights]
     unit, per_m = length_unit(max(float(np.abs(path).max()) for path in paths))
-    meeting = solution.meeting_state()[:3] * per_m
+    meeting = solution.meeting_state(report.point)[:3] * per_m
     titles = [f"{title}, {unit}" for title in AXIS_TITLES]
     for panel, axes in zip(panels.values(), _VIEWS, strict=True):
         for index, (name, path) in enumerate(zip(_names(solution), paths, strict=True)):
@@ -84,16 +83,16 @@ def draw_trajectories(solution: EncounterSolution) -> Figure:
 
 
 @style()
-def draw_controls(solution: EncounterSolution, bound_m_s2: float | None = None) -> Figure:
+def draw_controls(report: Report) -> Figure:
     """Draw the components and the magnitude of the controls against time, with the bound if there is one."""
     figure, grid = subplots(120.0, 2, 2, sharex=True)
     panels = [*grid.flat]
-    for index, name in enumerate(_names(solution)):
-        plan = solution.plan(index)
-        times = plan.times(_POINTS)
-        control = plan.control(times)
+    for index, (name, flight) in enumerate(zip(_names(report.solution), report.flights, strict=True)):
+        times = flight.times(_POINTS)
+        control = flight.control(times)
         for axes, values in zip(panels, (*control.T, np.linalg.norm(control, axis=1)), strict=True):
             axes.plot(times, values, **_look(index, marker="none", label=name))
+    bound_m_s2 = report.problem.max_control_m_s2
     if bound_m_s2 is not None:
         panels[3].axhline(bound_m_s2, label="bound of the control", **BOUND)
     for axes, quantity in zip(panels, (*component_titles("u"), "$|u|$"), strict=True):

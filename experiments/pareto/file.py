@@ -61,7 +61,7 @@ class ParetoProblem:
     meet : Meeting
         A rendezvous, or an intercept: the same position, and any velocities.
     max_control_m_s2 : float or None
-        Bound on the control of each craft.
+        Bound on the control of each craft at all times; it is imposed.
     terminal : TerminalTable
         Components that are not free.
     craft : tuple of CraftTable

@@ -10,7 +10,7 @@ from infoset.arrays import Floats
 from infoset.experiments.common.hill_axes import AXES, AXIS_TITLES
 from infoset.experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
 from infoset.experiments.common.units import length_unit
-from infoset.experiments.pareto.report import CHOICES, Report
+from infoset.experiments.pareto.report import CHOICES, Report, imposed_text
 from infoset.rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
 MOMENTS = 121
@@ -40,6 +40,10 @@ def pareto_page(report: Report) -> str:
         f"axes: {AXES}",
         "Drag the meeting, or type its components, to see the costs of the craft and the group loss.",
     ]
+    if report.imposed is not None:
+        about.append(
+            f"This page is without the bound on the control. {_sentence(imposed_text(report, report.imposed))}"
+        )
     data = {
         "free": [{"name": name, "unit": "m" if len(name) == 1 else "m/s"} for name in free],
         "point": solution.point,
@@ -64,6 +68,10 @@ def pareto_page(report: Report) -> str:
     }
     script = (resources.files("infoset.experiments.pareto") / "page.js").read_text(encoding="utf-8")
     return motion_page(f"Encounter {report.problem.name}", about, time_s, views, own_script=script, own_data=data)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _affine(solution: EncounterSolution, index: int, time_s: Floats) -> tuple[Floats, Floats]:

@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from infoset.arrays import Floats
 from infoset.experiments.common.hill_axes import AXES
 from infoset.experiments.common.problem_command import trajectories_csv
 from infoset.experiments.common.screen import Part, number, number_table
 from infoset.experiments.pareto.file import TERMINAL, ParetoProblem
-from infoset.rendezvous.pareto import BoundCheck, Coalitions, EncounterSolution, Feasibility, distances
+from infoset.rendezvous.bounded_control import BoundedFlight
+from infoset.rendezvous.pareto import (
+    BoundedEncounter,
+    Coalitions,
+    EncounterSolution,
+    Plan,
+    distances,
+    peak_control,
+    total_impulse,
+)
 
 SAMPLES = 31
 """Number of times in a trajectory of the CSV file."""
@@ -26,22 +38,74 @@ _ZERO = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
+class ImposedBound:
+    """The meeting with a bound on the control that a minimum-energy control without it exceeds.
+
+    `least_m_s2` is the smallest bound with which any meeting is possible, and `peaks_without_m_s2` are the maximum
+    controls to the meeting without the bound.
+    """
+
+    encounter: BoundedEncounter
+    least_m_s2: float
+    peaks_without_m_s2: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Report:
     """Results of one command.
 
-    `selections` are Pareto-optimal meetings, shape (f,), by the rule of their choice. There are no `coalitions` if
-    there are too many craft, and no `bounds` if the problem has no bound on the control. `sweep` has other times of the
-    meeting.
+    `solution`, `selections`, `coalitions` and `sweep` do not depend on a bound on the control; the meeting, its
+    costs and its flights do. `selections` are Pareto-optimal meetings, shape (f,), by the rule of their choice. There
+    are no `coalitions` if there are too many craft, and there is no `imposed` bound if the problem has none, or it
+    changes nothing. `sweep` has other times of the meeting.
     """
 
     problem: ParetoProblem
     solution: EncounterSolution
     selections: Mapping[str, Floats]
     coalitions: Coalitions | None
-    bounds: tuple[BoundCheck, ...]
-    peaks_m_s2: tuple[float, ...]
-    impulses_m_s: tuple[float, ...]
+    imposed: ImposedBound | None
     sweep: tuple[EncounterSolution, ...]
+
+    @cached_property
+    def point(self) -> Floats:
+        """Free values of the meeting, shape (f,)."""
+        return self.solution.point if self.imposed is None else self.imposed.encounter.point
+
+    @cached_property
+    def flights(self) -> tuple[Plan | BoundedFlight, ...]:
+        """Flights of the craft to the meeting."""
+        if self.imposed is not None:
+            return self.imposed.encounter.flights
+        return tuple(self.solution.plan(index) for index in range(len(self.solution.costs)))
+
+    @cached_property
+    def cost_squared(self) -> Floats:
+        """J_i^2 of the flights, m^2/s^3, shape (n,)."""
+        return self.solution.cost_squared() if self.imposed is None else self.imposed.encounter.cost_squared
+
+    @cached_property
+    def excess(self) -> Floats:
+        """J_i^2 - J_i*^2 of the flights, m^2/s^3, shape (n,); J_i* is the cost without a bound."""
+        if self.imposed is None:
+            return self.solution.excess()
+        ideal = [cost.ideal_cost_squared for cost in self.solution.costs]
+        return np.asarray(self.imposed.encounter.cost_squared - ideal)
+
+    @cached_property
+    def group_loss(self) -> float:
+        """Weighted sum of the excesses, m^2/s^3."""
+        return float(self.excess @ self.solution.encounter.weights)
+
+    @cached_property
+    def peaks_m_s2(self) -> tuple[float, ...]:
+        """Maximum |u| of the flights."""
+        return tuple(peak_control(flight) for flight in self.flights)
+
+    @cached_property
+    def impulses_m_s(self) -> tuple[float, ...]:
+        """Total impulse of the flights."""
+        return tuple(total_impulse(flight) for flight in self.flights)
 
 
 def report_json(report: Report) -> dict[str, object]:
@@ -57,9 +121,10 @@ def report_json(report: Report) -> dict[str, object]:
         "meeting_time_s": encounter.meeting_s,
         "meet": encounter.meeting,
         "free": [component.name.lower() for component in encounter.free],
-        "meeting": _named_state(solution, solution.point),
+        "meeting": _named_state(solution, report.point),
         "craft": [_craft_json(report, index) for index in range(len(solution.costs))],
-        "group_loss_m2_s3": solution.group_loss(),
+        "group_loss_m2_s3": report.group_loss,
+        "imposed_bound": _imposed_json(report),
         "matrix": [cost.matrix for cost in solution.costs[: 1 if solution.same_matrix else None]],
         **({"distances": distances(solution)} if solution.same_matrix else {}),
         "selections": {
@@ -89,21 +154,33 @@ def _named_state(solution: EncounterSolution, point: Floats) -> dict[str, float]
 def _craft_json(report: Report, index: int) -> dict[str, object]:
     solution = report.solution
     cost = solution.costs[index]
-    values: dict[str, object] = {
+    return {
         "name": cost.craft.name,
         "weight": cost.craft.weight,
         "ideal": _named_state(solution, cost.ideal),
         "ideal_cost_squared_m2_s3": cost.ideal_cost_squared,
-        "cost_squared_m2_s3": solution.cost_squared()[index],
-        "excess_m2_s3": solution.excess()[index],
+        "cost_squared_m2_s3": report.cost_squared[index],
+        "excess_m2_s3": report.excess[index],
         "impulse_m_s": report.impulses_m_s[index],
         "peak_control_m_s2": report.peaks_m_s2[index],
-        "costate_at_meeting": solution.plan(index).costate,
+        "costate_at_meeting": report.flights[index].costate,
     }
-    if report.bounds:
-        check = report.bounds[index]
-        values |= {"min_peak_control_m_s2": check.min_peak_m_s2, "feasibility": check.feasibility}
-    return values
+
+
+def _imposed_json(report: Report) -> dict[str, object] | None:
+    imposed, solution = report.imposed, report.solution
+    if imposed is None:
+        return None
+    return {
+        "max_control_m_s2": imposed.encounter.max_m_s2,
+        "smallest_possible_m_s2": imposed.least_m_s2,
+        "without": {
+            "meeting": _named_state(solution, solution.point),
+            "cost_squared_m2_s3": solution.cost_squared(),
+            "peak_control_m_s2": imposed.peaks_without_m_s2,
+            "group_loss_m2_s3": solution.group_loss(),
+        },
+    }
 
 
 def _coalitions_json(coalitions: Coalitions | None, names: list[str]) -> dict[str, object]:
@@ -125,38 +202,42 @@ def _coalitions_json(coalitions: Coalitions | None, names: list[str]) -> dict[st
 
 def trajectories(report: Report) -> str:
     """Return the trajectories as CSV."""
-    plans = map(report.solution.plan, range(len(report.solution.costs)))
     tracks = [
-        ([plan.craft.name], [times, plan.state(times), plan.control(times)])
-        for plan in plans
-        for times in [plan.times(SAMPLES)]
+        ([cost.craft.name], [times, flight.state(times), flight.control(times)])
+        for cost, flight in zip(report.solution.costs, report.flights, strict=True)
+        for times in [flight.times(SAMPLES)]
     ]
     return trajectories_csv(["craft"], tracks)
+
+
+def imposed_text(report: Report, imposed: ImposedBound) -> str:
+    """Return what the bound changes, and which results do not depend on it."""
+    peak, bound = max(imposed.peaks_without_m_s2), imposed.encounter.max_m_s2
+    return (
+        f"the bound of {bound:g} m/s^2 is imposed: without it the controls reach {peak:.4g} m/s^2, and the group loss "
+        f"is {float(report.solution.group_loss()):.6g} in place of {report.group_loss:.6g} m^2/s^3; the "
+        f"smallest possible bound is {imposed.least_m_s2:.6g} m/s^2. Ideals, choices, coalitions and other meeting "
+        "times are without the bound"
+    )
 
 
 def report_lines(report: Report) -> Iterator[Part]:
     """Yield the meeting, the costs, the choices and the coalitions, for the screen."""
     solution, encounter = report.solution, report.problem.encounter
     names = [cost.craft.name for cost in solution.costs]
-    meeting = ", ".join(f"{key} = {value:.6g}" for key, value in _named_state(solution, solution.point).items())
+    meeting = ", ".join(f"{key} = {value:.6g}" for key, value in _named_state(solution, report.point).items())
     yield f"{report.problem.name}: {encounter.meeting.value} at {encounter.meeting_s:g} s: {meeting}"
     yield f"axes: {AXES}"
     table = number_table(
         "craft", "ideal J*^2\nm^2/s^3", "J^2\nm^2/s^3", "excess\nm^2/s^3", "impulse\nm/s", "peak |u|\nm/s^2"
     )
     ideal = [cost.ideal_cost_squared for cost in solution.costs]
-    columns = (ideal, solution.cost_squared(), solution.excess(), report.impulses_m_s, report.peaks_m_s2)
+    columns = (ideal, report.cost_squared, report.excess, report.impulses_m_s, report.peaks_m_s2)
     for name, *row in zip(names, *columns, strict=True):
         table.add_row(name, *(number(float(value)) for value in row))
     yield table
-    bound = report.problem.max_control_m_s2 or 0.0
-    for name, check in zip(names, report.bounds, strict=False):
-        if check.feasibility is Feasibility.ANOTHER_CONTROL:
-            yield (
-                f"{name}: the minimum-energy control exceeds the bound {bound:g} m/s^2 by "
-                f"{check.peak_m_s2 / bound - 1.0:.2%}; another control satisfies the bound (the smallest possible peak "
-                f"is {check.min_peak_m_s2:.6g} m/s^2)"
-            )
+    if report.imposed is not None:
+        yield imposed_text(report, report.imposed)
     free = [component.name.lower() for component in encounter.free]
     titles = [f"{name}, {'m' if len(name) == 1 else 'm/s'}" for name in free]
     chosen = number_table("choice", *titles, "group loss\nm^2/s^3")

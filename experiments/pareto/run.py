@@ -13,20 +13,19 @@ from infoset.experiments.common.screen import BeginProgress
 from infoset.experiments.pareto.command import Pareto
 from infoset.experiments.pareto.file import TERMINAL, ParetoProblem
 from infoset.experiments.pareto.page import pareto_page
-from infoset.experiments.pareto.report import Report, report_json, report_lines, trajectories
+from infoset.experiments.pareto.report import ImposedBound, Report, report_json, report_lines, trajectories
 from infoset.limits import MAXIMUM
+from infoset.rendezvous.bounded_control import BoundTooSmallError
 from infoset.rendezvous.pareto import (
-    BoundCheck,
     EncounterSolution,
-    Feasibility,
     analyse_coalitions,
-    check_bound,
+    bound_encounter,
     min_sum_of_costs,
     minimax_excess,
     nearest_to,
+    needed_bound,
     peak_control,
     solve_encounter,
-    total_impulse,
 )
 from infoset.rendezvous.pareto.coalitions import MAX_CRAFT
 
@@ -46,10 +45,9 @@ def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Repo
         **({} if preferred is None else {"preferred": nearest_to(solution, preferred)}),
     }
     progress(0.2)
-    bounds = _bounds(problem, solution)
+    imposed = _imposed(problem, solution)
     progress(0.4)
-    plans = [solution.plan(index) for index in range(len(solution.costs))]
-    coalitions = analyse_coalitions(solution) if len(plans) <= MAX_CRAFT else None
+    coalitions = analyse_coalitions(solution) if len(solution.costs) <= MAX_CRAFT else None
     progress(0.9)
     latest_s = max(craft.start_s for craft in encounter.craft)
     times_s = (latest_s + (encounter.meeting_s - latest_s) * np.linspace(*SWEEP)).tolist()
@@ -58,9 +56,7 @@ def solve(problem: ParetoProblem, options: Pareto, begin: BeginProgress) -> Repo
         solution,
         selections,
         coalitions,
-        bounds,
-        peaks_m_s2=tuple(peak_control(plan) for plan in plans),
-        impulses_m_s=tuple(total_impulse(plan) for plan in plans),
+        imposed,
         sweep=tuple(solve_encounter(replace(encounter, meeting_s=time_s)) for time_s in times_s),
     )
 
@@ -83,21 +79,30 @@ def _preferred(text: str, problem: ParetoProblem) -> Floats:
     return np.array([values[key] for key in keys])
 
 
-def _bounds(problem: ParetoProblem, solution: EncounterSolution) -> tuple[BoundCheck, ...]:
-    """Return the check of the bound for each craft; refuse a bound that no control keeps."""
+def _imposed(problem: ParetoProblem, solution: EncounterSolution) -> ImposedBound | None:
+    """Return the meeting with the bound; None if there is none, or the minimum-energy controls keep it."""
     bound, encounter = problem.max_control_m_s2, problem.encounter
     if bound is None:
-        return ()
-    checks = [check_bound(solution.plan(index), bound, encounter.common) for index in range(len(solution.costs))]
-    worst = max(range(len(checks)), key=lambda index: checks[index].min_peak_m_s2)
-    need = checks[worst].min_peak_m_s2
-    if checks[worst].feasibility is Feasibility.IMPOSSIBLE:
+        return None
+    peaks = [peak_control(solution.plan(index)) for index in range(len(solution.costs))]
+    if max(peaks) <= bound:
+        return None
+    least = needed_bound(encounter)
+    key = f"{problem.name}: max_control_m_s2"
+    if bound < least.value_m_s2:
+        names = " and ".join(encounter.craft[index].name for index in least.craft)
         raise InputError(
-            f"{problem.name}: max_control_m_s2: no control of at most {bound:g} m/s^2 brings the craft "
-            f"{encounter.craft[worst].name} to the meeting; at least {need:.6g} m/s^2 is needed, {need / bound:.4g} "
-            "times the bound; raise it, or make duration_s longer"
+            f"{key}: no meeting is possible with controls of at most {bound:g} m/s^2; {names} need at least "
+            f"{least.value_m_s2:.6g} m/s^2, {least.value_m_s2 / bound:.4g} times the bound; raise it, or make "
+            "duration_s longer"
         )
-    return tuple(checks)
+    try:
+        return ImposedBound(bound_encounter(solution, bound), least.value_m_s2, tuple(peaks))
+    except BoundTooSmallError as error:
+        raise InputError(
+            f"{key}: {error}; the smallest bound with which a meeting is possible is {least.value_m_s2:.6g} m/s^2; "
+            "raise it, or make duration_s longer"
+        ) from None
 
 
 COMMAND = ProblemCommand(

@@ -1,5 +1,6 @@
 """Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their order."""
 
+from infoset.rendezvous.multipoint.bounded import bound_path, bound_visits, needed_bound
 from infoset.rendezvous.multipoint.kepler import KeplerTour
 from infoset.rendezvous.multipoint.order import (
     MAX_TARGETS,
@@ -36,6 +37,9 @@ __all__ = [
     "best_order",
     "best_order_of_slots",
     "best_times",
+    "bound_path",
+    "bound_visits",
+    "needed_bound",
     "optimise_times",
     "search_grid",
     "solve_segments",

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from infoset.rendezvous._arrays import Flags, Floats, Integers
+from infoset.rendezvous.bounded_control import power
 from infoset.rendezvous.relative_motion import LinearMotion
 from infoset.rendezvous.relative_motion.linear_motion import state_scales
 
@@ -228,12 +229,13 @@ def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
         raise ValueError(f"times must increase: visit {index + 1} is at {arrive_s[index]:g} s, not after {limit}")
 
 
-def time_gradient(nodes: Nodes, arrive: Floats, before: Floats, after: Floats) -> Floats:
+def time_gradient(nodes: Nodes, arrive: Floats, before: Floats, after: Floats, max_m_s2: float = np.inf) -> Floats:
     """dI/dt, shape (N,), from the chaser's states at the nodes and its costates before and after them, shapes (N, 6).
 
     D'(V_i - V) at a flyby. H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous: as the target coasts in the
-    dynamics of the chaser, this is the power 1/2 |u|^2, after minus before.
+    dynamics of the chaser, this is the power lambda_V' u - 1/2 |u|^2, after minus before; 1/2 |u|^2 below the bound.
     """
     flyby = ((before - after)[:, :3] * (nodes.arrive[:, 3:] - arrive[:, 3:])).sum(axis=1)
-    power = 0.5 * (after[:, 3:] ** 2).sum(axis=1) - 0.5 * (before[:, 3:] ** 2).sum(axis=1)
-    return np.asarray(np.where(nodes.rendezvous, power, flyby))
+    sizes_before, sizes_after = (np.linalg.norm(costates[:, 3:], axis=1) for costates in (before, after))
+    change = power(sizes_after, max_m_s2) - power(sizes_before, max_m_s2)
+    return np.asarray(np.where(nodes.rendezvous, change, flyby))

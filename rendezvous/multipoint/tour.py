@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from infoset.rendezvous._arrays import Floats, Integers
-from infoset.rendezvous.multipoint.segments import Nodes, Path, solve_segments
+from infoset.rendezvous.multipoint.segments import LinearPath, Nodes, Path, solve_segments
 from infoset.rendezvous.relative_motion import LinearMotion
 
 SMOOTH = 4.0 / 3.0
@@ -127,6 +127,6 @@ class Tour(Visits):
         coasted = self.motion.transition(np.zeros(time_s.shape), time_s) @ self.initial[which][:, :, None]
         return np.asarray(coasted[:, :, 0])
 
-    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
+    def flyer(self, order: Sequence[int]) -> Callable[[Floats], LinearPath]:
         """Return `fly` for one `order`; the path is unique."""
         return lambda time_s: solve_segments(self.motion, self.start_s, self.start_state, self.nodes(order, time_s))

@@ -1,15 +1,8 @@
 """Minimum-energy encounter of several craft, and the choice among its Pareto-optimal meetings."""
 
+from infoset.rendezvous.pareto.bounded import BoundedEncounter, NeededBound, bound_encounter, needed_bound
 from infoset.rendezvous.pareto.coalitions import Coalition, Coalitions, Core, analyse_coalitions
 from infoset.rendezvous.pareto.encounter import Component, Craft, Encounter, Meeting
-from infoset.rendezvous.pareto.feasibility import (
-    BoundCheck,
-    Feasibility,
-    check_bound,
-    min_peak,
-    peak_control,
-    total_impulse,
-)
 from infoset.rendezvous.pareto.front import distances, pareto_set, simplex_weights
 from infoset.rendezvous.pareto.selections import min_sum_of_costs, minimax_excess, nearest_to
 from infoset.rendezvous.pareto.solution import (
@@ -19,9 +12,10 @@ from infoset.rendezvous.pareto.solution import (
     solve_encounter,
     weighted_point,
 )
+from infoset.rendezvous.pareto.thrust import Flight, peak_control, total_impulse
 
 __all__ = [
-    "BoundCheck",
+    "BoundedEncounter",
     "Coalition",
     "Coalitions",
     "Component",
@@ -30,16 +24,17 @@ __all__ = [
     "CraftCost",
     "Encounter",
     "EncounterSolution",
-    "Feasibility",
+    "Flight",
     "Meeting",
+    "NeededBound",
     "Plan",
     "analyse_coalitions",
-    "check_bound",
+    "bound_encounter",
     "distances",
-    "min_peak",
     "min_sum_of_costs",
     "minimax_excess",
     "nearest_to",
+    "needed_bound",
     "pareto_set",
     "peak_control",
     "simplex_weights",

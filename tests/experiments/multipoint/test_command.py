@@ -266,11 +266,59 @@ def test_unsound_problems_are_refused(
     assert [each.name for each in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_a_bound_that_the_control_exceeds_says_by_how_much(infoset: Command) -> None:
-    peak = found(infoset, "service-3")["peak_control_m_s2"]
-    err = infoset.refused("multipoint", "service-3", "--set", "max_control_m_s2=0.002")
-    assert f"reaches {peak:.6g} m/s^2, {peak / 0.002 - 1.0:.2%} over the bound of 0.002 m/s^2" in err
-    assert infoset("multipoint", "service-3", "--set", f"max_control_m_s2={peak * 1.0001}", "-q")[0] == 0
+def test_bound_above_the_peak_changes_nothing(infoset: Command) -> None:
+    without = found(infoset, "service-3")
+    bounded = found(infoset, "service-3", "--set", f"max_control_m_s2={without['peak_control_m_s2'] * 1.0001}")
+    assert bounded | {"problem_hash": ""} == without | {"problem_hash": ""}
+    assert bounded["imposed_bound"] is None
+
+
+def test_bound_below_the_peak_is_imposed(infoset: Command) -> None:
+    without = found(infoset, "service-3")
+    bounded = found(infoset, "service-3", "--set", "max_control_m_s2=0.005")
+    _, screen, _ = infoset("multipoint", "service-3", "--set", "max_control_m_s2=0.005", "--html", "page.html")
+
+    assert bounded["peak_control_m_s2"] == pytest.approx(0.005, rel=1e-9)
+    assert bounded["cost_m2_s3"] > without["cost_m2_s3"]
+    imposed = bounded["imposed_bound"]
+    assert imposed["cost_without_m2_s3"] == without["cost_m2_s3"]
+    assert imposed["peak_control_without_m_s2"] == without["peak_control_m_s2"]
+    assert imposed["smallest_possible_m_s2"] < 0.005
+    (note,) = bounded["notes"]
+    assert note.startswith("the bound of 0.005 m/s^2 is imposed: without it the cost is 0.02114228 m^2/s^3")
+    assert note in " ".join(screen.split())
+    assert "0.005 m/s^2 is imposed" in Path("page.html").read_text()
+
+
+def test_best_times_and_order_with_a_bound(infoset: Command) -> None:
+    options = ("service-3", "--order", "best", "--times", "best")
+    bounded = found(infoset, *options, "--set", "max_control_m_s2=0.004")
+
+    assert bounded["peak_control_m_s2"] == pytest.approx(0.004, rel=1e-9)
+    assert bounded["cost_m2_s3"] > found(infoset, *options)["cost_m2_s3"]
+    gradient = bounded["time_gradient_m2_s4"]
+    assert max(abs(each) for each in gradient[:-1]) < 1e-6 * abs(gradient[-1])
+    assert "the order was chosen without the bound" in bounded["notes"]
+    assert "the best times without the bound were improved with it" in bounded["notes"]
+
+
+def test_bound_below_the_smallest_possible_one_is_refused(infoset: Command) -> None:
+    err = infoset.refused("multipoint", "service-3", "--set", "max_control_m_s2=0.003")
+    assert "no control of at most 0.003 m/s^2 makes the visits at these times" in err
+    least = float(err.split("at least ")[1].split(" m/s^2")[0])
+    just_above = found(infoset, "service-3", "--set", f"max_control_m_s2={1.001 * least}")
+    assert just_above["peak_control_m_s2"] == pytest.approx(1.001 * least, rel=1e-9)
+    close = infoset.refused("multipoint", "service-3", "--set", f"max_control_m_s2={least * (1.0 + 1e-9)}")
+    assert "m/s^2" in close
+    assert f"{least:.6g}" in close
+
+
+def test_bound_under_the_gravity_of_one_point_is_only_checked(infoset: Command) -> None:
+    peak = found(infoset, "asteroid-tour")["peak_control_m_s2"]
+    err = infoset.refused("multipoint", "asteroid-tour", "--set", "max_control_m_s2=0.0001")
+    assert f"reaches {peak:.6g} m/s^2, {peak / 0.0001 - 1.0:.2%} over the bound of 0.0001 m/s^2" in err
+    assert "the bound is checked but not imposed" in err
+    assert infoset("multipoint", "asteroid-tour", "--set", f"max_control_m_s2={peak * 1.0001}", "-q")[0] == 0
 
 
 def test_stays_that_fit_no_order(infoset: Command) -> None:

@@ -53,22 +53,52 @@ def test_an_intercept_and_craft_that_start_later(infoset: Command, mine: Callabl
     np.testing.assert_allclose(ends, np.tile(ends[0], (3, 1)), atol=1e-8)
 
 
-def test_a_bound_that_another_control_meets(infoset: Command) -> None:
-    code, out, _ = infoset("pareto", "--set", "max_control_m_s2=1.4", "--json", "found.json")
+def test_bound_above_the_peaks_changes_nothing(infoset: Command) -> None:
+    without = infoset.json("pareto", "-q")
+    bounded = infoset.json("pareto", "-q", "--set", "max_control_m_s2=1.6")
+    assert bounded | {"problem_hash": ""} == without | {"problem_hash": ""}
+    assert without["imposed_bound"] is None
+
+
+def test_bound_below_a_peak_is_imposed(infoset: Command) -> None:
+    without = infoset.json("pareto", "-q")
+    code, screen, _ = infoset(
+        "pareto", "--set", "max_control_m_s2=1.1", "--json", "x.json", "--csv", "x.csv", "--html", "x.html"
+    )
     assert code == 0
-    craft = strict(Path("found.json").read_text())["craft"]
-    assert [each["feasibility"] for each in craft] == ["within", "within", "another-control"]
-    assert craft[2]["min_peak_control_m_s2"] < 1.4 < craft[2]["peak_control_m_s2"]
-    assert f"exceeds the bound 1.4 m/s^2 by {craft[2]['peak_control_m_s2'] / 1.4 - 1.0:.2%}" in out
+    bounded = strict(Path("x.json").read_text())
+
+    peaks = [craft["peak_control_m_s2"] for craft in bounded["craft"]]
+    assert peaks[0] < 1.1
+    assert peaks[1:] == pytest.approx([1.1, 1.1], rel=1e-9)
+    loss = sum(craft["excess_m2_s3"] for craft in bounded["craft"])
+    assert bounded["group_loss_m2_s3"] == pytest.approx(loss, rel=1e-12)
+    assert loss > without["group_loss_m2_s3"]
+    imposed = bounded["imposed_bound"]
+    assert imposed["without"]["meeting"] == without["meeting"]
+    assert imposed["without"]["group_loss_m2_s3"] == without["group_loss_m2_s3"]
+    # What does not depend on the bound stays.
+    for key in ("selections", "coalitions", "sweep", "matrix"):
+        assert bounded[key] == without[key]
+    rows = [line.split(",") for line in Path("x.csv").read_text().splitlines()[1:]]
+    controls = np.array([[float(cell) for cell in row[8:11]] for row in rows])
+    assert np.linalg.norm(controls, axis=1).max() <= 1.1 * (1.0 + 1e-9)
+    ends = np.array([[float(cell) for cell in row[2:8]] for row in rows if float(row[1]) == 30.0])
+    np.testing.assert_allclose(ends, np.tile([*bounded["meeting"].values()], (3, 1)), atol=1e-8)
+    words = "the bound of 1.1 m/s^2 is imposed: without it the controls reach 1.501 m/s^2"
+    assert words in " ".join(screen.split())
+    assert words[1:] in Path("x.html").read_text()
 
 
-def test_a_bound_that_no_control_meets_says_by_how_much(infoset: Command) -> None:
+def test_bound_that_no_meeting_keeps_is_refused_with_the_smallest_one(infoset: Command) -> None:
     err = infoset.refused("pareto", "--set", "max_control_m_s2=0.5")
-    assert "no control of at most 0.5 m/s^2 brings the craft third to the meeting" in err
+    assert "no meeting is possible with controls of at most 0.5 m/s^2; second and third need at least" in err
     minimum = float(err.split("at least ")[1].split(" m/s^2")[0])
     assert f"{minimum / 0.5:.4g} times the bound" in err
-    # Just over what is said, it can be met.
-    assert infoset("pareto", "--set", f"max_control_m_s2={minimum * 1.00001}", "-q")[0] == 0
+    # Just over what is said, it is possible; at it, the reason is the same.
+    assert infoset("pareto", "--set", f"max_control_m_s2={minimum * 1.001}", "-q")[0] == 0
+    close = infoset.refused("pareto", "--set", f"max_control_m_s2={minimum * (1.0 + 1e-6)}")
+    assert f"{minimum:.6g} m/s^2" in close
 
 
 @pytest.mark.parametrize(
