@@ -31,7 +31,8 @@ from infoset.experiments.common.figure_style import (
 from infoset.experiments.common.hill_axes import AXIS_TITLES, component_titles
 from infoset.experiments.common.units import length_unit
 from infoset.experiments.pareto.report import CHOICES, Report
-from infoset.rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
+from infoset.rendezvous.bounded_control import BoundedFlight
+from infoset.rendezvous.pareto import BoundedEncounter, EncounterSolution, Plan, pareto_set, simplex_weights
 
 _VIEWS: tuple[tuple[int, ...], ...] = ((1, 0), (0, 1, 2), (1, 2), (0, 2))
 """Axes of the panels: three planes, and space in the second one."""
@@ -54,20 +55,33 @@ def _names(solution: EncounterSolution) -> list[str]:
 
 def draw_all(report: Report) -> Iterator[Figure]:
     """Draw the figures of a report, one after the other."""
-    yield draw_trajectories(report)
+    bounded = None if report.imposed is None else report.imposed.encounter
+    yield draw_trajectories(report.solution, bounded)
     yield draw_controls(report)
     yield draw_front(report)
 
 
 @style()
-def draw_trajectories(report: Report) -> Figure:
-    """Draw the trajectories in space and in three planes."""
+def draw_trajectories(solution: EncounterSolution, bounded: BoundedEncounter | None = None) -> Figure:
+    """Draw the trajectories to the meeting in space and in three planes.
+
+    They are those of minimum group loss without a bound on the control, or the `bounded` ones.
+    """
     figure = new_figure(150.0)
     panels = figure.subplot_mosaic("ab;cd", per_subplot_kw={"b": {"projection": "3d"}})
-    solution = report.solution
-    paths = [flight.state(flight.times(_POINTS))[:, :3] for flight in report.flights]
+
+    point: Floats
+    flights: tuple[Plan | BoundedFlight, ...]
+    if bounded is None:
+        point = solution.point
+        flights = solution.plans()
+    else:
+        point = bounded.point
+        flights = bounded.flights
+
+    paths = [flight.state(flight.times(_POINTS))[:, :3] for flight in flights]
     unit, per_m = length_unit(max(float(np.abs(path).max()) for path in paths))
-    meeting = solution.meeting_state(report.point)[:3] * per_m
+    meeting = solution.meeting_state(point)[:3] * per_m
     titles = [f"{title}, {unit}" for title in AXIS_TITLES]
     for panel, axes in zip(panels.values(), _VIEWS, strict=True):
         for index, (name, path) in enumerate(zip(_names(solution), paths, strict=True)):

@@ -77,7 +77,7 @@ class Report:
         """Flights of the craft to the meeting."""
         if self.imposed is not None:
             return self.imposed.encounter.flights
-        return tuple(self.solution.plan(index) for index in range(len(self.solution.costs)))
+        return self.solution.plans()
 
     @cached_property
     def cost_squared(self) -> Floats:

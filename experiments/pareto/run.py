@@ -84,7 +84,7 @@ def _imposed(problem: ParetoProblem, solution: EncounterSolution) -> ImposedBoun
     bound, encounter = problem.max_control_m_s2, problem.encounter
     if bound is None:
         return None
-    peaks = [peak_control(solution.plan(index)) for index in range(len(solution.costs))]
+    peaks = [peak_control(flight) for flight in solution.plans()]
     if max(peaks) <= bound:
         return None
     least = needed_bound(encounter)

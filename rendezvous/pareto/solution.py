@@ -133,6 +133,10 @@ class EncounterSolution:
         costate = cost.to_costate @ (cost.effort_base + cost.effort_slope @ (self.point if point is None else point))
         return Plan(cost.craft, self.encounter.meeting_s, costate)
 
+    def plans(self, point: Floats | None = None) -> tuple[Plan, ...]:
+        """Return the flights of all craft to a `point`, shape (f,)."""
+        return tuple(self.plan(index, point) for index in range(len(self.costs)))
+
 
 def solve_encounter(encounter: Encounter) -> EncounterSolution:
     """Solve an `encounter`.
